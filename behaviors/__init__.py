@@ -1,0 +1,1 @@
+"""py_trees leaves, one module per state of the task."""

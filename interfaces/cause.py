@@ -1,0 +1,33 @@
+"""Why something failed: one enumeration for the whole house."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+class CauseCode(StrEnum):
+    """Every reason that a leaf, a service or a run may name."""
+
+    OUT_OF_REACH = "out_of_reach"
+    NO_COLLISION_FREE_GOAL = "no_collision_free_goal"
+    PLANNING_FAILED = "planning_failed"
+    MOTION_BLOCKED = "motion_blocked"
+    GRASP_EMPTY = "grasp_empty"
+    GRASP_FAILED = "grasp_failed"
+    SLIPPED = "slipped"
+    CONNECTOR_NOT_FOUND = "connector_not_found"
+    SEARCH_EXHAUSTED = "search_exhausted"
+    NOT_STOWED = "not_stowed"
+    NOT_STILL = "not_still"
+    TOO_MANY_TRIES = "too_many_tries"
+    TIME_LIMIT = "time_limit"
+    INTERRUPTED = "interrupted"
+    INTERNAL_ERROR = "internal_error"
+
+
+@dataclass(frozen=True)
+class Cause:
+    """A cause: its code, one sentence with the numbers, and the tree path of the node that names it ('' before a tree)."""
+
+    code: CauseCode
+    message: str
+    node: str = ""

@@ -1,0 +1,42 @@
+"""Camera images as they cross rooms."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class Intrinsics:
+    """A pinhole camera without distortion. Lengths in pixels; pixel (0, 0) is the centre of the top left pixel."""
+
+    width: int
+    height: int
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+
+    @classmethod
+    def from_fov(cls, width: int, height: int, horizontal_fov: float) -> "Intrinsics":
+        """Square pixels, principal point in the middle; `horizontal_fov` in radians."""
+        f = 0.5 * width / float(np.tan(0.5 * horizontal_fov))
+        return cls(width, height, f, f, (width - 1) / 2, (height - 1) / 2)
+
+
+@dataclass(frozen=True, eq=False)
+class RgbdFrame:
+    """One exposure of an RGB-D camera, depth aligned to colour.
+
+    `rgb` is (H, W, 3) uint8; `depth` is (H, W) float32 metres along the optical axis, 0 where there is no reading;
+    `stamp` is the simulated second of the exposure; `number` counts exposures of this camera since the start.
+    `joints` are the encoder readings (6,) rad of the arm that carries the camera, at the exposure; None for a fixed one.
+    """
+
+    camera: str
+    number: int
+    stamp: float
+    rgb: NDArray[np.uint8]
+    depth: NDArray[np.float32]
+    intrinsics: Intrinsics
+    joints: NDArray[np.float64] | None = None

@@ -1,0 +1,1 @@
+"""Frames and joints in, trajectories out."""

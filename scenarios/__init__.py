@@ -1,0 +1,1 @@
+"""Cells and scenarios that ship with Regrasp (YAML)."""

@@ -1,0 +1,1 @@
+"""The world: arms, cable, sockets, cameras and their noise, faults, ground truth."""

@@ -1,0 +1,1 @@
+"""Tree files, and what loads and checks them."""
