@@ -1,1 +1,18 @@
 """Tree files, and what loads and checks them."""
+
+from trees.check import Finding, check_tree
+from trees.element import TreeSyntaxError
+from trees.load import TreeError, load_tree
+from trees.paths import in_tree_order, node_paths
+from trees.show import show_tree
+
+__all__ = [
+    "Finding",
+    "TreeError",
+    "TreeSyntaxError",
+    "check_tree",
+    "in_tree_order",
+    "load_tree",
+    "node_paths",
+    "show_tree",
+]

@@ -1,0 +1,45 @@
+"""What is wrong with an input: one line a finding, all findings at once."""
+
+import difflib
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+
+@dataclass(frozen=True, order=True)
+class Finding:
+    """One thing that is wrong: where (a file or an option; lines count from 1), what, and what would be right."""
+
+    source: str
+    line: int
+    message: str
+
+    def __str__(self) -> str:
+        text = f"{self.source}:{self.line}: {self.message}"
+        # What stands in a file must not steer the terminal.
+        return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
+
+
+class Findings(Exception):  # noqa: N818 - it is the list of findings that travels
+    """Raised for bad input. `items` holds every finding once, in the order of file and line."""
+
+    def __init__(self, items: Iterable[Finding]) -> None:
+        self.items = sorted(set(items))
+        super().__init__("\n".join(str(f) for f in self.items))
+
+
+def nearest(name: str, names: Iterable[str], what: str = "there are") -> str:
+    """The words that help after an unknown name: the nearest known one, else all that exist."""
+    known = sorted(names)
+    close = difflib.get_close_matches(name, known, n=1)
+    if close:
+        return f"did you mean {close[0]!r}?"
+    return f"{what} {', '.join(known)}" if known else "there are none"
+
+
+def shown(path: Path) -> str:
+    """A path as the user would write it: relative when it lies under the current folder."""
+    try:
+        return str(path.resolve().relative_to(Path.cwd()))
+    except (ValueError, OSError):
+        return str(path)

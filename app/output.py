@@ -1,0 +1,29 @@
+"""Where a run's record goes, and whether it can."""
+
+import os
+import tempfile
+from itertools import count
+from pathlib import Path
+
+from app.findings import Finding, shown
+
+
+def free_folder(scenario: str, seed: int) -> Path:
+    """The first of runs/SCENARIO-SEED-1, -2, ... that does not exist."""
+    return next(p for n in count(1) if not (p := Path("runs", f"{scenario}-{seed}-{n}")).exists())
+
+
+def findings(out: Path) -> list[Finding]:
+    """Why no run can be written to `out`; nothing is left behind by the look."""
+    if os.path.exists(out / "result.json"):
+        return [Finding(shown(out), 1, "already holds a run; name another folder")]
+    spot = out.absolute()
+    while not os.path.lexists(spot) and spot != spot.parent:
+        spot = spot.parent
+    if not os.path.isdir(spot):
+        return [Finding(shown(out), 1, f"{shown(spot)!r} is no folder; name another place")]
+    try:
+        with tempfile.TemporaryFile(dir=spot):
+            return []
+    except OSError as error:
+        return [Finding(shown(out), 1, f"cannot write in {shown(spot)!r} ({error.strerror}); name another place")]

@@ -1,0 +1,58 @@
+"""Shipped scenarios, cells and trees by name, and files by path."""
+
+import os
+from importlib.resources import files
+from pathlib import Path
+from typing import Literal
+
+from app.findings import Finding, Findings, nearest, shown
+
+Kind = Literal["scenario", "cell", "tree"]
+_SUFFIX: dict[Kind, str] = {"scenario": ".yaml", "cell": ".yaml", "tree": ".xml"}
+MAX_BYTES = 256 * 1024  # of a file that a person writes
+
+
+def shipped(kind: Kind) -> dict[str, Path]:
+    """Name to file of everything of this kind that comes with Regrasp, sorted by name."""
+    folders = {"scenario": ("scenarios",), "cell": ("scenarios", "cells"), "tree": ("trees",)}
+    package, *below = folders[kind]
+    folder = Path(str(files(package).joinpath(*below)))
+    return {path.stem: path for path in sorted(folder.glob("*" + _SUFFIX[kind]))}
+
+
+def resolve(kind: Kind, name: str, beside: Path, where: tuple[str, int] | None = None) -> Path:
+    """The file that `name` means: an existing file or what is written like one, from `beside`, else a shipped name.
+
+    Raises `Findings`, at the place `where` (source, line) that holds the name; without one, at the name itself.
+    """
+    path = beside / name
+    known = shipped(kind)
+    if name.endswith(_SUFFIX[kind]) or os.path.isfile(path):
+        return path
+    if name in known:
+        return known[name]
+    name = name if len(name) <= 80 else name[:77] + "..."
+    wrong = f"{name!r} is a folder" if name and os.path.isdir(path) else f"no {kind} named {name!r}"
+    hint = nearest(name, known, "the shipped ones are")
+    raise Findings([Finding(*(where or (name, 1)), f"{wrong}; {hint} (a path ends in {_SUFFIX[kind]})")])
+
+
+def read_text(path: Path, where: tuple[str, int] | None = None) -> str:
+    """The text of a file that a person wrote. Raises `Findings` when there is no such file or it is no text."""
+    source, line = where or (shown(path), 1)
+    if not os.path.isfile(path):
+        wrong = "is a folder" if os.path.isdir(path) else "does not exist" if not os.path.exists(path) else "is no file"
+        raise Findings([Finding(source, line, f"{shown(path)!r} {wrong}; name a file")])
+    try:
+        with path.open("rb") as stream:
+            data = stream.read(MAX_BYTES + 1)
+    except OSError as error:
+        raise Findings([Finding(source, line, f"cannot read {shown(path)!r}: {error.strerror}")]) from None
+    if len(data) > MAX_BYTES:
+        raise Findings([Finding(shown(path), 1, f"longer than {MAX_BYTES} bytes; name a file written by hand")])
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        at = data.count(b"\n", 0, error.start) + 1
+        message = f"byte {data[error.start]:#04x} is not UTF-8; save the file as UTF-8 text"
+        raise Findings([Finding(shown(path), at, message)]) from None

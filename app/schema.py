@@ -1,0 +1,160 @@
+"""Plain values against a pydantic model, with pydantic's errors told as findings at file and line."""
+
+import json
+from collections import defaultdict
+from collections.abc import Sequence
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
+
+from app.findings import Finding, Findings, nearest
+from app.yaml_lines import Document, Path, Value
+
+M = TypeVar("M", bound=BaseModel)
+Schema = dict[str, Any]  # a node of the model's JSON schema
+
+_METRES = "metres, such as 0.3"
+_LENGTHS = "size position zero earth jitter center seat base offset anchor length radius depth capture_distance"
+_UNITS = dict.fromkeys(_LENGTHS.split(), _METRES) | {  # by the name of the key that holds the number
+    "camera_position": _METRES,
+    "baseline": _METRES,
+    "seconds": "seconds, such as 1.5",
+    "sim_seconds": "seconds, such as 600.0",
+    "unintended_force": "newtons, such as 5.0",
+    "pull_out_force": "newtons, such as 10.0",
+    "hold_force": "newtons, such as 15.0",
+    "max_force": "newtons, such as 40.0",
+    "yaw_deg": "degrees, such as 30.0",
+    "sleep": "radians, such as 0.8",
+    "carried": "shares of the way from socket to clip, such as 0.5",
+}
+
+
+def validated(document: Document, model: type[M]) -> M:
+    """The model's instance. Raises `Findings` with every error; strict: text is never taken for a number."""
+    try:
+        return model.model_validate_json(json.dumps(document.value), strict=True)
+    except ValidationError as error:
+        root = model.model_json_schema()
+        errors = _best_branches(document.value, error.errors())
+        raise Findings(_finding(document, root, path, e) for path, e in errors) from None
+
+
+def _child(value: Value, step: str | int) -> tuple[bool, Value]:
+    """Whether `value` holds `step`, and what stands there."""
+    if isinstance(value, dict) and isinstance(step, str) and step in value:
+        return True, value[step]
+    if isinstance(value, list) and isinstance(step, int) and step < len(value):
+        return True, value[step]
+    return False, value
+
+
+def _split(value: Value, loc: Sequence[str | int]) -> tuple[Path, Path]:
+    """Pydantic's location as the path that the file has, and the steps it has not: union branches, missing keys."""
+    path: Path = ()
+    beside: Path = ()
+    for step in loc:
+        held, value = _child(value, step)
+        path, beside = ((*path, step), beside) if held else (path, (*beside, step))
+    return path, beside
+
+
+def _best_branches(value: Value, errors: list[ErrorDetails]) -> list[tuple[Path, ErrorDetails]]:
+    """Each error with its path in the file; of a union's branches only the one with the fewest errors."""
+    unions: dict[Path, dict[str | int, list[tuple[Path, ErrorDetails]]]] = defaultdict(lambda: defaultdict(list))
+    kept = []
+    for error in errors:
+        path, beside = _split(value, error["loc"])
+        if len(beside) > (error["type"] == "missing"):  # what is missing stands last in `beside`
+            spot = error["loc"][: error["loc"].index(beside[0])]
+            unions[spot][beside[0]].append((path, error))
+        else:
+            kept.append((path, error))
+    return kept + [e for branches in unions.values() for e in min(branches.values(), key=len)]
+
+
+def _finding(document: Document, root: Schema, path: Path, error: ErrorDetails) -> Finding:
+    kind, last = error["type"], error["loc"][-1:]
+    dotted = ".".join(map(str, path))
+    if kind == "missing" and isinstance(last[0], str):
+        expected = _expected(root, (*path, last[0]))
+        where = f" in {dotted}" if dotted else ""
+        message = f"key {last[0]!r} is missing{where}; expected {expected}"
+    elif kind == "extra_forbidden":
+        keys = {key for schema in _at(root, path[:-1]) for key in schema.get("properties", {})}
+        message = f"unknown key {str(path[-1])!r}; {nearest(str(path[-1]), keys)}"
+    elif kind == "value_error":
+        message = f"{dotted or 'the file'}: {error['msg'].removeprefix('Value error, ')}"
+    elif kind in ("literal_error", "enum") and isinstance(error["input"], str):
+        names = [name for schema in _at(root, path) for name in schema.get("enum", [schema.get("const")])]
+        message = f"{dotted}: no {error['input']!r}; {nearest(error['input'], names)}"
+    else:
+        message = f"{dotted or 'the file'} is {_short(document, path)}; expected {_expected(root, path)}"
+    return Finding(*document.place(path), message)
+
+
+def _short(document: Document, path: Path) -> str:
+    value = document.value
+    for step in path:
+        _, value = _child(value, step)
+    text = "empty" if value is None else repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _at(root: Schema, path: Path) -> list[Schema]:
+    """The schema nodes that describe the value at `path`; several where the model has a union."""
+    nodes = _open(root, root)
+    for step in path:
+        below = []
+        for node in nodes:
+            if isinstance(step, int):
+                items = node.get("prefixItems", [])
+                below.append(items[step] if step < len(items) else node.get("items"))
+            else:
+                below.append(node.get("properties", {}).get(step))
+        nodes = [opened for node in below if isinstance(node, dict) for opened in _open(root, node)]
+    return nodes
+
+
+def _open(root: Schema, node: Schema) -> list[Schema]:
+    """Follow references and unions to the nodes that say something."""
+    if "$ref" in node:
+        return _open(root, root["$defs"][node["$ref"].rsplit("/", 1)[1]])
+    if "anyOf" in node:
+        return [opened for option in node["anyOf"] for opened in _open(root, option)]
+    return [] if node.get("type") == "null" else [node]
+
+
+def _expected(root: Schema, path: Path) -> str:
+    """What would be right at `path`, in words."""
+    key = next((step for step in reversed(path) if isinstance(step, str)), "")
+    return " or ".join(dict.fromkeys(_words(node, key) for node in _at(root, path))) or "nothing"
+
+
+def _words(node: Schema, key: str) -> str:
+    if "const" in node or "enum" in node:
+        return "one of " + ", ".join(node.get("enum", [node.get("const")]))
+    kind = node.get("type")
+    if kind == "array":
+        items = node.get("prefixItems", [])
+        what = _words(items[0], key) if items and "$ref" not in items[0] else ""
+        return f"{len(items)} values, each {what}" if what else "a list"
+    if kind == "object":
+        return "a mapping of " + ", ".join(node.get("properties", {}))
+    if kind in ("number", "integer"):
+        unit = f" in {_UNITS[key]}" if key in _UNITS else ""
+        return ("a whole number" if kind == "integer" else "a number") + unit + _range(node)
+    return {"boolean": "true or false", "string": "text"}.get(str(kind), "another value")
+
+
+def _range(node: Schema) -> str:
+    bounds = {
+        "above": node.get("exclusiveMinimum"),
+        "at least": node.get("minimum"),
+        "below": node.get("exclusiveMaximum"),
+        "at most": node.get("maximum"),
+        "a multiple of": node.get("multipleOf"),
+    }
+    words = [f"{name} {bound:g}" for name, bound in bounds.items() if bound is not None]
+    return f" ({', '.join(words)})" if words else ""

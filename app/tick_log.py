@@ -1,0 +1,65 @@
+"""The tick log: each change of a node's status as one JSON line."""
+
+import json
+from collections.abc import Callable
+from typing import TextIO
+
+import py_trees
+from py_trees.common import Status
+
+from trees import in_tree_order, node_paths
+
+
+class TickLog(py_trees.visitors.VisitorBase):
+    """Writes {"t": simulated s, "path": "root/carry/move", "status": "RUNNING"} for every status that a tick changed.
+
+    Add it to a `BehaviourTree` as a visitor. Lines of one tick stand in tree order. Status is taken when a node is
+    visited, and once more after the tick: a node that was stopped later in the tick (preempted, or its Parallel ended)
+    is not visited again and goes INVALID unseen. After `root.stop(...)` outside a tick call `finalise()`.
+    """
+
+    def __init__(self, root: py_trees.behaviour.Behaviour, stream: TextIO, now: Callable[[], float]) -> None:
+        super().__init__(full=False)
+        paths = node_paths(root)
+        self._stream = stream
+        self._now = now
+        self._nodes = [(node, json.dumps(paths[node.id])) for node in in_tree_order(root)]
+        self._last = [node.status for node, _ in self._nodes]
+        self._visited: dict[int, Status] = {}
+
+    def initialise(self) -> None:
+        """Before a tick."""
+        self._visited.clear()
+
+    def run(self, behaviour: py_trees.behaviour.Behaviour) -> None:
+        """At a node's visit: its status may be gone when the tick ends."""
+        self._visited[id(behaviour)] = behaviour.status
+
+    def finalise(self) -> None:
+        """After a tick, or after a stop outside one: write what changed, and flush."""
+        stamp = json.dumps(round(self._now(), 6))
+        lines = []
+        for i, (node, path) in enumerate(self._nodes):
+            last = self._last[i]
+            for status in (self._visited.get(id(node), last), node.status):
+                if status is not last:
+                    lines.append(f'{{"t": {stamp}, "path": {path}, "status": "{status.value}"}}\n')
+                    last = status
+            self._last[i] = last
+        self._visited.clear()
+        if lines:
+            self._stream.write("".join(lines))
+            self._stream.flush()
+
+
+def active_leaf(root: py_trees.behaviour.Behaviour) -> str:
+    """The own name of the deepest RUNNING node, '' when the tree is at rest.
+
+    Of a Parallel's RUNNING children the last counts: monitors come first.
+    """
+    node = root if root.status is Status.RUNNING else None
+    name = ""
+    while node is not None:
+        name = node.name.rsplit(".", 1)[-1]
+        node = next((child for child in reversed(node.children) if child.status is Status.RUNNING), None)
+    return name

@@ -1,0 +1,124 @@
+"""A run as a film: overview, both cameras, and a few lines of text."""
+
+import subprocess
+from collections.abc import Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import cv2
+import numpy as np
+from imageio_ffmpeg import get_ffmpeg_exe
+from numpy.typing import NDArray
+
+Frame = NDArray[np.uint8]
+
+# Width and height are multiples of 16, as h264 has it. The cameras' 848x480 halved give the right column.
+SIZE = (1280, 544)
+OVERVIEW_SIZE = (856, 480)  # what an overview camera should render, to be shown without scaling
+_CAMERA_SIZE = (424, 240)
+_INK, _PAPER = (235, 235, 235), 24
+
+
+def compose(overview: Frame | None, rear: Frame | None, wrist: Frame | None, lines: Sequence[str]) -> Frame:
+    """One frame (544, 1280, 3) uint8 RGB: overview at the left, rear and wrist stacked at the right, text below.
+
+    Images are (H, W, 3) uint8 RGB of any size, scaled to fit; None leaves the place dark. Up to four lines, in two
+    columns; they stand on a dark band of their own.
+    """
+    frame: Frame = np.full((SIZE[1], SIZE[0], 3), _PAPER, np.uint8)
+    _place(frame, overview, (0, 0), OVERVIEW_SIZE)
+    for row, (label, image) in enumerate({"rear camera": rear, "wrist camera": wrist}.items()):
+        left, top = OVERVIEW_SIZE[0], row * _CAMERA_SIZE[1]
+        _place(frame, image, (left, top), _CAMERA_SIZE)
+        _write(frame, label, (left + 8, top + 20), 0.5)
+    for i, line in enumerate(lines[:4]):
+        column, row = divmod(i, 2)
+        _write(frame, line, (16 + column * SIZE[0] // 2, OVERVIEW_SIZE[1] + 25 + 27 * row), 0.6)
+    return frame
+
+
+def _place(frame: Frame, image: Frame | None, corner: tuple[int, int], size: tuple[int, int]) -> None:
+    """Copy the image, scaled to fit and centred, into the box at `corner` (left, top) of `size` (width, height)."""
+    if image is None:
+        return
+    scale = min(size[0] / image.shape[1], size[1] / image.shape[0])
+    width, height = (max(1, round(image.shape[1] * scale)), max(1, round(image.shape[0] * scale)))
+    if (height, width) != image.shape[:2]:
+        image = cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR)
+    left, top = corner[0] + (size[0] - width) // 2, corner[1] + (size[1] - height) // 2
+    frame[top : top + height, left : left + width] = image
+
+
+def _write(frame: Frame, text: str, origin: tuple[int, int], scale: float) -> None:
+    """Light letters with a dark rim, readable on anything; OpenCV's font has ASCII only."""
+    text = text.encode("ascii", "replace").decode()
+    for color, thickness in (((0, 0, 0), 4), (_INK, 1)):
+        cv2.putText(frame, text, origin, cv2.FONT_HERSHEY_SIMPLEX, scale, color, thickness, cv2.LINE_AA)
+
+
+class VideoWriter:
+    """An h264 film that any player takes, written by imageio_ffmpeg's own ffmpeg; a context manager.
+
+    ffmpeg runs in a session of its own, so that Ctrl-C reaches only us and the film can still be closed properly.
+    """
+
+    def __init__(self, path: Path, fps: float, size: tuple[int, int] = SIZE) -> None:
+        """`size` is (width, height) in pixels, both even.
+
+        Raises:
+            OSError: ffmpeg cannot be started.
+        """
+        self._shape = (size[1], size[0], 3)
+        self._broken = False
+        source = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}", "-r", str(fps), "-i", "-"]
+        target = ["-an", "-c:v", "libx264", "-preset", "veryfast", "-crf", "23", "-pix_fmt", "yuv420p"]
+        self._ffmpeg = subprocess.Popen(
+            [get_ffmpeg_exe(), "-y", "-v", "error", *source, *target, "-movflags", "+faststart", str(path)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            start_new_session=True,
+        )
+
+    def write(self, frame: Frame) -> None:
+        """Append a frame, (height, width, 3) uint8 RGB.
+
+        Raises:
+            ValueError: another shape or type.
+            OSError: ffmpeg has died (a full disk, say).
+        """
+        if frame.shape != self._shape or frame.dtype != np.uint8:
+            raise ValueError(f"a frame must be {self._shape} uint8, not {frame.shape} {frame.dtype}")
+        assert self._ffmpeg.stdin is not None
+        if self._broken:
+            return
+        try:
+            self._ffmpeg.stdin.write(np.ascontiguousarray(frame).data)
+        except BaseException:  # half a frame may be through: another one behind it would be torn
+            self._broken = True
+            raise
+
+    def close(self) -> None:
+        """End the film and wait until it is whole; again does nothing.
+
+        Raises:
+            OSError: ffmpeg could not write it.
+        """
+        stdin = self._ffmpeg.stdin
+        assert stdin is not None
+        if stdin.closed:
+            return
+        try:
+            stdin.close()
+        except BrokenPipeError:
+            pass  # its exit status says why
+        if code := self._ffmpeg.wait():
+            raise OSError(f"ffmpeg could not write the video (exit status {code})")
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()

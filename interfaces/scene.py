@@ -1,0 +1,26 @@
+"""What a scenario puts into the cell: obstacles and faults, already drawn from the seed where they vary."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from interfaces.cell import Box
+
+Gravity = Literal["zero", "earth"]
+EARTH_GRAVITY = 9.81  # m/s2
+
+
+@dataclass(frozen=True)
+class Obstacle:
+    """A foam piece: a box turned by `yaw` rad about z, and the thin stand under it when it does not stand on the floor."""
+
+    box: Box
+    yaw: float
+    stand: Box | None
+
+
+@dataclass(frozen=True)
+class JawOpens:
+    """The right jaw opens for `seconds` when the held end has gone the share `carried` of the way from socket to clip."""
+
+    carried: float
+    seconds: float

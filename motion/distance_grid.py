@@ -1,0 +1,44 @@
+"""How far the nearest seen surface is, looked up in a grid of voxels."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt
+
+FAR = 10.0  # metres; the distance where nothing is occupied
+
+
+@dataclass(frozen=True, eq=False)
+class DistanceGrid:
+    """Distances in metres to the nearest occupied voxel's centre, never more than the truth anywhere inside a voxel.
+
+    `distance` (nx, ny, nz) float32; `lower` (3,) is the corner of voxel (0, 0, 0) in world; `h` the voxel's edge. Outside
+    the grid nothing is known to be occupied. A grid knows only what it was given: mark unseen space where that matters.
+    """
+
+    distance: NDArray[np.float32]
+    lower: NDArray[np.float64]
+    h: float
+
+    @classmethod
+    def from_occupied(cls, occupied: NDArray[np.bool_], lower: NDArray[np.float64], h: float) -> "DistanceGrid":
+        """Grid of an occupancy array (nx, ny, nz)."""
+        if not occupied.any():
+            return cls(np.full(occupied.shape, FAR, np.float32), np.asarray(lower, float), h)
+        centres = np.asarray(distance_transform_edt(~occupied)) * h
+        # A point may lie half a voxel's diagonal off the centre that the transform measured from.
+        return cls((centres - 0.5 * np.sqrt(3.0) * h).astype(np.float32), np.asarray(lower, float), h)
+
+    @classmethod
+    def from_points(
+        cls, points: NDArray[np.float64], lower: NDArray[np.float64], upper: NDArray[np.float64], h: float
+    ) -> "DistanceGrid":
+        """Grid over the box `lower`..`upper` (3,) with a voxel occupied where one of the points (n, 3) lies."""
+        lower = np.asarray(lower, float)
+        shape = np.ceil((np.asarray(upper) - lower) / h).astype(int)
+        index = np.floor((np.asarray(points, float).reshape(-1, 3) - lower) / h).astype(int)
+        index = index[np.all((index >= 0) & (index < shape), axis=1)]
+        occupied = np.zeros(tuple(shape), dtype=np.bool_)
+        occupied[tuple(index.T)] = True
+        return cls.from_occupied(occupied, lower, h)

@@ -1,0 +1,187 @@
+"""Where the arm's links are for given joint angles, and which joint angles bring tool or camera to a pose.
+
+ViperX 300 S, maker's kinematics with the base height of rtb-data's URDF. Joints: waist, shoulder, elbow, forearm roll,
+wrist angle, wrist rotate. At zero the upper arm stands upright and the forearm points forward; every link frame then is
+parallel to the base frame.
+"""
+
+from collections.abc import Iterator
+
+import numba as nb
+import numpy as np
+from eaik.IK_HP import HPRobot
+from numpy.typing import NDArray
+from scipy.spatial.transform import RigidTransform
+
+FloatArray = NDArray[np.float64]
+
+# Joint origins in the parent link, metres, and rotation axes (0 x, 1 y, 2 z).
+ORIGINS = np.array(
+    [[0, 0, 0.0787], [0, 0, 0.04805], [0.05955, 0, 0.3], [0.2, 0, 0], [0.1, 0, 0], [0.069744, 0, 0]], dtype=np.float64
+)
+AXES = np.array([2, 1, 1, 0, 1, 0])
+TOOL_OFFSET = np.array([0.1072, 0.0, 0.0])  # tool centre in the last link
+
+# Limits, intersected over the maker's documentation and rtb-data's URDF.
+LOWER = np.deg2rad([-180.0, -106.0, -101.0, -180.0, -107.0, -180.0])
+UPPER = np.deg2rad([180.0, 72.0, 92.0, 180.0, 128.0, 180.0])
+VELOCITY_LIMIT = np.full(6, np.pi)  # rad/s, the maker's servos
+ACCELERATION_LIMIT = np.full(6, 5.0)  # rad/s2, the maker's MoveIt configuration for its six-joint arms
+
+_POSITION_TOLERANCE = 1e-4  # metres, of an inverse kinematics solution
+_ANGLE_TOLERANCE = 1e-3  # rad
+_CAMERA_POSITION_TOLERANCE = 0.002  # metres
+_CAMERA_AXIS_TOLERANCE = np.deg2rad(0.5)
+
+
+@nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
+def link_frames_in(base: FloatArray, q: FloatArray) -> FloatArray:
+    """Frames of base and links 1-6 (7, 4, 4) for a base frame (4, 4) and joints (6,) rad."""
+    out = np.zeros((7, 4, 4))
+    out[0] = base
+    for i in range(6):
+        parent, frame = out[i], out[i + 1]
+        c, s = np.cos(q[i]), np.sin(q[i])
+        a = AXES[i]
+        u, v = (a + 1) % 3, (a + 2) % 3
+        for r in range(3):
+            frame[r, 3] = parent[r, 3]
+            for k in range(3):
+                frame[r, 3] += parent[r, k] * ORIGINS[i, k]
+            frame[r, a] = parent[r, a]
+            frame[r, u] = c * parent[r, u] + s * parent[r, v]
+            frame[r, v] = c * parent[r, v] - s * parent[r, u]
+        frame[3, 3] = 1.0
+    return out
+
+
+def wrap(q: FloatArray) -> FloatArray:
+    """Angles brought into [-pi, pi)."""
+    return (q + np.pi) % (2 * np.pi) - np.pi
+
+
+@nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
+def _reaches(base: FloatArray, q: FloatArray, target: FloatArray) -> bool:
+    """Whether joints (6,) bring the tool to a target (4, 4) within the tolerances."""
+    frame = link_frames_in(base, q)[6]
+    position, rotation = 0.0, 0.0
+    for r in range(3):
+        position += (frame[r, 3] + frame[r, 0] * TOOL_OFFSET[0] - target[r, 3]) ** 2
+        for c in range(3):
+            rotation += (frame[r, c] - target[r, c]) ** 2
+    # |A - B| (Frobenius) = sqrt(8) sin(angle / 2): exact near zero, unlike the arc cosine of the trace
+    return position < _POSITION_TOLERANCE**2 and rotation < 8 * np.sin(_ANGLE_TOLERANCE / 2) ** 2
+
+
+class ArmKinematics:
+    """One arm whose base frame stands at `base` (world_from_base)."""
+
+    def __init__(self, base: RigidTransform) -> None:
+        self.base: FloatArray = np.ascontiguousarray(base.as_matrix())
+        self._base_inverse = np.linalg.inv(self.base)
+        self._solver = HPRobot(np.eye(3)[AXES], np.vstack([ORIGINS, TOOL_OFFSET]))
+
+    def link_frames(self, q: FloatArray) -> FloatArray:
+        """World frames (7, 4, 4) of the base and the six links, for joints (6,) rad."""
+        return link_frames_in(self.base, np.asarray(q, float))
+
+    def tool(self, q: FloatArray) -> RigidTransform:
+        """world_from_tool: x forward along the gripper, y the direction in which the fingers close."""
+        return RigidTransform.from_matrix(self._tool_matrix(q))
+
+    def wrist(self, q: FloatArray) -> RigidTransform:
+        """world_from_wrist: the link before the last joint; a wrist camera is fixed on it."""
+        return RigidTransform.from_matrix(self.link_frames(q)[5])
+
+    def ik(self, world_from_tool: RigidTransform) -> FloatArray:
+        """All joint vectors (n, 6) rad within the limits that bring the tool to a pose; (0, 6) when there is none.
+
+        Every row is checked by forward kinematics (0.1 mm, 1 mrad), for the analytic solver also answers poses out of reach.
+        """
+        return self._solve(world_from_tool.as_matrix())
+
+    def ik_view(self, world_from_camera: RigidTransform, wrist_from_camera: RigidTransform) -> FloatArray:
+        """Joint vectors (n, 6) rad that bring a wrist camera to a place and viewing direction, the most upright image first.
+
+        Five joints carry the camera, so the roll about the optical axis comes out as it may: position within 2 mm and
+        axis within 0.5 degrees are met, the last joint stays 0. The optical axis must be the wrist link's x axis.
+        """
+        wanted = world_from_camera.as_matrix()
+        mount = wrist_from_camera.as_matrix()
+        if mount[0, 2] < 1 - 1e-6:
+            raise ValueError(f"the camera must look along the wrist link's x axis, not along {mount[:3, 2]}")
+        found = [q for q in self._view_solutions(wanted, mount) if self._sees(q, wanted, mount)]
+        found.sort(key=lambda q: -float(self._camera_up(q, mount) @ -wanted[:3, 1]))
+        return _distinct(found)
+
+    def _tool_matrix(self, q: FloatArray) -> FloatArray:
+        frame: FloatArray = self.link_frames(q)[6]
+        frame[:3, 3] += frame[:3, :3] @ TOOL_OFFSET
+        return frame
+
+    def _solve(self, target: FloatArray) -> FloatArray:
+        """`ik` of a (4, 4) matrix."""
+        good = []
+        for raw in self._solver.IK(self._base_inverse @ target).Q:
+            q = wrap(np.asarray(raw, float))
+            if not _reaches(self.base, q, target):
+                q = self._straight_wrist(q, target)
+                if not _reaches(self.base, q, target):
+                    continue
+            if np.all((q >= LOWER) & (q <= UPPER)):
+                good.append(q)
+        return _distinct(good)
+
+    def _straight_wrist(self, raw: FloatArray, target: FloatArray) -> FloatArray:
+        """Repair of a branch with the wrist straight, where the solver only gives a least-squares orientation."""
+        arm = np.array([raw[0], raw[1], raw[2], 0.0, 0.0, 0.0])
+        turn = self.link_frames(arm)[3, :3, :3].T @ target[:3, :3]
+        arm[5] = np.arctan2(turn[2, 1] - turn[1, 2], turn[1, 1] + turn[2, 2])
+        return wrap(arm)
+
+    def _view_solutions(self, wanted: FloatArray, mount: FloatArray) -> Iterator[FloatArray]:
+        """Fixed-point iteration over the roll: an answer's last joint says by how much the roll was off."""
+        tool_from_mount = mount.copy()
+        tool_from_mount[0, 3] -= ORIGINS[5, 0] + TOOL_OFFSET[0]
+        tool_target = wanted @ np.linalg.inv(tool_from_mount)
+        for start in (0.0, 0.5 * np.pi, -0.5 * np.pi, np.pi):
+            for q in self._solve(_rolled(tool_target, wanted, start)):
+                roll = start
+                for _ in range(20):
+                    if abs(q[5]) < 1e-4:
+                        yield np.append(q[:5], 0.0)
+                        break
+                    roll -= q[5]
+                    branches = self._solve(_rolled(tool_target, wanted, roll))
+                    if not len(branches):
+                        break
+                    q = branches[np.argmin(np.abs(wrap(branches[:, :5] - q[:5])).sum(axis=1) + np.abs(branches[:, 5]))]
+
+    def _sees(self, q: FloatArray, wanted: FloatArray, mount: FloatArray) -> bool:
+        camera = self.link_frames(q)[5] @ mount
+        near = float(np.linalg.norm(camera[:3, 3] - wanted[:3, 3])) < _CAMERA_POSITION_TOLERANCE
+        cross = float(np.linalg.norm(np.cross(camera[:3, 2], wanted[:3, 2])))
+        return near and cross < np.sin(_CAMERA_AXIS_TOLERANCE) and float(camera[:3, 2] @ wanted[:3, 2]) > 0
+
+    def _camera_up(self, q: FloatArray, mount: FloatArray) -> FloatArray:
+        up: FloatArray = -(self.link_frames(q)[5] @ mount)[:3, 1]
+        return up
+
+
+def _rolled(tool_target: FloatArray, wanted: FloatArray, roll: float) -> FloatArray:
+    """The tool target turned by `roll` rad about the wanted optical axis through the wanted camera position."""
+    x, y, z = wanted[:3, 2]
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    turn = np.eye(4)
+    turn[:3, :3] = np.eye(3) + np.sin(roll) * cross + (1 - np.cos(roll)) * cross @ cross
+    turn[:3, 3] = wanted[:3, 3] - turn[:3, :3] @ wanted[:3, 3]
+    return turn @ tool_target
+
+
+def _distinct(rows: list[FloatArray]) -> FloatArray:
+    """The rows as (n, 6) without repetitions (equal within 1 mrad), order kept."""
+    kept: list[FloatArray] = []
+    for row in rows:
+        if all(np.abs(wrap(row - other)).max() > 1e-3 for other in kept):
+            kept.append(row)
+    return np.array(kept).reshape(-1, 6)

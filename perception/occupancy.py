@@ -1,0 +1,124 @@
+"""Obstacles from depth images: what an arm must keep clear of besides the boxes that it was told of."""
+
+from collections.abc import Sequence
+from enum import IntEnum
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import RigidTransform
+
+from interfaces.cell import Box, Connector
+from interfaces.frame import Intrinsics, RgbdFrame
+from perception.camera_model import project, rays, subsampled
+from perception.segmentation import SegmentationParameters, color_mask
+
+FloatArray = NDArray[np.float64]
+Depth = NDArray[np.float32]
+Mask = NDArray[np.bool_]
+Spheres = tuple[FloatArray, FloatArray]  # centres (n, 3) m in the world, radii (n,) m
+
+STEP = 4  # pixels; choice: 5 mm apart at 0.75 m, a third of a voxel
+KNOWN_MARGIN = 0.025  # m; choice: depth scale 1.5 % of 0.85 m is 13 mm, camera pose 6 mm, noise 4 mm
+ASSUMED_DEPTH = 0.08  # m; choice: how far an obstacle reaches behind its seen surface until a view shows otherwise
+EDGE = 0.03  # m; neighbours that differ by more are an edge, where depth readings fly between the surfaces
+ROBOT_MARGIN = 0.02  # m; choice: arms are 5 mm off, depth scale 13 mm
+DARK = 45  # of 255; choice: the cable's 0.06 is 15 in full light
+THIN = 0.0075  # m; choice: a dark pixel nearer than this to a lighter one is cable (7 mm) or the rim of a dark thing
+CLOSER = 1.1  # choice: a look from up to this many times the range may overrule the one before
+
+
+class Voxel(IntEnum):
+    """What is known of a voxel."""
+
+    UNSEEN = 0
+    FREE = 1  # looked through
+    BEHIND = 2  # assumed full: behind a seen surface
+    SURFACE = 3  # seen
+
+
+class Occupancy:
+    """Voxels of a region of the world. Known boxes are left to those who check them exactly."""
+
+    def __init__(
+        self, lower: FloatArray, upper: FloatArray, known: Sequence[Box], connector: Connector, h: float = 0.015
+    ) -> None:
+        """Region from `lower` to `upper` (3,) m in voxels of edge `h` m; `known` boxes and the connector are no obstacles."""
+        counts = np.ceil((upper - lower) / h - 1e-9).astype(int)
+        grid = np.moveaxis(np.indices(tuple(counts)), 0, -1).reshape(-1, 3)
+        centers = lower + (grid + 0.5) * h
+        self.h = h
+        self._known = known
+        self._centers = np.ascontiguousarray(centers[~near_boxes(centers, known)])
+        self._state = np.zeros(len(self._centers), np.uint8)
+        self._range = np.full(len(self._centers), np.inf, np.float32)  # of the look that decided the state
+        self._color = SegmentationParameters.for_color(connector.color)
+
+    def occupied_points(self) -> FloatArray:
+        """Centres (n, 3) m, world frame, of the voxels seen or assumed to be full."""
+        return np.asarray(self._centers[self._state >= Voxel.BEHIND])
+
+    def integrate(self, frame: RgbdFrame, world_from_camera: RigidTransform, ignore: Sequence[Spheres] = ()) -> None:
+        """Take in a frame. Depth readings within `ROBOT_MARGIN` of the `ignore` spheres, the arms, are no obstacles.
+
+        Each voxel in view is compared with the reading on its pixel: before it the voxel is free, at it a surface, up to
+        `ASSUMED_DEPTH` behind it assumed full. A look overrules a guess, and a look from about as near or nearer a look.
+        """
+        k = subsampled(frame.intrinsics, STEP)
+        depth = cv2.medianBlur(np.where(np.isfinite(frame.depth), frame.depth, 0), 3)[::STEP, ::STEP]
+        solid = ~_edges(depth) & (depth > 0) & ~self._cable_or_connector(frame.rgb, depth, k)
+        points = world_from_camera.apply((rays(k) * depth[..., None])[solid])
+        solid[solid] = ~(near_boxes(points, self._known) | _near_spheres(points, ignore))
+        local = world_from_camera.inv().apply(self._centers)
+        pixels = np.nan_to_num(np.rint(project(local, k)), nan=-1.0)
+        seen = np.flatnonzero(np.all((pixels >= 0) & (pixels < [k.width, k.height]), axis=1))
+        u, v = pixels[seen].astype(int).T
+        self._update(seen, local[seen, 2], depth[v, u], _nearest_around(depth)[v, u], solid[v, u])
+
+    def _update(self, seen: NDArray[np.intp], z: FloatArray, reading: Depth, nearest: Depth, solid: Mask) -> None:
+        """Voxels `seen` (n,) at depth `z` against the `reading` and the `nearest` one around on their pixels."""
+        free = (reading > 0) & (z < nearest - self.h)
+        surface = solid & (np.abs(z - reading) <= self.h)
+        behind = solid & (z > reading) & (z <= reading + ASSUMED_DEPTH) & ~surface
+        state = self._state[seen]
+        open_to_look = (state == Voxel.UNSEEN) | (state == Voxel.BEHIND) | (z <= CLOSER * self._range[seen])
+        for looked, value in ((free, Voxel.FREE), (surface, Voxel.SURFACE)):
+            chosen = seen[looked & open_to_look]
+            self._state[chosen] = value
+            self._range[chosen] = z[looked & open_to_look]
+        self._state[seen[behind & (state == Voxel.UNSEEN)]] = Voxel.BEHIND
+
+    def _cable_or_connector(self, rgb: NDArray[np.uint8], depth: Depth, k: Intrinsics) -> Mask:
+        """Pixels of the connector's colour, or dark and thin as the cable is."""
+        red = cv2.dilate(color_mask(rgb, self._color), np.ones((5, 5), np.uint8))[::STEP, ::STEP] > 0
+        dark = np.ascontiguousarray((rgb.max(axis=2) < DARK)[::STEP, ::STEP]).astype(np.uint8)
+        inside = cv2.distanceTransform(dark, cv2.DIST_L2, 3) - 0.5
+        return np.asarray(red | ((dark > 0) & (inside * depth / k.fx < THIN)))
+
+
+def near_boxes(points: FloatArray, boxes: Sequence[Box]) -> Mask:
+    """Whether each of `points` (n, 3) m is inside one of `boxes` or within `KNOWN_MARGIN` of it."""
+    near = np.zeros(len(points), np.bool_)
+    for box in boxes:
+        beyond = np.maximum(np.abs(points - box.center) - 0.5 * np.asarray(box.size), 0.0)
+        near |= np.einsum("ij,ij->i", beyond, beyond) <= KNOWN_MARGIN**2
+    return near
+
+
+def _near_spheres(points: FloatArray, groups: Sequence[Spheres]) -> Mask:
+    near = np.zeros(len(points), np.bool_)
+    for centers, radii in groups:
+        squared = (points**2).sum(axis=1)[:, None] + (centers**2).sum(axis=1) - 2 * points @ centers.T
+        near |= np.any(squared <= (radii + ROBOT_MARGIN) ** 2, axis=1)
+    return near
+
+
+def _edges(depth: Depth) -> Mask:
+    """Pixels whose 3x3 neighbourhood holds readings further apart than `EDGE`, or none: thin things, flying readings."""
+    farthest = cv2.dilate(depth, np.ones((3, 3), np.uint8))
+    return np.asarray(farthest - _nearest_around(depth) > EDGE)
+
+
+def _nearest_around(depth: Depth) -> Depth:
+    """The nearest reading in each pixel's 3x3 neighbourhood; a large number where there is none."""
+    return np.asarray(cv2.erode(np.where(depth > 0, depth, np.float32(1e3)), np.ones((3, 3), np.uint8)), np.float32)

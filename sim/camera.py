@@ -1,0 +1,89 @@
+"""A simulated RGB-D camera."""
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import RigidTransform, Rotation
+
+from interfaces.cell import CameraSpec, Errors
+from interfaces.frame import RgbdFrame
+from sim.depth_noise import DepthNoise
+from sim.picture import LightState
+from sim.renderer import Renderer
+
+
+@dataclass(frozen=True, eq=False)
+class _Exposure:
+    """What is needed to draw the picture later, if anyone asks."""
+
+    number: int
+    stamp: float
+    poses: NDArray[np.float32]
+    world_from_camera: RigidTransform
+    joints: NDArray[np.float64] | None
+
+
+class SimCamera:
+    """Fulfils `interfaces.devices.Camera`: the world calls `expose` at the camera's rate, readers call `latest`.
+
+    `true_pose` gives world_from_camera with the calibration's error in it; `joints` gives the encoder readings (6,) of the
+    arm that carries the camera, None for a fixed one; `now` the simulated seconds; `latency` the seconds from an exposure
+    until its frame can be read.
+    """
+
+    def __init__(
+        self,
+        spec: CameraSpec,
+        renderer: Renderer,
+        light: LightState,
+        noise: DepthNoise,
+        true_pose: Callable[[], RigidTransform],
+        joints: Callable[[], NDArray[np.float64]] | None,
+        now: Callable[[], float],
+        latency: float,
+    ) -> None:
+        self.name: str = spec.name
+        self._intrinsics = spec.intrinsics
+        self._renderer, self._light, self._noise = renderer, light, noise
+        self._true_pose, self._joints, self._now, self._latency = true_pose, joints, now, latency
+        self._exposures: deque[_Exposure] = deque(maxlen=int(np.ceil(latency * spec.rate)) + 2)
+        self._count = 0
+        self._frame: RgbdFrame | None = None
+        self._ids: NDArray[np.int32] | None = None
+
+    def expose(self, poses: NDArray[np.float32]) -> None:
+        """Keep this instant: `poses` from `Visuals.snapshot`, which cameras that expose together should share."""
+        self._count += 1
+        joints = None if self._joints is None else np.array(self._joints(), float)
+        self._exposures.append(_Exposure(self._count, self._now(), poses, self._true_pose(), joints))
+
+    def latest(self) -> RgbdFrame | None:
+        """See `Camera.latest`. The picture is drawn when it is first asked for."""
+        ready = [e for e in self._exposures if e.stamp + self._latency <= self._now() + 1e-9]
+        if ready and (self._frame is None or self._frame.number != ready[-1].number):
+            self._frame, self._ids = self._draw(ready[-1])
+        return self._frame
+
+    def true_ids(self) -> NDArray[np.int32] | None:
+        """Ground truth: what each pixel of the latest frame shows (`VisualItem.id`, -1 for nothing); None before the first."""
+        self.latest()
+        return self._ids
+
+    def _draw(self, exposure: _Exposure) -> tuple[RgbdFrame, NDArray[np.int32]]:
+        image = self._renderer.render(exposure.poses, exposure.world_from_camera, self._intrinsics, self._light)
+        depth = self._noise.apply(image.depth, exposure.number)
+        frame = RgbdFrame(
+            self.name, exposure.number, exposure.stamp, image.rgb, depth, self._intrinsics, exposure.joints
+        )
+        return frame, image.ids
+
+
+def camera_error(errors: Errors, rng: np.random.Generator) -> RigidTransform:
+    """A draw of nominal_from_true, the small transform by which a camera's optical frame is not where it is believed to be."""
+    axis = rng.standard_normal(3)
+    angle = np.deg2rad(errors.camera_angle_deg) * rng.standard_normal()
+    turn = Rotation.from_rotvec(angle * axis / np.linalg.norm(axis))
+    return RigidTransform.from_components(errors.camera_position * rng.standard_normal(3), turn)

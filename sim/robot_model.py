@@ -1,0 +1,78 @@
+"""The ViperX 300 S as a URDF, made from the `rtb-data` package: rubber pads on the fingers, a camera body on the wrist."""
+
+import xml.etree.ElementTree as ET
+from importlib.resources import files
+
+import xacro
+
+PACKAGE = "package://trossen_descriptions/"
+NAME = "vx300s"
+# Measured on rtb-data's finger meshes: a finger's inner face stands this far behind its joint's position. The pads sit at
+# the tips: their centre, which is our tool centre, lies PAD_AHEAD of the fingers' link (the maker's ee_gripper_link is
+# 0.018 behind it), so that a finger ends 0.012 past what it holds and can hold a plug close to a panel.
+FINGER_FACE = 0.0135
+PAD_AHEAD = 0.0565
+PAD_LENGTH = 0.024  # along the fingers, metres
+PAD_HEIGHT = 0.018
+CAMERA_SIZE = (0.025, 0.090, 0.025)  # D435i's body
+
+
+def robot_urdf(pad_thickness: float, camera_offset: tuple[float, float, float] | None) -> str:
+    """The URDF text. Pads are links `left_pad`, `right_pad`; `camera_offset` (m, wrist link's frame) adds a camera body."""
+    root = files("rtbdata") / "xacro" / "trossen_descriptions"
+    document = xacro.process_file(str(root / "urdf" / "vx300s.urdf.xacro"), mappings={"robot_name": NAME})
+    # PyBullet cannot parse a one-line URDF.
+    text = document.toprettyxml(indent=" ").replace(PACKAGE, f"{root}/")
+    robot = ET.fromstring(text)
+    for finger, side in (("left", 1.0), ("right", -1.0)):
+        # The finger link's origin is at its joint's position: the face is FINGER_FACE nearer to the middle.
+        y = -side * (FINGER_FACE + pad_thickness / 2)
+        _add_box(
+            robot,
+            f"{finger}_pad",
+            f"{NAME}/{finger}_finger_link",
+            (PAD_AHEAD, y, 0.0),
+            (PAD_LENGTH, pad_thickness, PAD_HEIGHT),
+            (0.12, 0.12, 0.12),
+        )
+    if camera_offset is not None:
+        # The optical centre sits at the front of the body; the URDF's wrist link is ours turned by pi about x.
+        behind = (camera_offset[0] - CAMERA_SIZE[0] / 2 - 0.004, -camera_offset[1], -camera_offset[2])
+        _add_box(robot, "camera_body", f"{NAME}/wrist_link", behind, CAMERA_SIZE, (0.75, 0.75, 0.75))
+    ET.indent(robot)
+    return ET.tostring(robot, encoding="unicode")
+
+
+def pad_gap(left: float, right: float, pad_thickness: float) -> float:
+    """Distance between the pads in metres from the finger joints' positions."""
+    return left - right - 2 * (FINGER_FACE + pad_thickness)
+
+
+def finger_position(gap: float, pad_thickness: float) -> float:
+    """The left finger joint's position in metres at which the pads stand `gap` apart."""
+    return gap / 2 + FINGER_FACE + pad_thickness
+
+
+def _add_box(
+    robot: ET.Element,
+    name: str,
+    parent: str,
+    position: tuple[float, float, float],
+    size: tuple[float, float, float],
+    color: tuple[float, float, float],
+) -> None:
+    link = ET.SubElement(robot, "link", name=name)
+    for kind in ("visual", "collision"):
+        element = ET.SubElement(link, kind)
+        geometry = ET.SubElement(element, "geometry")
+        ET.SubElement(geometry, "box", size=" ".join(map(str, size)))
+        if kind == "visual":
+            material = ET.SubElement(element, "material", name=f"{name}_color")
+            ET.SubElement(material, "color", rgba=" ".join(map(str, (*color, 1))))
+    inertial = ET.SubElement(link, "inertial")
+    ET.SubElement(inertial, "mass", value="0.005")
+    ET.SubElement(inertial, "inertia", ixx="1e-6", iyy="1e-6", izz="1e-6", ixy="0", ixz="0", iyz="0")
+    joint = ET.SubElement(robot, "joint", name=f"{name}_joint", type="fixed")
+    ET.SubElement(joint, "parent", link=parent)
+    ET.SubElement(joint, "child", link=name)
+    ET.SubElement(joint, "origin", xyz=" ".join(map(str, position)), rpy="0 0 0")

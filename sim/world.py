@@ -1,0 +1,268 @@
+"""The world: one PyBullet client with the cell, the arms, the cable, the cameras and the faults of one run.
+
+Time moves only in `advance`. Every physics step runs the same schedule: servos, cable springs, step, holds, faults,
+contacts; camera exposures and finger samples fall on fixed steps, so nothing depends on who looks or how often.
+"""
+
+from typing import Literal
+
+import numpy as np
+import pybullet as p
+from scipy.spatial.transform import RigidTransform, Rotation, Slerp
+
+from interfaces.cell import Box, Cell, Socket, WristMount
+from interfaces.scene import EARTH_GRAVITY, Gravity, JawOpens, Obstacle
+from sim.arm import SimArm
+from sim.cable import build_cable
+from sim.camera import SimCamera, camera_error
+from sim.depth_noise import DepthNoise
+from sim.faults import JawOpensFault
+from sim.fixtures import ClipHold, Hold, SocketHold
+from sim.renderer import LightState, make_renderer
+from sim.visuals import Visuals
+
+RendererChoice = Literal["auto", "moderngl", "tiny"]
+LAY_SECONDS, SETTLE_SECONDS = 1.5, 2.5  # the cable is drawn from straight into its socket, then comes to rest
+CONTACT_EVERY = 4  # physics steps between looks at the arms' contacts
+
+
+class World:
+    """One run's world. `seed` draws every error and noise; the same arguments give the same bits."""
+
+    def __init__(
+        self,
+        cell: Cell,
+        gravity: Gravity,
+        seed: int,
+        obstacles: tuple[Obstacle, ...] = (),
+        faults: tuple[JawOpens, ...] = (),
+        renderer: RendererChoice = "auto",
+        gui: bool = False,
+    ) -> None:
+        self.cell, self.gravity = cell, gravity
+        self.client: int = p.connect(p.GUI if gui else p.DIRECT)
+        self.step_seconds = 1.0 / cell.hidden.step_rate
+        self._steps = 0
+        errors_rng, light_rng = (np.random.default_rng(s) for s in np.random.SeedSequence([seed, 1]).spawn(2))
+        self._configure(gravity)
+        self.boxes = self._build_boxes(obstacles)
+        hidden, known = cell.hidden, cell.known
+        mounts = {c.mount.arm: c.mount.offset for c in known.cameras if isinstance(c.mount, WristMount)}
+        self.arms = {
+            spec.name: SimArm(
+                self.client, spec, hidden.gripper, hidden.errors, self.step_seconds, mounts.get(spec.name), errors_rng
+            )
+            for spec in known.arms
+        }
+        stiffness = hidden.cable.stiffness.zero if gravity == "zero" else hidden.cable.stiffness.earth
+        self.cable = build_cable(
+            self.client, hidden.cable, known.connector, hidden.connector_mass, stiffness, self.step_seconds
+        )
+        p.changeDynamics(
+            self.cable.body,
+            self.cable.connector_link,
+            lateralFriction=hidden.connector_friction,
+            spinningFriction=0.005,
+            physicsClientId=self.client,
+        )
+        self._filter_collisions()
+        self.socket = self._plug()
+        self.clip = ClipHold(self.client, self.cable.body, self.cable.connector_link, known.clip, self.step_seconds)
+        self.faults = self._build_faults(faults)
+        self.contact_peaks: dict[str, float] = {}
+        self._connector, self._velocity = self.cable.connector_state()
+        self.visuals = Visuals(self.client)
+        self.renderer = make_renderer(self.visuals, renderer)
+        self.light = self._draw_light(light_rng)
+        self.cameras = self._build_cameras(seed, errors_rng)
+        for arm in self.arms.values():
+            arm.restart_clock()
+        self._expose()
+
+    def now(self) -> float:
+        """Seconds since the run began."""
+        return self._steps * self.step_seconds
+
+    def advance(self, seconds: float) -> None:
+        """Let the world run for so long (rounded to whole physics steps)."""
+        for _ in range(round(seconds / self.step_seconds)):
+            self._step()
+
+    def close(self) -> None:
+        """Free the client and the renderer."""
+        self.renderer.close()
+        p.disconnect(self.client)
+
+    def held(self, arm: str) -> bool:
+        """Whether both pads of an arm touch the connector now (ground truth)."""
+        body, link = self.cable.body, self.cable.connector_link
+        return all(
+            p.getContactPoints(self.arms[arm].body, body, pad, link, physicsClientId=self.client)
+            for pad in self.arms[arm].gripper.pads
+        )
+
+    def connector_pose(self) -> RigidTransform:
+        """True world_from_connector after the last step."""
+        return self._connector
+
+    def _step(self) -> None:
+        for arm in self.arms.values():
+            arm.step()
+        self.cable.apply_springs()
+        p.stepSimulation(physicsClientId=self.client)
+        self._steps += 1
+        self._connector, self._velocity = self.cable.connector_state()
+        self.socket.step()
+        self.clip.step(self._connector, self._velocity)
+        if self._steps % CONTACT_EVERY == 0:
+            self._watch_contacts()
+            if not self.socket.holds:
+                for fault in self.faults:
+                    if fault.fired_at is None:
+                        fault.step(self.now(), self._connector.translation, self.held("right"))
+        self._expose()
+
+    def _expose(self) -> None:
+        rate = self.cell.hidden.step_rate
+        due = [c for c in self.cameras.values() if self._steps * c.spec.rate % rate < c.spec.rate]
+        if due:
+            poses = self.visuals.snapshot()
+            for camera in due:
+                camera.expose(poses)
+
+    def _watch_contacts(self) -> None:
+        """Keep the largest normal force of each arm against each thing that it must not touch."""
+        for name, arm in self.arms.items():
+            sums: dict[str, float] = {}
+            for contact in p.getContactPoints(arm.body, physicsClientId=self.client):
+                other = self._named.get(contact[2] if contact[1] == arm.body else contact[1])
+                if other is not None and other != name:
+                    sums[other] = sums.get(other, 0.0) + contact[9]
+            for other, force in sums.items():
+                key = f"{name} arm - {other}"
+                self.contact_peaks[key] = max(self.contact_peaks.get(key, 0.0), force)
+
+    def _configure(self, gravity: Gravity) -> None:
+        p.resetSimulation(physicsClientId=self.client)
+        p.setGravity(0, 0, -EARTH_GRAVITY if gravity == "earth" else 0.0, physicsClientId=self.client)
+        p.setTimeStep(self.step_seconds, physicsClientId=self.client)
+        p.setPhysicsEngineParameter(
+            numSolverIterations=self.cell.hidden.solver_iterations,
+            deterministicOverlappingPairs=1,
+            physicsClientId=self.client,
+        )
+
+    def _build_boxes(self, obstacles: tuple[Obstacle, ...]) -> dict[str, int]:
+        known = self.cell.known
+        bodies = {box.name: self._box(box) for box in (*known.boxes, *known.clip.bracket)}
+        bodies |= {socket.name: self._socket_block(socket) for socket in known.sockets}
+        for obstacle in obstacles:
+            turn = Rotation.from_euler("z", obstacle.yaw)
+            bodies[f"obstacle {obstacle.box.name}"] = self._box(obstacle.box, turn)
+            if obstacle.stand is not None:
+                bodies[f"obstacle {obstacle.stand.name}"] = self._box(obstacle.stand, turn)
+        return bodies
+
+    def _box(self, box: Box, turn: Rotation | None = None) -> int:
+        half = [s / 2 for s in box.size]
+        collision = p.createCollisionShape(p.GEOM_BOX, halfExtents=half, physicsClientId=self.client)
+        visual = p.createVisualShape(
+            p.GEOM_BOX, halfExtents=half, rgbaColor=[*box.color, 1], physicsClientId=self.client
+        )
+        turn = Rotation.identity() if turn is None else turn
+        body = p.createMultiBody(
+            0, collision, visual, box.center, turn.as_quat().tolist(), physicsClientId=self.client
+        )
+        p.changeDynamics(body, -1, lateralFriction=0.5, physicsClientId=self.client)
+        return int(body)
+
+    def _socket_block(self, socket: Socket) -> int:
+        # A plug that goes in along y needs the block turned so that its y edge is the axis; one along -y is the same box.
+        axis = np.asarray(socket.axis) / np.linalg.norm(socket.axis)
+        tilt = Rotation.from_euler("x", float(np.arctan2(axis[2], abs(axis[1]))) * float(np.sign(axis[1])))
+        return self._box(Box(name=socket.name, center=socket.center, size=socket.size, color=socket.color), tilt)
+
+    def _filter_collisions(self) -> None:
+        """Switch off the pairs that are joined by design: bases and floor, the plug and what takes it in, the clamp."""
+        for arm in self.arms.values():
+            p.setCollisionFilterPair(arm.body, self.boxes["floor"], -1, -1, 0, physicsClientId=self.client)
+        cable, plug = self.cable.body, self.cable.connector_link
+        takers = [s.name for s in self.cell.known.sockets] + [b.name for b in self.cell.known.clip.bracket]
+        for name in takers:
+            p.setCollisionFilterPair(cable, self.boxes[name], plug, -1, 0, physicsClientId=self.client)
+        right_end = self.cell.known.sockets[-1].name
+        for link in range(4):
+            for name in (right_end, "right_panel"):
+                p.setCollisionFilterPair(cable, self.boxes[name], link, -1, 0, physicsClientId=self.client)
+        allowed = {cable, *(self.boxes[n] for n in takers)}
+        self._named = {body: name for name, body in self.boxes.items() if body not in allowed}
+        self._named |= {arm.body: name for name, arm in self.arms.items()}
+
+    def _plug(self) -> SocketHold:
+        """Lay the straight cable into its socket and let it come to rest, before time begins."""
+        known = self.cell.known
+        socket = known.socket(known.plugged_into)
+        start, _ = self.cable.connector_state()
+        goal = socket.world_from_plug(known.connector.length)
+        hold = Hold(self.client, self.cable.body, self.cable.connector_link, start)
+        turn = Slerp([0, 1], Rotation.concatenate([start.rotation, goal.rotation]))
+        steps = round(LAY_SECONDS / self.step_seconds)
+        for i in range(steps + round(SETTLE_SECONDS / self.step_seconds)):
+            s = min(1.0, (i + 1) / steps)
+            s = s * s * (3 - 2 * s)
+            hold.move(
+                RigidTransform.from_components((1 - s) * start.translation + s * goal.translation, turn(s))
+            )
+            self.cable.apply_springs()
+            p.stepSimulation(physicsClientId=self.client)
+        return SocketHold(hold, socket.pull_out_force)
+
+    def _build_faults(self, faults: tuple[JawOpens, ...]) -> list[JawOpensFault]:
+        known = self.cell.known
+        start = known.socket(known.plugged_into).world_from_plug(known.connector.length).translation
+        goal = known.clip.world_from_seat.translation
+        return [JawOpensFault(f, self.arms["right"].gripper, start, goal) for f in faults]
+
+    def _draw_light(self, rng: np.random.Generator) -> LightState:
+        light = self.cell.hidden.light
+        turn = Rotation.from_rotvec(np.deg2rad(light.direction_jitter_deg) * rng.normal(size=3) / np.sqrt(3))
+        factor = max(0.3, 1.0 + light.brightness_jitter * float(rng.normal()))
+        direction = turn.apply(np.asarray(light.direction) / np.linalg.norm(light.direction))
+        return LightState(direction, light.ambient * factor, light.diffuse * factor)
+
+    def _build_cameras(self, seed: int, rng: np.random.Generator) -> dict[str, SimCamera]:
+        known, errors = self.cell.known, self.cell.hidden.errors
+        cameras = {}
+        for spec in known.cameras:
+            error = camera_error(spec, errors, rng)
+            mount = spec.mount
+            if isinstance(mount, WristMount):
+                arm = self.arms[mount.arm]
+                pose = _wrist_camera_pose(arm, mount, error)
+                joints = _encoder(arm)
+            else:
+                pose, joints = _constant(mount.world_from_camera * error), None
+            cameras[spec.name] = SimCamera(
+                spec=spec,
+                visuals=self.visuals,
+                renderer=self.renderer,
+                light=self.light,
+                noise=DepthNoise(spec, errors, seed),
+                true_pose=pose,
+                joints=joints,
+                now=self.now,
+                latency=known.latencies.image,
+            )
+        return cameras
+
+
+def _wrist_camera_pose(arm: SimArm, mount: WristMount, error: RigidTransform):  # type: ignore[no-untyped-def]
+    return lambda: arm.wrist_pose() * mount.wrist_from_camera * error
+
+
+def _encoder(arm: SimArm):  # type: ignore[no-untyped-def]
+    return lambda: arm.reading().positions
+
+
+def _constant(pose: RigidTransform):  # type: ignore[no-untyped-def]
+    return lambda: pose
