@@ -15,7 +15,7 @@ def free_folder(scenario: str, seed: int) -> Path:
 
 def findings(out: Path) -> list[Finding]:
     """Why no run can be written to `out`; nothing is left behind by the look."""
-    if os.path.exists(out / "result.json"):
+    if any(os.path.exists(out / name) for name in ("result.json", "events.jsonl", "ticks.jsonl")):
         return [Finding(shown(out), 1, "already holds a run; name another folder")]
     spot = out.absolute()
     while not os.path.lexists(spot) and spot != spot.parent:

@@ -19,20 +19,28 @@ from interfaces.cause import Cause, CauseCode
 
 Outcome = Literal["stowed", "safe_stop", "time_limit", "interrupted", "internal_error"]
 
-_PACKAGES = {
-    **dict.fromkeys(
-        ("regrasp", "eaik", "moderngl", "numba", "numpy", "ompl", "py_trees", "pybullet", "scipy", "toppra")
-    ),
-    "opencv": "opencv-python-headless",
-}
+_PACKAGES = (
+    "regrasp",
+    "eaik",
+    "moderngl",
+    "numba",
+    "numpy",
+    "ompl",
+    "opencv",
+    "py_trees",
+    "pybullet",
+    "scipy",
+    "toppra",
+)
+_DISTRIBUTIONS = {"opencv": "opencv-python-headless"}  # where the package index has another name
 
 
 def versions() -> dict[str, str]:
     """Version of Python and of the packages that bear on a run's course; those that are not installed are left out."""
     found = {"python": platform.python_version()}
-    for name, package in sorted(_PACKAGES.items()):
+    for name in _PACKAGES:
         try:
-            found[name] = version(package or name)
+            found[name] = version(_DISTRIBUTIONS.get(name, name))
         except PackageNotFoundError:
             continue
     return found

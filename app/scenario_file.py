@@ -13,7 +13,7 @@ from app.findings import Finding, Findings, nearest, shown
 from app.placement import TOUCHING, overlaps
 from app.resources import read_text, resolve
 from app.schema import validated
-from app.yaml_lines import Document, parse
+from app.yaml_lines import Document, Place, parse
 from interfaces.cause import CauseCode
 from interfaces.cell import Cell, Color, Fraction, Model, NotNegative, Vector
 
@@ -143,12 +143,18 @@ def _named(document: Document, key: Literal["cell", "tree"], folder: Path) -> Pa
 
 def _cell(document: Document, folder: Path, overrides: list[tuple[int, str]]) -> Cell | None:
     path = _named(document, "cell", folder)
-    if path is None:
-        return None
-    below = parse(read_text(path, document.place(("cell",))), shown(path))
-    set_.apply(below, overrides)
-    cell = validated(below, Cell)
-    found = list(_inconsistent(below, cell))
+    return load_cell(path, overrides, document.place(("cell",))) if path else None
+
+
+def load_cell(path: Path, overrides: Sequence[tuple[int, str]] = (), where: Place | None = None) -> Cell:
+    """Read and check a cell file under (number, "key.path=value") overrides.
+
+    Raises `Findings`, at `where` (the place that names the cell) when there is no such file.
+    """
+    document = parse(read_text(path, where), shown(path))
+    set_.apply(document, overrides)
+    cell = validated(document, Cell)
+    found = list(_inconsistent(document, cell))
     if found:
         raise Findings(found)
     return cell
@@ -177,13 +183,24 @@ def _inconsistent(document: Document, cell: Cell) -> Iterator[Finding]:
 def _tree(document: Document, folder: Path) -> Path | None:
     path = _named(document, "tree", folder)
     if path is not None:
-        read_text(path, document.place(("tree",)))
-        from trees import check_tree  # the leaves bring the planner and the compiler with them: seconds
-
-        found = [Finding(shown(path), line, message) for line, message in check_tree(path)]
-        if found:
-            raise Findings(found)
+        check_tree_file(path, document.place(("tree",)))
     return path
+
+
+def check_tree_file(path: Path, where: Place | None = None) -> None:
+    """Raises `Findings` for all that is wrong in a tree file; at `where`, which names it, when there is no such file."""
+    read_text(path, where)
+    from trees import check_tree  # the leaves bring the planner and the compiler with them: seconds
+
+    found = [Finding(shown(path), line, message) for line, message in check_tree(path)]
+    if found:
+        raise Findings(found)
+
+
+def description(path: Path) -> str:
+    """The sentence that a scenario file gives of itself, without a check of the rest."""
+    value = parse(read_text(path), shown(path)).value
+    return str(value.get("description", "")) if isinstance(value, dict) else ""
 
 
 def _misplaced(document: Document, file: ScenarioFile, cell: Cell) -> Iterator[Finding]:

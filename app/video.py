@@ -1,5 +1,6 @@
 """A run as a film: overview, both cameras, and a few lines of text."""
 
+import contextlib
 import subprocess
 from collections.abc import Sequence
 from pathlib import Path
@@ -108,10 +109,8 @@ class VideoWriter:
         assert stdin is not None
         if stdin.closed:
             return
-        try:
+        with contextlib.suppress(BrokenPipeError):  # its exit status says why
             stdin.close()
-        except BrokenPipeError:
-            pass  # its exit status says why
         if code := self._ffmpeg.wait():
             raise OSError(f"ffmpeg could not write the video (exit status {code})")
 

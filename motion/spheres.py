@@ -1,18 +1,15 @@
 """The arm as spheres, for collision checks.
 
-Computed from rtb-data's STL meshes of the ViperX 300 S by clustering surface points (fingers by hand: two columns and five
-rows a finger, small at the tips). Fingers stand fully open, 0.057 m each, with pads 6 mm thick.
+Computed from rtb-data's STL meshes of the ViperX 300 S by clustering surface points; base, shoulder and fingers are laid
+out by hand, small where the arm comes near itself in its sleep pose and at the finger tips. No mesh point but the column's
+foot lies more than 3 mm outside. Fingers stand fully open, 0.057 m each, with pads 6 mm thick.
 """
 
 import numpy as np
 
 # link frame (0 base ... 6 last link), centre x, y, z in that frame, radius; metres
 _ROWS = [
-    (0, 0.0190, -0.0403, 0.0132, 0.092),
-    (0, 0.0183, 0.0423, 0.0083, 0.093),
-    (0, -0.1154, -0.0001, 0.0277, 0.093),
-    (1, 0.0053, -0.0093, 0.0135, 0.064),
-    (1, -0.0059, 0.0101, 0.0128, 0.064),
+    (0, 0.0000, 0.0000, -0.4580, 0.478),  # foot plate: the cap of a big sphere
     (2, 0.0026, -0.0235, 0.0307, 0.043),
     (2, -0.0055, 0.0248, 0.0308, 0.044),
     (2, 0.0000, -0.0014, 0.1050, 0.042),
@@ -51,6 +48,9 @@ _FINGER = [  # x, |y|, |z|, radius in the last link; mirrored in y and z
     (0.119, 0.0455, 0.0170, 0.0125),
     (0.126, 0.0440, 0.0080, 0.0125),
 ]
+_ROWS += [(0, 0.042 * np.cos(a), 0.042 * np.sin(a), 0.052, 0.038) for a in np.arange(8) * np.pi / 4]  # column
+_ROWS += [(0, x, y, 0.024, 0.043) for x in (-0.170, -0.125, -0.085) for y in (-0.03, 0.03)]  # box behind the column
+_ROWS += [(1, 0.0, y, z, 0.0255) for y in (-0.038, -0.012, 0.012, 0.038) for z in (0.018, 0.045)]  # yoke
 _ROWS += [(6, x, sy * y, sz * z, r) for sy in (-1, 1) for x, y, z, r in _FINGER for sz in (-1, 1)]
 
 LINKS = np.array([row[0] for row in _ROWS], dtype=np.int64)

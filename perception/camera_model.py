@@ -30,7 +30,7 @@ def deproject(depth: NDArray[np.float32], mask: NDArray[np.bool_], intrinsics: I
 
 
 def project(points: FloatArray, intrinsics: Intrinsics) -> FloatArray:
-    """Pixels (n, 2), u to the right and v down, of `points` (n, 3) m in the optical frame; NaN for those not in front."""
+    """Pixels (n, 2), u to the right and v down, of `points` (n, 3) m in the optical frame; NaN for those behind."""
     z = np.where(points[:, 2] > 1e-6, points[:, 2], np.nan)
     u = intrinsics.fx * points[:, 0] / z + intrinsics.cx
     v = intrinsics.fy * points[:, 1] / z + intrinsics.cy
@@ -38,7 +38,7 @@ def project(points: FloatArray, intrinsics: Intrinsics) -> FloatArray:
 
 
 def in_view(points: FloatArray, intrinsics: Intrinsics, margin: float = 0.0) -> NDArray[np.bool_]:
-    """Whether each of `points` (n, 3) m in the optical frame is seen at least `margin` pixels inside the image; (n,)."""
+    """Whether each of `points` (n, 3) m in the optical frame is in the image, `margin` pixels inside; (n,)."""
     pixels = project(points, intrinsics)
     high = np.array([intrinsics.width, intrinsics.height]) - 0.5 - margin
     return np.all((pixels >= margin - 0.5) & (pixels <= high), axis=1)  # NaN compares false: behind is not in view

@@ -43,7 +43,7 @@ class Occupancy:
     def __init__(
         self, lower: FloatArray, upper: FloatArray, known: Sequence[Box], connector: Connector, h: float = 0.015
     ) -> None:
-        """Region from `lower` to `upper` (3,) m in voxels of edge `h` m; `known` boxes and the connector are no obstacles."""
+        """Region from `lower` to `upper` (3,) m in voxels of edge `h` m. `known` boxes and connector do not count."""
         counts = np.ceil((upper - lower) / h - 1e-9).astype(int)
         grid = np.moveaxis(np.indices(tuple(counts)), 0, -1).reshape(-1, 3)
         centers = lower + (grid + 0.5) * h
@@ -61,8 +61,8 @@ class Occupancy:
     def integrate(self, frame: RgbdFrame, world_from_camera: RigidTransform, ignore: Sequence[Spheres] = ()) -> None:
         """Take in a frame. Depth readings within `ROBOT_MARGIN` of the `ignore` spheres, the arms, are no obstacles.
 
-        Each voxel in view is compared with the reading on its pixel: before it the voxel is free, at it a surface, up to
-        `ASSUMED_DEPTH` behind it assumed full. A look overrules a guess, and a look from about as near or nearer a look.
+        Each voxel in view is compared with the reading on its pixel: before it the voxel is free, at it a surface, up
+        to `ASSUMED_DEPTH` behind it assumed full. A look overrules a guess, and any look but from much closer.
         """
         k = subsampled(frame.intrinsics, STEP)
         depth = cv2.medianBlur(np.where(np.isfinite(frame.depth), frame.depth, 0), 3)[::STEP, ::STEP]
@@ -114,7 +114,7 @@ def _near_spheres(points: FloatArray, groups: Sequence[Spheres]) -> Mask:
 
 
 def _edges(depth: Depth) -> Mask:
-    """Pixels whose 3x3 neighbourhood holds readings further apart than `EDGE`, or none: thin things, flying readings."""
+    """Pixels whose 3x3 readings lie further apart than `EDGE`: thin things, flying readings."""
     farthest = cv2.dilate(depth, np.ones((3, 3), np.uint8))
     return np.asarray(farthest - _nearest_around(depth) > EDGE)
 

@@ -1,4 +1,4 @@
-"""The connector's pose from its colour and depth (Hwang 2024, sections 3.2.3.1 and 3.2.3.2), and what size adds to it."""
+"""The connector's pose from its colour and depth (Hwang 2024, section 3.2.3), and what its size adds."""
 
 from dataclasses import dataclass
 
@@ -8,13 +8,18 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from interfaces.cell import Connector
 from interfaces.frame import RgbdFrame
-from perception.camera_model import deproject
+from perception.camera_model import deproject, in_view, project
 from perception.segmentation import NoSegment, NotSeen, SegmentationParameters, segment
 
 FloatArray = NDArray[np.float64]
 
 MIN_POINTS = 20  # choice: n-mean and min/max need distinct points
 MIDDLE_SHARE = 0.2  # choice: n for the position is a fifth of the points: averages noise and stays in the middle
+FIT_STEPS, FIT_POINTS = 4, 400  # choice: eight steps and all points changed the errors by less than a tenth
+FIT_FADE = 0.004  # m; choice: the depth noise at 0.75 m is 3 mm
+FIT_COSINE = 0.9  # choice: a fit that turns the principal axis by more than 25 degrees went astray
+WHOLE_SHARE = 0.9  # choice: a visible part of nine tenths of the length has its centre within 5 mm
+BEYOND = 0.02  # m; choice: reaches across the depth shadow (8 px = 9 mm beside an edge 0.1 m in front)
 END_SHARE = 0.05  # choice: n for each end is a twentieth: 70 points at 0.75 m; more would shorten the vector
 DEVIATIONS = 2.0  # choice: an even spread ends at 1.73 standard deviations, so 2 cuts outliers and no ends
 LEFT = np.array([0.0, 1.0, 0.0])  # the sign of the axis without a hint: plugs of the cell point to +y
@@ -24,8 +29,9 @@ LEFT = np.array([0.0, 1.0, 0.0])  # the sign of the axis without a hint: plugs o
 class Estimate:
     """Where the connector is, by one frame. World frame, metres.
 
-    `position` (3,): its centre, as far as it is visible; `axis` (3,): unit vector from cable to tip, sign by the hint;
-    `extent`: length of the visible part along the axis; `points`: depth readings used; `mask_area`: pixels of its colour.
+    `position` (3,): its centre, or that of its visible part unless `whole`; `axis` (3,): unit vector from cable to tip,
+    sign by the hint; `points`: depth readings used; `mask_area`: pixels of its colour; `extent`: length of the visible
+    part along the axis; `whole`: both ends are in sight, or one is and the known length gave the other.
     """
 
     stamp: float
@@ -36,6 +42,7 @@ class Estimate:
     points: int
     mask_area: int
     extent: float
+    whole: bool
 
 
 @dataclass(frozen=True)
@@ -70,16 +77,18 @@ def estimate(
     if len(points) < MIN_POINTS:
         message = f"{len(points)} depth readings on {found.area} pixels of the connector, {MIN_POINTS} are needed"
         return NoEstimate(frame.stamp, frame.camera, NotSeen.NO_DEPTH, message)
-    center, axis = n_mean(points), min_max_axis(points)
-    if not faithful:
-        center, axis = refine_axis_and_center(points, connector.radius, connector.length)
-    axis = world_from_camera.rotation.apply(axis)
+    if faithful:
+        center, axis, whole = n_mean(points), min_max_axis(points), False
+        extent = float(np.subtract(*np.percentile(points @ axis, [99, 1])))
+    else:
+        center, axis = refine_axis_and_center(points, connector.radius)
+        low, high = _ends(points, center, axis)
+        extent = float(np.linalg.norm(high - low))
+        center, whole = _whole_center(frame, low, high, connector)
+    position, axis = world_from_camera.apply(center), world_from_camera.rotation.apply(axis)
     axis *= 1.0 if axis @ (LEFT if hint is None else hint) >= 0 else -1.0
-    position = world_from_camera.apply(center)
     pose = RigidTransform.from_components(position, _rotation(axis, world_from_camera.rotation))
-    along = world_from_camera.apply(points) @ axis
-    extent = float(np.subtract(*np.percentile(along, [99, 1])))
-    return Estimate(frame.stamp, frame.camera, position, axis, pose, len(points), found.area, extent)
+    return Estimate(frame.stamp, frame.camera, position, axis, pose, len(points), found.area, extent, whole)
 
 
 def without_outliers(points: FloatArray) -> FloatArray:
@@ -115,21 +124,86 @@ def pca_axis(points: FloatArray) -> FloatArray:
     return np.asarray(np.linalg.eigh(centred.T @ centred)[1][:, -1])
 
 
-def refine_axis_and_center(points: FloatArray, radius: float, length: float) -> tuple[FloatArray, FloatArray]:
-    """Centre (3,) and unit axis (3,) of a cylinder seen from one side as `points` (m, 3), optical frame.
+def refine_axis_and_center(points: FloatArray, radius: float) -> tuple[FloatArray, FloatArray]:
+    """A point (3,) on the axis and unit axis (3,) of a cylinder of known `radius` m, one side seen as `points` (m, 3).
 
-    Across its width the visible side stands sqrt(r^2 - x^2) before the cylinder's axis, on average
-    (1/2r) int_-r^r sqrt(r^2 - x^2) dx = pi r / 4. The side's normals are square to the axis, so the mean point moves by
-    that much along the part of the viewing ray that is square to the axis.
+    Start: the principal axis, and the mean point pushed away from the camera. Across its width the visible side stands
+    sqrt(r^2 - x^2) before the axis, on average (1/2r) int_-r^r sqrt(r^2 - x^2) dx = pi r / 4, and its normals are square
+    to the axis, so the push is that long and along the part of the viewing ray that is square to the axis. Then
+    Gauss-Newton steps on the distance from the axis less the radius. Optical frame.
+
+    Measured at 0.75 m, mean axis error (free, 30 %, 50 % hidden): min/max 7.5, 11, 17 degrees; principal axis 1.9, 4.1,
+    7.7; after the fit 1.0, 2.3, 3.7.
     """
-    axis = pca_axis(points)
+    start = pca_axis(points)
     mean = points.mean(axis=0)
-    away = mean - (mean @ axis) * axis
-    return mean + np.pi / 4 * radius * away / np.linalg.norm(away), axis
+    away = mean - (mean @ start) * start
+    center, axis = mean + np.pi / 4 * radius * away / np.linalg.norm(away), start
+    fitted_center, fitted_axis = center, start
+    for _ in range(FIT_STEPS):
+        fitted_center, fitted_axis = _fit_step(
+            points[:: 1 + len(points) // FIT_POINTS], fitted_center, fitted_axis, radius
+        )
+    sane = abs(fitted_axis @ start) > FIT_COSINE and np.linalg.norm(fitted_center - center) < radius
+    return (fitted_center, fitted_axis) if sane else (center, axis)
+
+
+def _fit_step(points: FloatArray, center: FloatArray, axis: FloatArray, radius: float) -> tuple[FloatArray, FloatArray]:
+    """One Gauss-Newton step: moves the centre and tilts the axis along the two directions square to the axis.
+
+    Depth noise lies along the viewing ray: it counts in full where the surface faces the camera and hardly at its rims,
+    so a residual weighs 1 / (cos^2 + 0.05); those beyond some millimetres (end face, flying readings) fade (Cauchy).
+    """
+    across = np.cross(axis, center)
+    across /= np.linalg.norm(across)  # square to the viewing ray
+    frame = np.column_stack([across, np.cross(axis, across)])
+    offset = points - center
+    along, planar = offset @ axis, offset @ frame
+    distance = np.maximum(np.linalg.norm(planar, axis=1), 1e-9)
+    normal = planar / distance[:, None]
+    residual = distance - radius
+    weight = 1.0 / ((1.0 + (residual / FIT_FADE) ** 2) * (normal[:, 1] ** 2 + 0.05))
+    jacobian = np.column_stack([normal, along[:, None] * normal])
+    hessian = jacobian.T @ (jacobian * weight[:, None])
+    hessian[np.diag_indices(4)] *= 1.0 + 1e-6  # a stub of the cylinder may not tell its tilt
+    step = np.linalg.solve(hessian, jacobian.T @ (weight * residual))
+    tilted = axis + frame @ step[2:]
+    return center + frame @ step[:2], tilted / np.linalg.norm(tilted)
+
+
+def _ends(points: FloatArray, center: FloatArray, axis: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The two ends (3,) of the visible part on the axis; the last hundredth of the points is left to flying readings."""
+    low, high = np.percentile((points - center) @ axis, [1, 99])
+    return center + low * axis, center + high * axis
+
+
+def _whole_center(frame: RgbdFrame, low: FloatArray, high: FloatArray, connector: Connector) -> tuple[FloatArray, bool]:
+    """Centre (3,) of the connector from the ends of its visible part, and whether it is that of the whole connector.
+
+    A part as long as the connector is the connector. If something hides just one end, the other and the length give it.
+    """
+    middle, axis = (low + high) / 2, (high - low) / np.linalg.norm(high - low)
+    hidden_low = _is_hidden(frame, low, -axis, connector.radius)
+    hidden_high = _is_hidden(frame, high, axis, connector.radius)
+    if hidden_low == hidden_high or np.linalg.norm(high - low) > connector.length:
+        return middle, bool(np.linalg.norm(high - low) > WHOLE_SHARE * connector.length)
+    return (high - 0.5 * connector.length * axis if hidden_low else low + 0.5 * connector.length * axis), True
+
+
+def _is_hidden(frame: RgbdFrame, end: FloatArray, outward: FloatArray, radius: float) -> bool:
+    """Whether what is seen beyond an `end` (3,), up to `BEYOND` m `outward`, stands before it, or the image ends there."""
+    beyond = end + np.linspace(0.0, BEYOND, 16)[:, None] * outward
+    inside = in_view(beyond, frame.intrinsics)
+    if not inside.all():
+        return True
+    u, v = np.rint(project(beyond, frame.intrinsics)).astype(int).T
+    depth = frame.depth[v, u]
+    nearer = (depth > 0) & (depth < beyond[:, 2] - 2 * radius)
+    return int(np.count_nonzero(nearer)) >= 3
 
 
 def _rotation(axis: FloatArray, world_from_camera: Rotation) -> Rotation:
-    """The rotation whose x is `axis` and whose z is as near as can be to the camera's up, or its forward if they align."""
+    """The rotation whose x is `axis` and whose z is as near as can be to the camera's up (forward if up aligns)."""
     up, forward = world_from_camera.apply([[0.0, -1.0, 0.0], [0.0, 0.0, 1.0]])
     y = np.cross(up if abs(axis @ up) < 0.95 else forward, axis)
     y /= np.linalg.norm(y)

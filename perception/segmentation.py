@@ -1,4 +1,4 @@
-"""The connector in a colour image: hue, saturation, value ranges and the largest contour (Hwang 2024, section 3.2.3.1)."""
+"""The connector in a colour image: HSV ranges and the largest contour (Hwang 2024, section 3.2.3.1)."""
 
 import colorsys
 from dataclasses import dataclass

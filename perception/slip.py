@@ -35,7 +35,7 @@ def distance_slip(
 
 
 def seen_at(connector: NDArray[np.float64], point: NDArray[np.float64], radius: float) -> SlipEvidence:
-    """Whether the `connector`'s estimated position (3,) is within `radius` m of `point` (3,), such as the clip's seat."""
+    """Whether the `connector`'s estimated position (3,) is within `radius` m of `point` (3,), the clip's seat say."""
     value = float(np.linalg.norm(connector - point))
     sentence = f"connector {value:.3f} m from the place looked at, limit {radius:.3f} m"
     return SlipEvidence(value <= radius, "place", value, radius, sentence)

@@ -1,4 +1,4 @@
-"""Does anything still move before a camera at rest? Recovery waits for the cable, whose swing shows even where its end hides."""
+"""Does anything still move before a camera at rest? A cable's swing shows even where its end hides."""
 
 from collections import deque
 

@@ -1,4 +1,4 @@
-"""What is known of the connector over time: the thesis's three checks (Hwang 2024, section 3.4.2), and what a hand hides."""
+"""What is known of the connector over time: three checks (Hwang 2024, section 3.4.2), and what a hand hides."""
 
 from collections import deque
 from dataclasses import dataclass
@@ -75,7 +75,8 @@ class ConnectorTrack:
     def held(self, tool: FloatArray | None) -> None:
         """Say where the holding gripper's centre (3,) m is, or None when the finger gap says that nothing is held."""
         if tool is not None and self._tool is None:  # a new grasp: it took what was last seen there
-            self._hand_near = self.last is not None and np.linalg.norm(self.last.position - tool) <= HIDING_RADIUS
+            last = self.last
+            self._hand_near = last is not None and bool(np.linalg.norm(last.position - tool) <= HIDING_RADIUS)
         self._tool = tool
 
     def check(self, now: float) -> TrackHealth:
@@ -102,13 +103,13 @@ class ConnectorTrack:
         return TrackState.LOST, health.reason
 
     def position(self, now: float) -> FloatArray | None:
-        """Best guess (3,) m of where the connector is: as last seen, or in the hand that hides it; None if never seen."""
+        """Best guess (3,) m of where the connector is: as last seen, or in the hand that hides it."""
         if self.state(now)[0] is TrackState.HIDDEN_BY_HAND:
             return self._tool
         return None if self.last is None else self.last.position
 
     def drift(self, now: float) -> FloatArray:
-        """Velocity (3,) m/s over the live interval before `now`, by least squares; zero from fewer than three estimates."""
+        """Velocity (3,) m/s over the live interval before `now`, by least squares; 0 from fewer than three."""
         recent = self._recent(now)
         if len(recent) < 3:
             return np.zeros(3)

@@ -11,7 +11,7 @@ import numba
 import numpy as np
 import pybullet as p
 from numpy.typing import NDArray
-from scipy.spatial.transform import RigidTransform
+from scipy.spatial.transform import RigidTransform, Rotation
 
 from interfaces.cell import Cable, Connector, pose_along
 
@@ -56,6 +56,7 @@ class CableBody:
     link_length: float
     stiffness: FloatArray  # (n,) N m/rad
     damping: FloatArray  # (n,) N m s/rad
+    connector_inertia: float  # kg m2, across the connector's axis
 
     @property
     def connector_link(self) -> int:
@@ -77,12 +78,10 @@ class CableBody:
             physicsClientId=self.client,
         )
 
-    def connector_state(self) -> tuple[RigidTransform, FloatArray]:
-        """world_from_connector and the centre's velocity (3,) m/s."""
+    def connector_state(self) -> tuple[RigidTransform, FloatArray, FloatArray]:
+        """world_from_connector, its centre's velocity (3,) m/s and its rate of turn (3,) rad/s, in the world."""
         s = p.getLinkState(self.body, self.connector_link, 1, 1, physicsClientId=self.client)
-        from scipy.spatial.transform import Rotation
-
-        return RigidTransform.from_components(s[4], Rotation.from_quat(s[5])), np.array(s[6])
+        return RigidTransform.from_components(s[4], Rotation.from_quat(s[5])), np.array(s[6]), np.array(s[7])
 
     def energy(self) -> float:
         """Kinetic plus bending energy in J (without gravity); the links' inertia floor counts, as it does in the motion."""
@@ -173,4 +172,4 @@ def build_cable(
     springs = np.full(n, bend)
     springs[0] *= 2
     damping_time = JOINT_DAMPING / (step * 4 * bend / inertia_floor)
-    return CableBody(client, body, n, length, springs, springs * damping_time)
+    return CableBody(client, body, n, length, springs, springs * damping_time, across)

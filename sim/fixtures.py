@@ -12,8 +12,12 @@ from scipy.spatial.transform import RigidTransform
 
 from interfaces.cell import Clip
 
+FloatArray = NDArray[np.float64]
+
 STIFF = 1e4  # N: the constraints' own limit, far over what the models release at
 FORCE_WINDOW = 5  # physics steps over which a force is averaged, so that one step's solver spike does not count
+LIP_TRAVEL = 0.010  # m over which the clip's force grows to its full value
+LIP_TORQUE = 0.3  # N m: the clip's largest aligning torque; 15 N on lips 0.02 apart
 CLICK_SPEED = 0.02  # m/s: the clip's lips close on an end that is about at rest in it ...
 CLICK_TIME = 0.2  # s: ... for so long
 REARM = 1.5  # an end that was pulled out must leave by so many capture distances before the clip takes it again
@@ -39,7 +43,7 @@ class Hold:
             physicsClientId=client,
         )
         p.changeConstraint(self._constraint, maxForce=STIFF, physicsClientId=client)
-        self._forces: deque[NDArray[np.float64]] = deque(maxlen=FORCE_WINDOW)
+        self._forces: deque[FloatArray] = deque(maxlen=FORCE_WINDOW)
 
     def move(self, to: RigidTransform) -> None:
         """Drag the held link's target (used only to lay the cable before a run)."""
@@ -51,7 +55,7 @@ class Hold:
             physicsClientId=self._client,
         )
 
-    def force(self) -> NDArray[np.float64]:
+    def force(self) -> FloatArray:
         """Mean force (3,) N over the last steps, in the axes that `getConstraintState` uses; zero before the first."""
         self._forces.append(np.array(p.getConstraintState(self._constraint, physicsClientId=self._client)[:3]))
         return np.asarray(np.mean(self._forces, axis=0))
@@ -83,35 +87,56 @@ class SocketHold:
 
 
 class ClipHold:
-    """The stow clip: closes on an end that rests in its mouth, lets go above `hold_force`."""
+    """The stow clip: rubber lips that close on an end resting in their mouth and then draw it to the seat.
 
-    def __init__(self, client: int, body: int, link: int, clip: Clip, step: float) -> None:
+    Their force grows to `hold_force` over `LIP_TRAVEL` and stays there; an end drawn out past `capture_distance` is free.
+    They align the end's axis with a torque that grows likewise; turning about the end's own axis is free.
+    """
+
+    def __init__(self, client: int, body: int, link: int, clip: Clip, mass: float, across: float, step: float) -> None:
         self._client, self._body, self._link, self._clip, self._dt = client, body, link, clip, step
         self._seat = clip.world_from_seat
-        self._cos = float(np.cos(np.deg2rad(clip.capture_angle_deg)))
         self._axis = self._seat.rotation.apply([1.0, 0.0, 0.0])
-        self._hold: Hold | None = None
+        self._cos = float(np.cos(np.deg2rad(clip.capture_angle_deg)))
+        self._stiffness = clip.hold_force / LIP_TRAVEL
+        self._torsion = LIP_TORQUE / float(np.sin(np.deg2rad(clip.capture_angle_deg)))
+        # Half of critical damping of the end alone on the lips.
+        self._damping = float(np.sqrt(self._stiffness * mass))
+        self._torsion_damping = float(np.sqrt(self._torsion * across))
         self._resting = 0.0
         self._armed = True
+        self.holds = False
 
-    @property
-    def holds(self) -> bool:
-        """Whether the end is in the clip."""
-        return self._hold is not None
-
-    def step(self, connector: RigidTransform, velocity: NDArray[np.float64]) -> None:
-        """Take or release the end after a physics step."""
-        if self._hold is not None:
-            if float(np.linalg.norm(self._hold.force())) > self._clip.hold_force:
-                self._hold.release()
-                self._hold, self._armed = None, False
+    def step(self, connector: RigidTransform, velocity: FloatArray, rate: FloatArray) -> None:
+        """Pull, take or release the end; call before a physics step with its pose, velocity (m/s) and rate (rad/s)."""
+        offset = self._seat.translation - connector.translation
+        distance = float(np.linalg.norm(offset))
+        axis = connector.rotation.apply([1.0, 0.0, 0.0])
+        if self.holds and distance > self._clip.capture_distance:
+            self.holds, self._armed = False, False
+        if self.holds:
+            self._pull(connector, offset, velocity, axis, rate)
             return
-        distance = float(np.linalg.norm(connector.translation - self._seat.translation))
         self._armed = self._armed or distance > REARM * self._clip.capture_distance
-        aligned = float(connector.rotation.apply([1.0, 0.0, 0.0]) @ self._axis) > self._cos
-        inside = self._armed and aligned and distance < self._clip.capture_distance
+        inside = self._armed and distance < self._clip.capture_distance and float(axis @ self._axis) > self._cos
         resting = inside and float(np.linalg.norm(velocity)) < CLICK_SPEED
         self._resting = self._resting + self._dt if resting else 0.0
         if self._resting >= CLICK_TIME:
-            self._hold = Hold(self._client, self._body, self._link, connector)
-            self._resting = 0.0
+            self.holds, self._resting = True, 0.0
+
+    def _pull(
+        self, connector: RigidTransform, offset: FloatArray, velocity: FloatArray, axis: FloatArray, rate: FloatArray
+    ) -> None:
+        force = _limited(self._stiffness * offset, self._clip.hold_force) - self._damping * velocity
+        turning = rate - axis * float(rate @ axis)
+        torque = _limited(self._torsion * np.cross(axis, self._axis), LIP_TORQUE) - self._torsion_damping * turning
+        at = connector.translation.tolist()
+        p.applyExternalForce(
+            self._body, self._link, force.tolist(), at, p.WORLD_FRAME, physicsClientId=self._client
+        )
+        p.applyExternalTorque(self._body, self._link, torque.tolist(), p.WORLD_FRAME, physicsClientId=self._client)
+
+
+def _limited(vector: FloatArray, limit: float) -> FloatArray:
+    size = float(np.linalg.norm(vector))
+    return vector if size <= limit else vector * (limit / size)

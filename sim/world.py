@@ -67,10 +67,18 @@ class World:
         )
         self._filter_collisions()
         self.socket = self._plug()
-        self.clip = ClipHold(self.client, self.cable.body, self.cable.connector_link, known.clip, self.step_seconds)
+        self.clip = ClipHold(
+            self.client,
+            self.cable.body,
+            self.cable.connector_link,
+            known.clip,
+            hidden.connector_mass,
+            self.cable.connector_inertia,
+            self.step_seconds,
+        )
         self.faults = self._build_faults(faults)
         self.contact_peaks: dict[str, float] = {}
-        self._connector, self._velocity = self.cable.connector_state()
+        self._connector, self._velocity, self._rate = self.cable.connector_state()
         self.visuals = Visuals(self.client)
         self.renderer = make_renderer(self.visuals, renderer)
         self.light = self._draw_light(light_rng)
@@ -109,11 +117,11 @@ class World:
         for arm in self.arms.values():
             arm.step()
         self.cable.apply_springs()
+        self.clip.step(self._connector, self._velocity, self._rate)
         p.stepSimulation(physicsClientId=self.client)
         self._steps += 1
-        self._connector, self._velocity = self.cable.connector_state()
+        self._connector, self._velocity, self._rate = self.cable.connector_state()
         self.socket.step()
-        self.clip.step(self._connector, self._velocity)
         if self._steps % CONTACT_EVERY == 0:
             self._watch_contacts()
             if not self.socket.holds:
@@ -202,7 +210,7 @@ class World:
         """Lay the straight cable into its socket and let it come to rest, before time begins."""
         known = self.cell.known
         socket = known.socket(known.plugged_into)
-        start, _ = self.cable.connector_state()
+        start, _, _ = self.cable.connector_state()
         goal = socket.world_from_plug(known.connector.length)
         hold = Hold(self.client, self.cable.body, self.cable.connector_link, start)
         turn = Slerp([0, 1], Rotation.concatenate([start.rotation, goal.rotation]))

@@ -19,7 +19,7 @@ _NAME = re.compile(r"[\w-]+")
 
 
 def check_tree(path: Path, leaves: Mapping[str, type] | None = None) -> list[Finding]:
-    """All findings, in line order; a tree file without any loads. `leaves` maps a tag to its class (default: all of ours).
+    """All findings, in line order; a tree file without any loads. `leaves` maps a tag to its class, by default all of ours.
 
     Raises:
         TypeError: a leaf class without ports.

@@ -1,4 +1,4 @@
-"""A tiny analytic ray caster: RGB and depth of cylinders and boxes, with the sensor noise of `knowledge/perception.md`."""
+"""A tiny analytic ray caster: RGB and depth of cylinders and boxes, with a stereo camera's noise."""
 
 from dataclasses import dataclass, field
 

@@ -1,0 +1,240 @@
+"""The command line: `regrasp`."""
+
+import os
+import sys
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import click
+import typer
+from typer.core import TyperGroup
+
+from app import output
+from app.findings import Finding, Findings
+from app.progress import shown_progress
+from app.resources import resolve, shipped
+from app.scenario_file import check_tree_file, description, load_scenario
+
+if TYPE_CHECKING:
+    from app.record import Result
+
+EXIT_UNMET, EXIT_BAD_INPUT, EXIT_INTERRUPTED = 1, 2, 130
+
+
+class _Group(TyperGroup):
+    """Tells findings one a line on stderr, and Ctrl-C by its exit code, whatever the command."""
+
+    def invoke(self, ctx: click.Context) -> Any:
+        try:
+            return super().invoke(ctx)
+        except Findings as error:
+            for finding in error.items:
+                typer.echo(str(finding), err=True)
+            raise typer.Exit(EXIT_BAD_INPUT) from None
+        except KeyboardInterrupt:
+            typer.echo("interrupted", err=True)
+            raise typer.Exit(EXIT_INTERRUPTED) from None
+
+
+# Plain help: the same on a terminal and in a pipe.
+app = typer.Typer(cls=_Group, no_args_is_help=True, rich_markup_mode=None, pretty_exceptions_enable=False)
+trees_app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Look at behaviour trees.")
+scenarios_app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Look at scenarios.")
+study_app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Run many episodes and count.")
+app.add_typer(trees_app, name="trees")
+app.add_typer(scenarios_app, name="scenarios")
+app.add_typer(study_app, name="study")
+
+Sets = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set", metavar="KEY=VALUE", help="Change a value of the scenario, or with cell. of its cell; repeat."
+    ),
+]
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"regrasp {version('regrasp')}")
+        raise typer.Exit
+
+
+@app.callback()
+def _root(
+    wanted: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
+    ] = False,
+) -> None:
+    """Two simulated arms unplug a cable, lose its end, and get it back with cameras alone.
+
+    \b
+      regrasp doctor                           is this machine ready?
+      regrasp scenarios list                   what is there to run?
+      regrasp run short_obstacle --video       run one, and film it
+    """
+
+
+@app.command()
+def run(
+    scenario: Annotated[str, typer.Argument(help="A shipped scenario's name, or a path to a .yaml file.")],
+    seed: Annotated[int, typer.Option(min=0, help="Draws every error, noise and jitter.")] = 0,
+    out: Annotated[Path | None, typer.Option(help="The record's folder; default runs/SCENARIO-SEED-N.")] = None,
+    video: Annotated[bool, typer.Option("--video", help="Film the run into the record.")] = False,
+    sets: Sets = None,
+    gui: Annotated[bool, typer.Option("--gui", help="Show PyBullet's window.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", help="No progress; only the summary.")] = False,
+) -> None:
+    """Run a scenario and leave a record of it.
+
+    \b
+    Examples:
+      regrasp run short_obstacle --video
+      regrasp run tall_obstacle --seed 7 --set gravity=earth --out runs/tall-7
+      regrasp run my/scenario.yaml --set obstacles.0.size=[0.08,0.12,0.3] --set cell.hidden.errors.arm_tool=0
+
+    \b
+    Exit code: 0 all that the scenario expects came out, 1 something did not, 2 bad input, 130 Ctrl-C.
+    """
+    wrong: list[Finding] = [] if not gui or _display() else [_NO_DISPLAY]
+    if out is not None:
+        wrong += output.findings(out)
+    try:
+        loaded = load_scenario(scenario, sets or [])
+    except Findings as error:
+        raise Findings([*wrong, *error.items]) from None
+    folder = out or output.free_folder(loaded.name, seed)
+    wrong += [] if out else output.findings(folder)
+    if wrong:
+        raise Findings(wrong)
+    from app.episode import run_episode  # brings the planner, the compiler and the physics: seconds
+
+    with shown_progress(quiet) as progress:
+        result = run_episode(loaded, folder, seed=seed, video=video, gui=gui, progress=progress)
+    typer.echo(summary(result, folder))
+    raise typer.Exit(exit_code(result))
+
+
+_NO_DISPLAY = Finding(
+    "--gui", 1, "there is no display here (DISPLAY is not set); run without it, and film with --video"
+)
+
+
+def _display() -> bool:
+    return sys.platform != "linux" or bool(os.environ.get("DISPLAY"))
+
+
+def exit_code(result: "Result") -> int:
+    """0 when all that was expected came out, 130 after Ctrl-C, else 1."""
+    if result.outcome == "interrupted":
+        return EXIT_INTERRUPTED
+    return 0 if result.succeeded else EXIT_UNMET
+
+
+def summary(result: "Result", folder: Path) -> str:
+    """What came out, for a person."""
+    met = sum(e.met for e in result.expectations)
+    lines = [
+        f"{result.scenario}, seed {result.seed}: {result.outcome}, {met} of {len(result.expectations)} expectations met"
+    ]
+    if result.cause:
+        at = f" ({result.cause.node})" if result.cause.node else ""
+        lines.append(f"  cause   {result.cause.code}: {result.cause.message}{at}")
+    yes, no = ("✓", "✗") if (sys.stdout.encoding or "").lower().startswith("utf") else ("ok", "NOT MET")
+    lines += [
+        f"  {yes if e.met else no} {e.name}: {_plain(e.value)} (asked: {_plain(e.limit)})" for e in result.expectations
+    ]
+    for slip in result.slips:
+        seen = (
+            f"noticed at {slip.detected_at:.2f} s by {slip.detected_by}"
+            if slip.detected_at is not None
+            else "not noticed"
+        )
+        lines.append(f"  slip    lost at {slip.released_at:.2f} s, {seen}")
+    lines.append(f"  record  {folder}")
+    lines.append(
+        f"  time    {result.sim_seconds:.1f} s simulated in {result.wall_seconds:.1f} s, "
+        f"real-time factor {result.real_time_factor:.2f}, renderer {result.renderer}"
+    )
+    return "\n".join(lines)
+
+
+def _plain(value: object) -> str:
+    return f"{value:.3g}" if isinstance(value, float) else str(value)
+
+
+@trees_app.command("list")
+def list_trees() -> None:
+    """Names of the shipped trees."""
+    for name in shipped("tree"):
+        typer.echo(name)
+
+
+@trees_app.command("show")
+def show(tree: Annotated[str, typer.Argument(help="A shipped tree's name, or a path to an .xml file.")]) -> None:
+    """Draw a tree as text.
+
+    \b
+    Example:
+      regrasp trees show recovery
+    """
+    path = resolve("tree", tree, Path())
+    check_tree_file(path)
+    from trees import show_tree
+
+    typer.echo(show_tree(path))
+
+
+@scenarios_app.command("list")
+def list_scenarios() -> None:
+    """Names and descriptions of the shipped scenarios."""
+    known = shipped("scenario")
+    width = max(map(len, known), default=0)
+    for name, path in known.items():
+        typer.echo(f"{name:<{width}}  {description(path)}")
+
+
+@app.command()
+def doctor() -> None:
+    """Say what a run needs from this machine, and whether it is there. Exit code 1 when something is missing."""
+    from app.doctor import checks
+
+    wrong = False
+    for check in checks():
+        typer.echo(f"{check.status:<6}{check.name:<24}{check.seen}")
+        wrong |= check.status == "wrong"
+    raise typer.Exit(1 if wrong else 0)
+
+
+@study_app.command("demo")
+def demo(
+    seeds: Annotated[str, typer.Option(metavar="A:B", help="Seeds from A up to, not including, B.")],
+    jobs: Annotated[int, typer.Option(min=1, help="Episodes side by side.")] = os.cpu_count() or 1,
+    out: Annotated[Path | None, typer.Option(help="Folder of demo.json and the runs' records.")] = None,
+    sets: Sets = None,
+) -> None:
+    """The whole demonstration: no, short and tall obstacle, each without and with gravity, over many seeds.
+
+    \b
+    Example:
+      regrasp study demo --seeds 0:20 --jobs 2 --out results/demo
+    """
+    chosen = parse_seeds(seeds)
+    from app.study import run_demo
+
+    raise typer.Exit(run_demo(chosen, jobs, out, sets or []))
+
+
+def parse_seeds(text: str) -> range:
+    """The seeds of "A:B", B left out. Raises `Findings` for anything else."""
+    first, _, after = text.partition(":")
+    if not (first.isdecimal() and after.isdecimal() and int(first) < int(after)):
+        raise Findings(
+            [Finding("--seeds", 1, f"{text!r} is no range of seeds; write A:B with A below B, such as 0:20")]
+        )
+    return range(int(first), int(after))
+
+
+def main() -> None:
+    """Entry point of the `regrasp` script."""
+    app()
