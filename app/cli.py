@@ -6,7 +6,6 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import click
 import typer
 from typer.core import TyperGroup
 
@@ -25,7 +24,7 @@ EXIT_UNMET, EXIT_BAD_INPUT, EXIT_INTERRUPTED = 1, 2, 130
 class _Group(TyperGroup):
     """Tells findings one a line on stderr, and Ctrl-C by its exit code, whatever the command."""
 
-    def invoke(self, ctx: click.Context) -> Any:
+    def invoke(self, ctx: Any) -> Any:
         try:
             return super().invoke(ctx)
         except Findings as error:
@@ -38,7 +37,9 @@ class _Group(TyperGroup):
 
 
 # Plain help: the same on a terminal and in a pipe.
-app = typer.Typer(cls=_Group, no_args_is_help=True, rich_markup_mode=None, pretty_exceptions_enable=False)
+app = typer.Typer(
+    cls=_Group, no_args_is_help=True, add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False
+)
 trees_app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Look at behaviour trees.")
 scenarios_app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Look at scenarios.")
 study_app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Run many episodes and count.")
@@ -220,6 +221,8 @@ def demo(
       regrasp study demo --seeds 0:20 --jobs 2 --out results/demo
     """
     chosen = parse_seeds(seeds)
+    if out and (wrong := output.findings(out)):
+        raise Findings(wrong)
     from app.study import run_demo
 
     raise typer.Exit(run_demo(chosen, jobs, out, sets or []))

@@ -15,8 +15,8 @@ from app.resources import shipped
 from app.scenario_file import load_cell
 
 PACKAGES = ("regrasp", "numpy", "scipy", "pybullet", "py_trees", "ompl", "eaik", "toppra", "numba", "moderngl")
-# The libraries that moderngl's EGL context opens, and the Debian package of each.
-EGL = {"EGL": "libegl1", "EGL_mesa": "libegl-mesa0", "GL": "libgl1"}
+EGL = {"EGL": "libegl1", "EGL_mesa": "libegl-mesa0"}  # library to Debian package; another maker's driver needs no Mesa
+INSTALL = "on Debian: apt-get install libegl1 libegl-mesa0 libgl1-mesa-dri"
 Status = Literal["ok", "slow", "wrong"]  # "slow": a run works, at a price
 
 
@@ -31,43 +31,44 @@ class Check:
 
 def checks(out: Path = Path("runs")) -> Iterator[Check]:
     """All checks, each as soon as it is done; the last builds a world and takes seconds."""
-    yield _python(sys.version_info[:3])
+    yield python(sys.version_info[:3])
     yield Check("platform", "ok", platform.platform())
-    yield from (_package(name) for name in (*PACKAGES, "opencv-python-headless"))
+    yield from (package(name) for name in (*PACKAGES, "opencv-python-headless"))
     yield Check("processors", "ok", str(os.cpu_count()))
-    yield _output(out)
-    yield _egl(find_library)
-    yield _world()
+    yield output_folder(out)
+    yield egl(find_library)
+    yield renderer()
 
 
-def _python(found: tuple[int, int, int]) -> Check:
+def python(found: tuple[int, int, int]) -> Check:
+    """Whether this Python is new enough."""
     text = ".".join(map(str, found))
     return (
         Check("python", "ok", text) if found >= (3, 11, 0) else Check("python", "wrong", f"{text}; take 3.11 or newer")
     )
 
 
-def _package(name: str) -> Check:
+def package(name: str) -> Check:
+    """Whether an installed package of that name is there."""
     try:
         return Check(name, "ok", version(name))
     except ImportError:  # PackageNotFoundError is one
         return Check(name, "wrong", "not installed; run make setup")
 
 
-def _output(out: Path) -> Check:
+def output_folder(out: Path) -> Check:
+    """Whether runs can be written below `out`."""
     wrong = output.findings(out / "doctor")
     return Check("output", "wrong", wrong[0].message) if wrong else Check("output", "ok", f"can write in {out}")
 
 
-def _egl(find: Callable[[str], str | None]) -> Check:
-    missing = [package for library, package in EGL.items() if not find(library)]
-    if sys.platform != "linux" or not missing:
-        return Check("EGL", "ok", "found")
-    wanted = " ".join([*missing, "libgl1-mesa-dri"])
-    return Check("EGL", "slow", f"missing, so the slow renderer draws; on Debian: apt-get install {wanted}")
+def egl(find: Callable[[str], str | None]) -> Check:
+    """Whether `find` knows the libraries of a GL context without a window."""
+    seen = ", ".join(f"{name} {'found' if find(name) else f'not found ({package})'}" for name, package in EGL.items())
+    return Check("EGL libraries", "ok" if find("EGL") else "slow", seen)
 
 
-def _world() -> Check:
+def renderer() -> Check:
     """Build the shipped cell's world, which takes all of the above, and say which renderer it got and why."""
     try:
         from sim.world import World
@@ -77,4 +78,6 @@ def _world() -> Check:
         world.close()
     except Exception as error:  # whatever it is, it is what the user must read
         return Check("renderer", "wrong", f"no world can be built: {type(error).__name__}: {error}")
-    return Check("renderer", "ok" if seen.name == "moderngl" else "slow", f"{seen.name}, {seen.reason}")
+    if seen.name == "moderngl":
+        return Check("renderer", "ok", f"moderngl, {seen.reason}")
+    return Check("renderer", "slow", f"{seen.name}, {seen.reason}; {INSTALL}")

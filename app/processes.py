@@ -2,7 +2,7 @@
 
 import contextlib
 import signal
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from multiprocessing import get_context
 from multiprocessing.connection import Connection, wait
 from typing import Any, Generic, NamedTuple, NoReturn, TypeVar
@@ -19,11 +19,11 @@ class Done(NamedTuple, Generic[T]):
     peak_memory_mb: float
 
 
-def run_each(tasks: Sequence[Callable[[], T]], jobs: int) -> Iterator[Done[T]]:
+def run_each(tasks: Sequence[Callable[[], T]], jobs: int) -> Generator[Done[T]]:
     """Run picklable tasks, at most `jobs` at a time, and yield each as it ends, in whatever order.
 
-    A task that raises or crashes yields its error; the others go on. When the caller stops, by Ctrl-C or otherwise, those
-    under way get a KeyboardInterrupt and ten seconds to put their things in order.
+    A task that raises or crashes yields its error; the others go on. When the caller closes the iterator or Ctrl-C
+    comes, those under way get a KeyboardInterrupt and ten seconds to put their things in order.
     """
     context = get_context("spawn")
     waiting = list(enumerate(tasks))
@@ -82,7 +82,7 @@ def _child(writer: "Connection[Any, Any]", task: Callable[[], Any]) -> None:
 
 
 def _peak_memory_mb() -> float:
-    """This process's largest resident size; 0 where the system does not tell (getrusage would count the parent's too)."""
+    """Largest resident size of this process, 0 without /proc (getrusage would count the parent's too)."""
     with contextlib.suppress(OSError), open("/proc/self/status", encoding="ascii") as status:
         for line in status:
             if line.startswith("VmHWM:"):

@@ -16,10 +16,10 @@ from app.schema import validated
 from app.yaml_lines import Document, Place, parse
 from interfaces.cause import CauseCode
 from interfaces.cell import Cell, Color, Fraction, Model, NotNegative, Vector
+from interfaces.scene import Gravity
 
 P = ParamSpec("P")
 T = TypeVar("T")
-Gravity = Literal["zero", "earth"]
 Outcome = Literal["stowed", "safe_stop"]
 Edge = Annotated[float, Field(gt=0, le=3)]  # metres
 Reach = Annotated[float, Field(ge=0, le=1)]  # metres
@@ -32,7 +32,7 @@ class ByGravity(Model):
     earth: Vector
 
 
-class Obstacle(Model):
+class ObstacleSpec(Model):
     """A foam block that the robot is not told about; one that does not stand on the floor is held by a thin stand."""
 
     name: str
@@ -43,7 +43,7 @@ class Obstacle(Model):
     jitter: tuple[Reach, Reach, Reach] = (0.0, 0.0, 0.0)  # uniform, to both sides, drawn from the seed
 
 
-class JawOpens(Model):
+class JawOpensSpec(Model):
     """The jaw opens for `seconds` at a share of the way from socket to clip, drawn from the seed within `carried`."""
 
     type: Literal["jaw_opens"]
@@ -87,8 +87,8 @@ class ScenarioFile(Model):
     cell: str  # a shipped cell's name, or a path from this file's folder
     tree: str  # likewise
     gravity: Gravity
-    obstacles: tuple[Obstacle, ...] = ()
-    faults: tuple[JawOpens, ...] = ()
+    obstacles: tuple[ObstacleSpec, ...] = ()
+    faults: tuple[JawOpensSpec, ...] = ()
     limits: Limits = Limits()
     expect: Expect = Expect()
 
@@ -169,15 +169,11 @@ def _inconsistent(document: Document, cell: Cell) -> Iterator[Finding]:
         yield Finding(*document.place(("known", "plugged_into")), message)
     arms: list[str] = [a.name for a in known.arms]
     cameras: list[str] = [c.name for c in known.cameras]
-    for key, names, needed in (
-        ("sockets", sockets, sockets),
-        ("arms", arms, ["left", "right"]),
-        ("cameras", cameras, ["rear", "wrist"]),
-    ):
-        for name in needed:
-            if names.count(name) != 1:
-                message = f"{key} hold {names.count(name)} named {name!r}; give one"
-                yield Finding(*document.place(("known", key)), message)
+    groups = {"sockets": (sockets, sockets), "arms": (arms, ["left", "right"]), "cameras": (cameras, ["rear", "wrist"])}
+    for key, (names, needed) in groups.items():
+        if sorted(names) != sorted(set(needed)):
+            message = f"{key} are {', '.join(names)}; give one each of {', '.join(sorted(set(needed)))}"
+            yield Finding(*document.place(("known", key)), message)
 
 
 def _tree(document: Document, folder: Path) -> Path | None:
@@ -188,7 +184,7 @@ def _tree(document: Document, folder: Path) -> Path | None:
 
 
 def check_tree_file(path: Path, where: Place | None = None) -> None:
-    """Raises `Findings` for all that is wrong in a tree file; at `where`, which names it, when there is no such file."""
+    """Raises `Findings` for all that is wrong in a tree file; at `where`, which names it, when there is none."""
     read_text(path, where)
     from trees import check_tree  # the leaves bring the planner and the compiler with them: seconds
 

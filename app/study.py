@@ -1,11 +1,12 @@
 """Studies: many runs, counted."""
 
+import contextlib
 import json
 import math
 import statistics
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from functools import partial
 from itertools import product
 from pathlib import Path
@@ -29,8 +30,13 @@ class Case(NamedTuple):
     gravity: str
     seed: int
 
+    @property
+    def group(self) -> str:
+        """Scenario and gravity."""
+        return f"{self.scenario} {self.gravity}"
+
     def __str__(self) -> str:
-        return f"{self.scenario} {self.gravity} seed {self.seed}"
+        return f"{self.group} seed {self.seed}"
 
 
 @dataclass(frozen=True)
@@ -43,15 +49,15 @@ class Row:
     outcome: str
     succeeded: bool
     cause: dict[str, Any] | None
-    slips: int
-    detection_delays: list[float]
-    detected_by: list[str]
-    found_by: str | None
-    unintended_force: float | None
-    unmet: list[str]
-    sim_seconds: float
-    real_time_factor: float
     peak_memory_mb: float
+    slips: int = 0
+    detection_delays: list[float] = field(default_factory=list)
+    detected_by: list[str] = field(default_factory=list)
+    found_by: str | None = None
+    unintended_force: float | None = None
+    unmet: list[str] = field(default_factory=list)
+    sim_seconds: float = 0.0
+    real_time_factor: float = 0.0
 
 
 def run_demo(
@@ -65,8 +71,8 @@ def run_demo(
     """The whole demonstration: three scenarios in two gravities, each with every seed, each run in its own process.
 
     Progress goes to stderr, a table to stdout; with `out`, runs go to out/runs/ and the figures to out/demo.json, which
-    is whole after every run. Returns the exit code: 0 when all runs came to an end, however they went, 130 after Ctrl-C,
-    2 when `out` holds a study. `load` and `episode` stand in for the real ones in tests.
+    is whole after every run. Returns the exit code: 0 when all runs came to an end, however they went, 130 after
+    Ctrl-C, 2 when `out` holds a study. `load` and `episode` stand in for the real ones in tests.
 
     Raises:
         app.findings.Findings: a scenario with these overrides is wrong.
@@ -81,8 +87,8 @@ def run_demo(
         print(f"{out} holds a study already (demo.json)", file=sys.stderr)
         return 2
     cases = [Case(*key) for key in product(SCENARIOS, GRAVITIES, seeds)]
-    loaded = {(name, g): load(name, [*overrides, f"gravity={g}"]) for name, g in product(SCENARIOS, GRAVITIES)}
-    tasks = [partial(episode, loaded[c[:2]], _folder(out, c), seed=c.seed, video=False) for c in cases]
+    loaded = {f"{name} {g}": load(name, [*overrides, f"gravity={g}"]) for name, g in product(SCENARIOS, GRAVITIES)}
+    tasks = [partial(episode, loaded[c.group], _folder(out, c), seed=c.seed, video=False) for c in cases]
     rows, code = _collect(cases, tasks, jobs, lambda rows: _write(out, rows, cases, overrides))
     _write(out, rows, cases, overrides)
     print_table(_HEADER, table(rows))
@@ -100,16 +106,21 @@ def _collect(
     rows: dict[int, Row] = {}
     code = 0
     try:
-        for done in run_each(tasks, jobs):
-            row = rows[done.number] = row_of(cases[done.number], done)
-            verdict = row.outcome if row.succeeded else f"{row.outcome}, not as expected"
-            figures = f"{row.sim_seconds:.1f} s simulated, {row.real_time_factor:.2f} x real time"
-            print(f"[{len(rows)}/{len(cases)}] {cases[done.number]}: {verdict}, {figures}", file=sys.stderr, flush=True)
-            keep([rows[i] for i in sorted(rows)])
+        with contextlib.closing(run_each(tasks, jobs)) as ended:
+            for done in ended:
+                case = cases[done.number]
+                row = rows[done.number] = row_of(case, done)
+                keep([rows[i] for i in sorted(rows)])
+                print(f"[{len(rows)}/{len(cases)}] {case}: {_summary(row)}", file=sys.stderr, flush=True)
     except KeyboardInterrupt:
         print(f"interrupted; {len(rows)} of {len(cases)} runs were done", file=sys.stderr)
         code = 130
     return [rows[i] for i in sorted(rows)], code
+
+
+def _summary(row: Row) -> str:
+    verdict = row.outcome if row.succeeded else f"{row.outcome}, not as expected"
+    return f"{verdict}, {row.sim_seconds:.1f} s simulated, {row.real_time_factor:.2f} x real time"
 
 
 def row_of(case: Case, done: Done[Result]) -> Row:
@@ -117,8 +128,7 @@ def row_of(case: Case, done: Done[Result]) -> Row:
     result = done.value
     if result is None:
         cause = {"code": "internal_error", "message": done.error, "node": ""}
-        nothing: tuple[Any, ...] = (0, [], [], None, None, [], 0.0, 0.0)
-        return Row(*case, "internal_error", False, cause, *nothing, done.peak_memory_mb)
+        return Row(*case, "internal_error", succeeded=False, cause=cause, peak_memory_mb=done.peak_memory_mb)
     values = {e.name: e.value for e in result.expectations}
     return Row(
         *case,

@@ -52,10 +52,12 @@ def _place(frame: Frame, image: Frame | None, corner: tuple[int, int], size: tup
 
 
 def _write(frame: Frame, text: str, origin: tuple[int, int], scale: float) -> None:
-    """Light letters with a dark rim, readable on anything; OpenCV's font has ASCII only."""
+    """Light letters on a dark plate, readable on anything; `origin` is the left end of the base line. ASCII only."""
     text = text.encode("ascii", "replace").decode()
-    for color, thickness in (((0, 0, 0), 4), (_INK, 1)):
-        cv2.putText(frame, text, origin, cv2.FONT_HERSHEY_SIMPLEX, scale, color, thickness, cv2.LINE_AA)
+    (width, height), below = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, scale, 1)
+    left, base = origin
+    cv2.rectangle(frame, (left - 4, base - height - 2), (left + width + 4, base + below), (_PAPER,) * 3, cv2.FILLED)
+    cv2.putText(frame, text, origin, cv2.FONT_HERSHEY_SIMPLEX, scale, _INK, 1, cv2.LINE_AA)
 
 
 class VideoWriter:

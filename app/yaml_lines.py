@@ -15,7 +15,7 @@ Place = tuple[str, int]  # source and line
 MAX_DEPTH = 20
 MAX_VALUES = 20_000  # after aliases are expanded
 # What YAML 1.1 and 1.2 both read as a number, so not 010, 1_000, 1:30 or 1e3.
-_NUMBER = re.compile(r"[-+]?(0|[1-9]\d{0,14}|(0|[1-9]\d{0,14})?\.\d{0,20}([eE][-+]\d{1,3})?)")
+_NUMBER = re.compile(r"[-+]?(0|[1-9]\d{0,18}|(0|[1-9]\d{0,18})?\.\d{0,30}([eE][-+]\d{1,3})?)")
 _LOOKS_LIKE_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+")
 _TAG = "tag:yaml.org,2002:"
 
@@ -49,7 +49,7 @@ def parse(text: str, source: str, line: int | None = None) -> Document:
         raise Findings([Finding(source, line or at, f"not YAML: {error.problem or error.context}")]) from None
     except yaml.reader.ReaderError as error:
         at = text.count("\n", 0, error.position) + 1
-        raise Findings([Finding(source, line or at, f"not YAML: character {error.character!r} is not text")]) from None
+        raise Findings([Finding(source, line or at, f"not YAML: {chr(error.character)!r} is not text")]) from None
     except (yaml.YAMLError, ValueError, OverflowError) as error:  # an escape beyond Unicode is a bare ValueError
         raise Findings([Finding(source, line or 1, f"not YAML: {error}")]) from None
     value = None if node is None else builder.build(node, (), 0)

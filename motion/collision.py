@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from functools import cache
+from itertools import pairwise
 
 import numba as nb
 import numpy as np
@@ -17,6 +18,9 @@ IntArray = NDArray[np.int64]
 COARSE_STEP = 0.02  # rad of the joint that moves most, between two checks of an edge
 FINE_STEP = 0.01  # the same for a path that will be driven
 _FIRST_MOVING_LINK = 2  # base and shoulder only turn on the spot: no box, surface or arm can be met by moving them
+
+# Spheres stand out of the meshes: 15 mm between shoulder and wrist in the sleep pose look like 1 mm.
+_SELF_SLACK = 0.008
 
 _ITSELF, _GRID, _OTHER_ARM = -1, -2, -3  # what a clearance is to, when it is not a box
 
@@ -82,7 +86,7 @@ def _nearest(q, base, links, local, pairs, boxes, others, distance, lower, h):  
             best, what = d, _GRID
     for m in range(pairs.shape[0]):
         a, c = world[pairs[m, 0]], world[pairs[m, 1]]
-        d = np.sqrt(_square(a, c)) - a[3] - c[3]
+        d = np.sqrt(_square(a, c)) - a[3] - c[3] + _SELF_SLACK
         if d < best:
             best, what = d, _ITSELF
     return best, what
@@ -120,7 +124,7 @@ def _free(q, base, links, local, pairs, boxes, others, distance, lower, h, margi
                 return False
     for m in range(pairs.shape[0]):
         a, c = world[pairs[m, 0]], world[pairs[m, 1]]
-        if _square(a, c) < (a[3] + c[3]) ** 2:
+        if _square(a, c) < (a[3] + c[3] - _SELF_SLACK) ** 2:
             return False
     return True
 
@@ -151,21 +155,20 @@ def _self_pairs(with_camera: bool) -> tuple[tuple[int, int], ...]:
     """
     links = [*LINKS.tolist(), *([5] if with_camera else [])]
     camera = len(LINKS)
-    pairs = []
-    for i, a in enumerate(links):
-        for j in range(i + 1, len(links)):
-            b = links[j]
-            if (a <= 1 and b >= 4) or (a == 2 and b >= 5) or (j == camera and a in (3, 4)):
-                pairs.append((i, j))
-    return tuple(pairs)
+    return tuple(
+        (i, j)
+        for i, a in enumerate(links)
+        for j, b in enumerate(links)
+        if (a <= 1 and b >= 4) or (a == 2 and b >= 5) or (j == camera and a in (3, 4))
+    )
 
 
 class CollisionModel:
     """One arm, and all that it must not touch. Does not change; make a new one when the surroundings do.
 
-    `camera_offset` (3,) m is where a wrist camera sits in the wrist link's frame. `other_arm` (m, 4) are another arm's spheres in world
-    (`spheres` of its model). `carried` (m, 4) are spheres fixed in the tool frame. `margin`s are metres between surfaces;
-    the arm's own links must only not touch, whatever the margin.
+    `camera_offset` (3,) m is where a wrist camera sits in the wrist link's frame. `other_arm` (m, 4) are another arm's
+    spheres in world (`spheres` of its model). `carried` (m, 4) are spheres fixed in the tool frame. A `margin` is
+    metres between surfaces; the arm's own links must only not touch, whatever the margin.
     """
 
     def __init__(
@@ -188,7 +191,7 @@ class CollisionModel:
             first = len(LINKS) + (camera_offset is not None)
             pairs += [(i, first + n) for i in np.flatnonzero(LINKS <= 3).tolist() for n in range(len(carried))]
             links.append(np.full(len(carried), 6))
-            local.append(np.asarray(carried, float) + [*TOOL_OFFSET, 0.0])
+            local.append(np.asarray(carried, float) + np.append(TOOL_OFFSET, 0.0))
         distance = grid or DistanceGrid(np.full((1, 1, 1), FAR, np.float32), np.zeros(3), 1e-3)
         self._arguments = (
             kinematics.base,
@@ -208,12 +211,12 @@ class CollisionModel:
         return inside and bool(_free(np.asarray(q, float), *self._arguments, margin))
 
     def edge_free(self, qa: FloatArray, qb: FloatArray, margin: float, step: float = COARSE_STEP) -> bool:
-        """Whether the straight joint motion is free, its end included (not its start), checked every `step` rad or closer."""
+        """Whether the straight joint motion is free, its end included (not its start), checked every `step` rad."""
         return bool(_edge_free(np.asarray(qa, float), np.asarray(qb, float), step, *self._arguments, margin))
 
     def path_free(self, path: FloatArray, margin: float) -> bool:
         """Whether the joint path (k, 6) is free from its first row to its last, checked finely."""
-        edges = zip(path[:-1], path[1:], strict=True)
+        edges = pairwise(np.asarray(path, float))
         return self.free(path[0], margin) and all(self.edge_free(a, b, margin, FINE_STEP) for a, b in edges)
 
     def clearance(self, q: FloatArray) -> float:

@@ -13,8 +13,9 @@ FAR = 10.0  # metres; the distance where nothing is occupied
 class DistanceGrid:
     """Distances in metres to the nearest occupied voxel's centre, never more than the truth anywhere inside a voxel.
 
-    `distance` (nx, ny, nz) float32; `lower` (3,) is the corner of voxel (0, 0, 0) in world; `h` the voxel's edge. Outside
-    the grid nothing is known to be occupied. A grid knows only what it was given: mark unseen space where that matters.
+    `distance` (nx, ny, nz) float32; `lower` (3,) is the corner of voxel (0, 0, 0) in world; `h` the voxel's edge.
+    Outside the grid nothing is known to be occupied. A grid knows only what it was given: mark unseen space where that
+    matters.
     """
 
     distance: NDArray[np.float32]

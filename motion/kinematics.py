@@ -20,7 +20,7 @@ ORIGINS = np.array(
     [[0, 0, 0.0787], [0, 0, 0.04805], [0.05955, 0, 0.3], [0.2, 0, 0], [0.1, 0, 0], [0.069744, 0, 0]], dtype=np.float64
 )
 AXES = np.array([2, 1, 1, 0, 1, 0])
-TOOL_OFFSET = np.array([0.1072, 0.0, 0.0])  # tool centre in the last link
+TOOL_OFFSET = np.array([0.1252, 0.0, 0.0])  # the pads' centre in the last link; the maker's ee_gripper is 0.018 behind
 
 # Limits, intersected over the maker's documentation and rtb-data's URDF.
 LOWER = np.deg2rad([-180.0, -106.0, -101.0, -180.0, -107.0, -180.0])
@@ -96,12 +96,12 @@ class ArmKinematics:
     def ik(self, world_from_tool: RigidTransform) -> FloatArray:
         """All joint vectors (n, 6) rad within the limits that bring the tool to a pose; (0, 6) when there is none.
 
-        Every row is checked by forward kinematics (0.1 mm, 1 mrad), for the analytic solver also answers poses out of reach.
+        Every row is checked by forward kinematics (0.1 mm, 1 mrad): the solver also answers poses out of reach.
         """
         return self._solve(world_from_tool.as_matrix())
 
     def ik_view(self, world_from_camera: RigidTransform, wrist_from_camera: RigidTransform) -> FloatArray:
-        """Joint vectors (n, 6) rad that bring a wrist camera to a place and viewing direction, the most upright image first.
+        """Joint vectors (n, 6) rad that bring a wrist camera to a place and direction of view, upright images first.
 
         Five joints carry the camera, so the roll about the optical axis comes out as it may: position within 2 mm and
         axis within 0.5 degrees are met, the last joint stays 0. The optical axis must be the wrist link's x axis.

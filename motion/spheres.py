@@ -1,8 +1,8 @@
 """The arm as spheres, for collision checks.
 
-Computed from rtb-data's STL meshes of the ViperX 300 S by clustering surface points; base, shoulder and fingers are laid
-out by hand, small where the arm comes near itself in its sleep pose and at the finger tips. No mesh point but the column's
-foot lies more than 3 mm outside. Fingers stand fully open, 0.057 m each, with pads 6 mm thick.
+Computed from rtb-data's STL meshes of the ViperX 300 S by clustering surface points; base, shoulder and fingers are
+laid out by hand, small where the arm comes near itself in its sleep pose and at the finger tips. From the upper arm on
+no mesh point lies more than 3 mm outside. Fingers stand fully open, 0.057 m each, with pads 6 mm thick.
 """
 
 import numpy as np
@@ -10,14 +10,19 @@ import numpy as np
 # link frame (0 base ... 6 last link), centre x, y, z in that frame, radius; metres
 _ROWS = [
     (0, 0.0000, 0.0000, -0.4580, 0.478),  # foot plate: the cap of a big sphere
-    (2, 0.0026, -0.0235, 0.0307, 0.043),
-    (2, -0.0055, 0.0248, 0.0308, 0.044),
-    (2, 0.0000, -0.0014, 0.1050, 0.042),
-    (2, 0.0025, 0.0029, 0.1766, 0.042),
-    (2, 0.0025, -0.0064, 0.2462, 0.043),
-    (2, 0.0397, -0.0240, 0.2994, 0.043),
-    (2, 0.0384, 0.0252, 0.2996, 0.042),
-    (2, 0.0022, 0.0033, 0.3105, 0.041),
+    (2, 0.0018, -0.0392, 0.0198, 0.028),
+    (2, -0.0017, 0.0416, 0.0229, 0.030),
+    (2, 0.0006, -0.0144, 0.0509, 0.029),
+    (2, 0.0021, 0.0126, 0.0515, 0.029),
+    (2, -0.0006, 0.0003, 0.0986, 0.030),
+    (2, 0.0003, 0.0000, 0.1375, 0.031),
+    (2, -0.0034, -0.0012, 0.1821, 0.031),
+    (2, 0.0003, 0.0011, 0.2242, 0.031),
+    (2, 0.0065, -0.0004, 0.2685, 0.032),
+    (2, 0.0178, -0.0250, 0.3004, 0.034),
+    (2, 0.0560, -0.0222, 0.2983, 0.033),
+    (2, 0.0122, 0.0267, 0.2999, 0.035),
+    (2, 0.0514, 0.0273, 0.3003, 0.034),
     (3, 0.0230, -0.0309, 0.0006, 0.035),
     (3, 0.0629, -0.0006, -0.0017, 0.035),
     (3, 0.1168, -0.0008, 0.0034, 0.035),

@@ -25,6 +25,7 @@ EDGE = 0.03  # m; neighbours that differ by more are an edge, where depth readin
 ROBOT_MARGIN = 0.02  # m; choice: arms are 5 mm off, depth scale 13 mm
 DARK = 45  # of 255; choice: the cable's 0.06 is 15 in full light
 THIN = 0.0075  # m; choice: a dark pixel nearer than this to a lighter one is cable (7 mm) or the rim of a dark thing
+NOTHING = 1e3  # m; farther than any reading
 CLOSER = 1.1  # choice: a look from up to this many times the range may overrule the one before
 
 
@@ -53,6 +54,7 @@ class Occupancy:
         self._state = np.zeros(len(self._centers), np.uint8)
         self._range = np.full(len(self._centers), np.inf, np.float32)  # of the look that decided the state
         self._color = SegmentationParameters.for_color(connector.color)
+        self._thickness = 2 * connector.radius
 
     def occupied_points(self) -> FloatArray:
         """Centres (n, 3) m, world frame, of the voxels seen or assumed to be full."""
@@ -66,20 +68,27 @@ class Occupancy:
         """
         k = subsampled(frame.intrinsics, STEP)
         depth = cv2.medianBlur(np.where(np.isfinite(frame.depth), frame.depth, 0), 3)[::STEP, ::STEP]
-        solid = ~_edges(depth) & (depth > 0) & ~self._cable_or_connector(frame.rgb, depth, k)
+        red = color_mask(frame.rgb, self._color)
+        through = np.where(depth > 0, _nearest_around(depth) - self.h, 0)
+        # Where the connector is, no obstacle is: a guess that covers it must not keep the hand away.
+        found = _nearest_around(np.where(red[::STEP, ::STEP] > 0, depth, np.float32(0)))
+        beside = (found < NOTHING) & (depth > found - self._thickness)
+        through = np.where(beside, np.maximum(through, found + self._thickness), through)
+        solid = (depth > 0) & ~_edges(depth) & ~_thin(frame.rgb, depth, k)
+        solid &= cv2.dilate(red, np.ones((5, 5), np.uint8))[::STEP, ::STEP] == 0
         points = world_from_camera.apply((rays(k) * depth[..., None])[solid])
         solid[solid] = ~(near_boxes(points, self._known) | _near_spheres(points, ignore))
         local = world_from_camera.inv().apply(self._centers)
         pixels = np.nan_to_num(np.rint(project(local, k)), nan=-1.0)
         seen = np.flatnonzero(np.all((pixels >= 0) & (pixels < [k.width, k.height]), axis=1))
         u, v = pixels[seen].astype(int).T
-        self._update(seen, local[seen, 2], depth[v, u], _nearest_around(depth)[v, u], solid[v, u])
+        self._update(seen, local[seen, 2], depth[v, u], through[v, u], solid[v, u])
 
-    def _update(self, seen: NDArray[np.intp], z: FloatArray, reading: Depth, nearest: Depth, solid: Mask) -> None:
-        """Voxels `seen` (n,) at depth `z` against the `reading` and the `nearest` one around on their pixels."""
-        free = (reading > 0) & (z < nearest - self.h)
+    def _update(self, seen: NDArray[np.intp], z: FloatArray, reading: Depth, through: Depth, solid: Mask) -> None:
+        """Voxels `seen` (n,) at depth `z` against their pixels: the `reading`, and how far one looks `through`."""
+        free = z < through
         surface = solid & (np.abs(z - reading) <= self.h)
-        behind = solid & (z > reading) & (z <= reading + ASSUMED_DEPTH) & ~surface
+        behind = solid & (z > reading + self.h) & (z <= reading + ASSUMED_DEPTH)
         state = self._state[seen]
         open_to_look = (state == Voxel.UNSEEN) | (state == Voxel.BEHIND) | (z <= CLOSER * self._range[seen])
         for looked, value in ((free, Voxel.FREE), (surface, Voxel.SURFACE)):
@@ -87,13 +96,6 @@ class Occupancy:
             self._state[chosen] = value
             self._range[chosen] = z[looked & open_to_look]
         self._state[seen[behind & (state == Voxel.UNSEEN)]] = Voxel.BEHIND
-
-    def _cable_or_connector(self, rgb: NDArray[np.uint8], depth: Depth, k: Intrinsics) -> Mask:
-        """Pixels of the connector's colour, or dark and thin as the cable is."""
-        red = cv2.dilate(color_mask(rgb, self._color), np.ones((5, 5), np.uint8))[::STEP, ::STEP] > 0
-        dark = np.ascontiguousarray((rgb.max(axis=2) < DARK)[::STEP, ::STEP]).astype(np.uint8)
-        inside = cv2.distanceTransform(dark, cv2.DIST_L2, 3) - 0.5
-        return np.asarray(red | ((dark > 0) & (inside * depth / k.fx < THIN)))
 
 
 def near_boxes(points: FloatArray, boxes: Sequence[Box]) -> Mask:
@@ -113,6 +115,13 @@ def _near_spheres(points: FloatArray, groups: Sequence[Spheres]) -> Mask:
     return near
 
 
+def _thin(rgb: NDArray[np.uint8], depth: Depth, k: Intrinsics) -> Mask:
+    """Dark pixels near to lighter ones, as the cable's are; of a dark obstacle this costs the rim alone."""
+    dark = np.ascontiguousarray(rgb[::STEP, ::STEP]).max(axis=2) < DARK
+    inside = cv2.distanceTransform(dark.astype(np.uint8), cv2.DIST_L2, 3) - 0.5
+    return np.asarray(dark & (inside * depth / k.fx < THIN))
+
+
 def _edges(depth: Depth) -> Mask:
     """Pixels whose 3x3 readings lie further apart than `EDGE`: thin things, flying readings."""
     farthest = cv2.dilate(depth, np.ones((3, 3), np.uint8))
@@ -120,5 +129,5 @@ def _edges(depth: Depth) -> Mask:
 
 
 def _nearest_around(depth: Depth) -> Depth:
-    """The nearest reading in each pixel's 3x3 neighbourhood; a large number where there is none."""
-    return np.asarray(cv2.erode(np.where(depth > 0, depth, np.float32(1e3)), np.ones((3, 3), np.uint8)), np.float32)
+    """The nearest reading in each pixel's 3x3 neighbourhood; `NOTHING` where there is none."""
+    return np.asarray(cv2.erode(np.where(depth > 0, depth, np.float32(NOTHING)), np.ones((3, 3), np.uint8)), np.float32)

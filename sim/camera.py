@@ -13,6 +13,7 @@ from interfaces.frame import RgbdFrame
 from sim.depth_noise import DepthNoise
 from sim.picture import LightState
 from sim.renderer import Renderer
+from sim.visuals import Visuals
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,14 +30,15 @@ class _Exposure:
 class SimCamera:
     """Fulfils `interfaces.devices.Camera`: the world calls `expose` at the camera's rate, readers call `latest`.
 
-    `true_pose` gives world_from_camera with the calibration's error in it; `joints` gives the encoder readings (6,) of the
-    arm that carries the camera, None for a fixed one; `now` the simulated seconds; `latency` the seconds from an exposure
-    until its frame can be read.
+    `true_pose` gives world_from_camera with the calibration's error in it; `joints` the encoder readings (6,) of the
+    arm that carries the camera, None for a fixed one; `now` the simulated seconds; `latency` is the seconds from an
+    exposure until its frame can be read.
     """
 
     def __init__(
         self,
         spec: CameraSpec,
+        visuals: Visuals,
         renderer: Renderer,
         light: LightState,
         noise: DepthNoise,
@@ -46,7 +48,9 @@ class SimCamera:
         latency: float,
     ) -> None:
         self.name: str = spec.name
+        self.spec = spec
         self._intrinsics = spec.intrinsics
+        self._visuals = visuals
         self._renderer, self._light, self._noise = renderer, light, noise
         self._true_pose, self._joints, self._now, self._latency = true_pose, joints, now, latency
         self._exposures: deque[_Exposure] = deque(maxlen=int(np.ceil(latency * spec.rate)) + 2)
@@ -54,8 +58,9 @@ class SimCamera:
         self._frame: RgbdFrame | None = None
         self._ids: NDArray[np.int32] | None = None
 
-    def expose(self, poses: NDArray[np.float32]) -> None:
-        """Keep this instant: `poses` from `Visuals.snapshot`, which cameras that expose together should share."""
+    def expose(self, poses: NDArray[np.float32] | None = None) -> None:
+        """Keep this instant. `poses` is a `Visuals.snapshot` of now that cameras exposing together share."""
+        poses = self._visuals.snapshot() if poses is None else poses
         self._count += 1
         joints = None if self._joints is None else np.array(self._joints(), float)
         self._exposures.append(_Exposure(self._count, self._now(), poses, self._true_pose(), joints))
@@ -68,7 +73,7 @@ class SimCamera:
         return self._frame
 
     def true_ids(self) -> NDArray[np.int32] | None:
-        """Ground truth: what each pixel of the latest frame shows (`VisualItem.id`, -1 for nothing); None before the first."""
+        """Ground truth: the `VisualItem.id` that each pixel of `latest()` shows, -1 for none; None before the first."""
         self.latest()
         return self._ids
 
@@ -81,8 +86,8 @@ class SimCamera:
         return frame, image.ids
 
 
-def camera_error(errors: Errors, rng: np.random.Generator) -> RigidTransform:
-    """A draw of nominal_from_true, the small transform by which a camera's optical frame is not where it is believed to be."""
+def camera_error(_spec: CameraSpec, errors: Errors, rng: np.random.Generator) -> RigidTransform:
+    """A draw of nominal_from_true: where a camera's optical frame really is, seen from where it is believed to be."""
     axis = rng.standard_normal(3)
     angle = np.deg2rad(errors.camera_angle_deg) * rng.standard_normal()
     turn = Rotation.from_rotvec(angle * axis / np.linalg.norm(axis))

@@ -95,7 +95,7 @@ def _measure(
     key: np.uint32,
     figures: NDArray[np.float32],
 ) -> NDArray[np.float32]:
-    """Measured depth of the pixels seen; `figures` are the scale, the noise of 1/Z per unit (1/m), and the least range (m)."""
+    """Measured depth of the pixels seen; `figures`: scale, standard deviation of 1/Z (1/m), least range (m)."""
     height, width = depth.shape
     scale, noise, least = figures
     out = np.zeros((height, width), np.float32)
@@ -123,7 +123,7 @@ def _flying(depth: NDArray[np.float32], v: int, u: int, key: np.uint32) -> np.fl
         if 0 <= v + dv < depth.shape[0] and 0 <= u + du < depth.shape[1] and depth[v + dv, u + du] > 0:
             near = min(near, depth[v + dv, u + du])
             far = max(far, depth[v + dv, u + du])
-    if far - near < np.float32(EDGE) * near:
+    if max(far - z, z - near) < np.float32(EDGE) * near:
         return z
     chance = _hash(key, v * depth.shape[1] + u)
     if chance >= np.float32(FLYING_SHARE):

@@ -18,6 +18,7 @@ from sim.visuals import Visuals
 FloatArray = NDArray[np.float64]
 SHADOW_SIZE = 1024  # texels a side of the shadow map
 CASTER = 1.0  # metres: items of a larger radius (the floor) take shadows but throw none
+_ROWS = ("row0", "row1", "row2")
 INSTANCE = np.dtype([("pose", "f4", (3, 4)), ("color", "f4", 3), ("id", "i4")])
 
 
@@ -39,14 +40,16 @@ class GlRenderer:
     name = "moderngl"
 
     def __init__(self, visuals: Visuals, reason: str = "") -> None:
-        self._gl = moderngl.create_context(standalone=True, backend="egl", require=330)
+        backend: Any = {"backend": "egl"}
+        self._gl: Any = moderngl.create_context(standalone=True, require=330, **backend)
         self.reason = f"{reason}: {self._gl.info['GL_RENDERER']}"
-        self._gl.enable(moderngl.DEPTH_TEST)
+        self._gl.enable(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
+        self._gl.front_face = "cw"  # image rows run downwards, so the picture is GL's in a mirror
         self._gl.depth_func = "<="
         self._draw = self._gl.program(vertex_shader=VERTEX, fragment_shader=FRAGMENT)
         self._cast = self._gl.program(vertex_shader=SHADOW_VERTEX, fragment_shader=SHADOW_FRAGMENT)
         behind = self._gl.program(vertex_shader=BACKDROP_VERTEX, fragment_shader=BACKDROP_FRAGMENT)
-        behind["color"].value = BACKGROUND
+        _set(behind, color=BACKGROUND)
         self._backdrop = self._gl.vertex_array(behind, [])
         self._groups = self._make_groups(visuals)
         self._shadows = self._gl.depth_texture((SHADOW_SIZE, SHADOW_SIZE))
@@ -60,7 +63,8 @@ class GlRenderer:
         self, poses: NDArray[np.float32], world_from_camera: RigidTransform, intrinsics: Intrinsics, light: LightState
     ) -> Image:
         """See `Renderer.render`. The very same read-only poses, for a second camera, cost no second shadow pass."""
-        if self._placed is None or self._placed[0] is not poses or poses.flags.writeable or self._placed[1] != light:
+        placed = self._placed
+        if placed is None or placed[0] is not poses or placed[1] is not light or poses.flags.writeable:
             self._place(poses, light)
             self._placed = (poses, light)
         target = self._target(intrinsics.width, intrinsics.height)
@@ -108,9 +112,8 @@ class GlRenderer:
         matrix, radius = _light_from_world(casters, poses, to_light)
         _write(self._cast, "world_to_light", matrix)
         _write(self._draw, "world_to_light", matrix)
-        self._draw["texel"].value = 2 * radius / SHADOW_SIZE
-        self._draw["to_light"].value = tuple(to_light)
-        self._draw["ambient"].value, self._draw["diffuse"].value = light.ambient, light.diffuse
+        texel = 2 * radius / SHADOW_SIZE
+        _set(self._draw, texel=texel, to_light=tuple(to_light), ambient=light.ambient, diffuse=light.diffuse)
         self._shadow_target.use()
         self._shadow_target.clear()
         for group in casters:
@@ -129,7 +132,9 @@ class GlRenderer:
         return self._targets[size]
 
 
-_ROWS = ("row0", "row1", "row2")
+def _set(program: Any, **uniforms: Any) -> None:
+    for name, value in uniforms.items():
+        program[name].value = value
 
 
 def _write(program: Any, name: str, matrix: FloatArray) -> None:
@@ -137,7 +142,7 @@ def _write(program: Any, name: str, matrix: FloatArray) -> None:
 
 
 def _clip_from_camera(k: Intrinsics) -> FloatArray:
-    """Projection (4, 4) with image rows downwards: the centre of pixel u lies half a pixel inside GL's window column u."""
+    """Projection (4, 4) with image rows downwards: the centre of pixel u lies half a pixel into GL's column u."""
     return np.array(
         [
             [2 * k.fx / k.width, 0.0, (2 * k.cx + 1) / k.width - 1, 0.0],
@@ -151,13 +156,16 @@ def _clip_from_camera(k: Intrinsics) -> FloatArray:
 def _light_from_world(
     casters: list[_Group], poses: NDArray[np.float32], to_light: FloatArray
 ) -> tuple[FloatArray, float]:
-    """Matrix (4, 4) that takes the casters' bounding ball to 0..1 as the light sees it, and the ball's radius in metres."""
+    """Matrix (4, 4) that takes the casters' bounding ball to 0..1 as the light sees it, and the ball's radius (m).
+
+    Its rows run downwards too, so that the same sides of triangles are drawn as in the picture.
+    """
     low = np.min([poses[g.rows, :, 3].min(axis=0) - g.radius for g in casters], axis=0) if casters else -np.ones(3)
     high = np.max([poses[g.rows, :, 3].max(axis=0) + g.radius for g in casters], axis=0) if casters else np.ones(3)
     centre, radius = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
     side = np.cross(to_light, [1.0, 0.0, 0.0] if abs(to_light[0]) < 0.9 else [0.0, 1.0, 0.0])
     side /= np.linalg.norm(side)
-    turn = np.array([side, np.cross(to_light, side), -to_light]) / (2 * radius)
+    turn = np.array([side, np.cross(side, to_light), -to_light]) / (2 * radius)
     matrix = np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = turn, 0.5 - turn @ centre
     return matrix, radius

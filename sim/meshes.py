@@ -74,10 +74,8 @@ def _merge(vertices: FloatArray, faces: NDArray[np.int64]) -> tuple[FloatArray, 
     count = np.bincount(inverse)
     means = np.column_stack([np.bincount(inverse, vertices[:, i]) / count for i in range(3)])
     merged = inverse[faces]
-    area = np.linalg.norm(np.cross(*(means[merged[:, i]] - means[merged[:, 0]] for i in (1, 2))), axis=1)
-    merged = merged[area > 1e-10]
-    _, first = np.unique(np.sort(merged, axis=1), axis=0, return_index=True)
-    return means, merged[np.sort(first)]
+    a, b, c = (means[merged[:, i]] for i in range(3))
+    return means, merged[np.linalg.norm(np.cross(b - a, c - a), axis=1) > 1e-10]
 
 
 def _smooth(faces: NDArray[np.int64], normals: FloatArray, area: FloatArray) -> FloatArray:

@@ -3,17 +3,17 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 NEAR, FAR = 0.02, 10.0  # metres along the optical axis; nothing outside is drawn
 BACKGROUND = (0.72, 0.74, 0.78)  # RGB, 0 to 1: the wall of the lab, far away
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LightState:
     """A far light: `direction` (3,) from the scene to the light in the world frame, any length; strengths 0 to 1."""
 
-    direction: tuple[float, float, float]
+    direction: ArrayLike
     ambient: float
     diffuse: float
 

@@ -12,6 +12,8 @@ from sim.picture import Image, LightState
 from sim.tiny_renderer import TinyRenderer
 from sim.visuals import Visuals
 
+__all__ = ["Image", "LightState", "Renderer", "RendererName", "make_renderer"]
+
 RendererName = Literal["auto", "moderngl", "tiny"]
 
 
@@ -24,7 +26,7 @@ class Renderer(Protocol):
     def render(
         self, poses: NDArray[np.float32], world_from_camera: RigidTransform, intrinsics: Intrinsics, light: LightState
     ) -> Image:
-        """The picture of the items at `poses` (n, 3, 4), as `Visuals.snapshot` gives them, from an OpenCV optical frame."""
+        """What an OpenCV optical frame sees of the items at `poses` (n, 3, 4), as from `Visuals.snapshot`."""
         ...
 
     def close(self) -> None:

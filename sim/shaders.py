@@ -31,7 +31,8 @@ void main() {
     float facing = dot(n, to_light) * inversesqrt(dot(n, n));
     float lit = texture(shadow_map, in_light);  // linear filter: four comparisons
     // faint grain, fixed in the world, so that surfaces are not of one colour
-    float grain = 1.0 + 0.03 * sin(90.0 * place.x + 4.0 * sin(11.0 * place.z)) * sin(37.0 * (place.y + place.z));
+    float warp = 4.0 * sin(11.0 * place.z + 7.0 * place.y);
+    float grain = 1.0 + 0.03 * sin(90.0 * place.x + warp) * sin(37.0 * (place.y + place.z) + warp);
     rgb = vec4(paint * grain * (ambient + diffuse * lit * max(facing, 0.0)), 1.0);
     depth = 1.0 / gl_FragCoord.w;  // clip w is the distance along the optical axis
     id = seen;
@@ -49,7 +50,7 @@ SHADOW_FRAGMENT = """#version 330
 void main() {}"""
 
 BACKDROP_VERTEX = """#version 330
-void main() { gl_Position = vec4(4.0 * (gl_VertexID & 1) - 1.0, 2.0 * (gl_VertexID & 2) - 1.0, 1.0, 1.0); }"""
+void main() { gl_Position = vec4(2.0 * (gl_VertexID & 2) - 1.0, 4.0 * (gl_VertexID & 1) - 1.0, 1.0, 1.0); }"""
 
 BACKDROP_FRAGMENT = """#version 330
 uniform vec3 color;

@@ -38,7 +38,7 @@ class TinyRenderer:
             k.height,
             viewMatrix=_view(world_from_camera),
             projectionMatrix=_projection(k),
-            lightDirection=list(light.direction),
+            lightDirection=np.asarray(light.direction, float).tolist(),
             lightColor=[1.0, 1.0, 1.0],
             lightDistance=10.0,
             lightAmbientCoeff=light.ambient,
@@ -79,7 +79,7 @@ def _view(world_from_camera: RigidTransform) -> list[float]:
 
 
 def _projection(k: Intrinsics) -> list[float]:
-    """OpenGL's projection matrix, column by column. TinyRenderer samples at a pixel's lower left corner, not its centre."""
+    """OpenGL's projection matrix, column by column; TinyRenderer samples a pixel at its lower left corner."""
     return [
         *(2 * k.fx / k.width, 0.0, 0.0, 0.0),
         *(0.0, 2 * k.fy / k.height, 0.0, 0.0),

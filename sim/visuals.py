@@ -13,8 +13,9 @@ from scipy.spatial.transform import RigidTransform, Rotation
 class VisualItem:
     """One visual shape.
 
-    `kind` is a PyBullet GEOM_ constant. `size` in metres: box: full edges; sphere: (radius, -, -); capsule and cylinder,
-    along z: (length, radius, -); mesh: the scale of the file's units. `file` is the mesh file, else ''. `color` is RGB, 0 to 1.
+    `kind` is a PyBullet GEOM_ constant. `size` in metres: box: full edges; sphere: (radius, -, -); capsule and
+    cylinder, along z: (length, radius, -); mesh: the scale of the file's units. `file` is the mesh file, else ''.
+    `color` is RGB, 0 to 1.
     """
 
     body: int
@@ -47,7 +48,7 @@ class Visuals:
         self._local: NDArray[np.float64] = np.array(local).reshape(-1, 3, 4)
 
     def snapshot(self) -> NDArray[np.float32]:
-        """World poses of all items now: (n, 3, 4), rows of world_from_visual. Read-only, so that cameras may share it."""
+        """World poses of all items now: (n, 3, 4), rows of world_from_visual. Read-only: cameras may share it."""
         frames = [frame for body, links in self._links.items() for frame in self._frames(body, links)]
         if not frames:
             return np.zeros((0, 3, 4), np.float32)
@@ -60,7 +61,7 @@ class Visuals:
         return poses
 
     def _frames(self, body: int, links: list[int]) -> list[tuple[Any, Any]]:
-        """World position and quaternion of the base's inertial frame and of the links' URDF frames, in `links`' order."""
+        """Position and quaternion in the world of the links' URDF frames; for the base, -1, of its inertial frame."""
         frames = []
         if links and links[0] == -1:
             frames.append(p.getBasePositionAndOrientation(body, physicsClientId=self._client))

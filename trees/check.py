@@ -19,7 +19,7 @@ _NAME = re.compile(r"[\w-]+")
 
 
 def check_tree(path: Path, leaves: Mapping[str, type] | None = None) -> list[Finding]:
-    """All findings, in line order; a tree file without any loads. `leaves` maps a tag to its class, by default all of ours.
+    """All findings, in line order; a file without any loads. `leaves` maps a tag to its class, by default all of ours.
 
     Raises:
         TypeError: a leaf class without ports.
@@ -35,9 +35,9 @@ def check_tree(path: Path, leaves: Mapping[str, type] | None = None) -> list[Fin
     except TreeSyntaxError as error:
         return [(error.line, str(error))]
     known = kinds(leaves)
-    trees = {tree.attributes.get("ID", ""): tree for tree in root.children}
+    trees = {tree.attributes.get("ID", ""): tree for tree in root.children if tree.tag == "BehaviorTree"}
     findings = [*_check_document(root, trees)]
-    for tree in root.children:
+    for tree in trees.values():
         findings += _check_names(tree)
         for element in tree.walk():
             if element is not tree:
@@ -68,6 +68,7 @@ def _check_document(root: Element, trees: Mapping[str, Element]) -> Iterator[Fin
     for tree in root.children:
         if tree.tag != "BehaviorTree":
             yield tree.line, unknown("element under root", tree.tag, ["BehaviorTree"])
+            continue
         if not tree.attributes.get("ID"):
             yield tree.line, "BehaviorTree needs an ID"
         elif trees[tree.attributes["ID"]] is not tree:  # the mapping keeps the last

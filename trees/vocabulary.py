@@ -25,6 +25,7 @@ class Attribute:
     is_port: bool = False
     is_output: bool = False
     takes_key: bool = True
+    minimum: int | None = None
 
     def problem(self, value: str) -> str | None:
         """Why this literal does not do, None if it does."""
@@ -37,7 +38,9 @@ class Attribute:
             suits = False
         if not suits:
             return f"is no {getattr(self.accepts, '__name__', self.accepts)}"
-        return "is not finite" if isinstance(result, float) and not math.isfinite(result) else None
+        if isinstance(result, float) and not math.isfinite(result):
+            return "is not finite"
+        return f"is less than {self.minimum}" if self.minimum is not None and result < self.minimum else None
 
 
 @dataclass(frozen=True)
@@ -60,8 +63,8 @@ BUILT_IN = {
     "Fallback": _MEMORY,
     "Selector": _MEMORY,
     "Parallel": Kind({"policy": _POLICY}, 1, None),
-    "Retry": Kind({"num_failures": Attribute(int)}, 1, 1),
-    "Repeat": Kind({"num_success": Attribute(int)}, 1, 1),
+    "Retry": Kind({"num_failures": Attribute(int, minimum=1)}, 1, 1),
+    "Repeat": Kind({"num_success": Attribute(int, minimum=1)}, 1, 1),
     "OneShot": Kind({"policy": Attribute(("on_completion", "on_successful_completion"))}, 1, 1),
     "Condition": Kind({"status": Attribute(("success", "failure", "running"))}, 1, 1),
     **{tag: Kind({}, 1, 1) for tag in _PLAIN_DECORATORS},

@@ -6,7 +6,9 @@ from dataclasses import dataclass, field
 from trees.element import Element, key_of
 from trees.vocabulary import Kind
 
-MAX_NODES = 2000  # after subtrees are filled in; a few nested ones could otherwise stand for billions
+# After subtrees are filled in: a few nested ones could stand for billions of nodes, and building and ticking recurse.
+MAX_NODES = 2000
+MAX_TREE_DEPTH = 150
 
 
 @dataclass(frozen=True)
@@ -22,6 +24,7 @@ class _Wires:
     readers: list[tuple[int, str, str]] = field(default_factory=list)  # line, port, blackboard path
     written: set[str] = field(default_factory=set)
     nodes: int = 0
+    depth: int = 0
 
 
 @dataclass(frozen=True)
@@ -54,6 +57,8 @@ def check_wiring(root: Element, trees: Mapping[str, Element], kinds: Mapping[str
     findings = [*_follow(main, _Scope("", _mapped(main, {}, _Scope("", {}))), trees, kinds, wires)]
     if wires.nodes > MAX_NODES:
         return [(root.line, f"more than {MAX_NODES} nodes once the subtrees are filled in")]
+    if wires.depth > MAX_TREE_DEPTH:
+        return [(root.line, f"deeper than {MAX_TREE_DEPTH} nodes once the subtrees are filled in")]
     return findings + [
         (line, f"{port} reads {path}, which no port writes")
         for line, port, path in wires.readers
@@ -67,19 +72,25 @@ def _mapped(tree: Element, given: Mapping[str, str], caller: _Scope) -> dict[str
 
 
 def _follow(
-    element: Element, scope: _Scope, trees: Mapping[str, Element], kinds: Mapping[str, Kind], wires: _Wires
+    element: Element,
+    scope: _Scope,
+    trees: Mapping[str, Element],
+    kinds: Mapping[str, Kind],
+    wires: _Wires,
+    depth: int = 1,
 ) -> Iterator[tuple[int, str]]:
     for child in element.children:
         wires.nodes += 1
-        if wires.nodes > MAX_NODES:
+        wires.depth = max(wires.depth, depth)
+        if wires.nodes > MAX_NODES or depth > MAX_TREE_DEPTH:
             return
         if child.tag == "SubTree":
             if tree := trees.get(child.attributes.get("ID", "")):
                 inner = _Scope(f"{scope.namespace}/{child.name}", _mapped(tree, child.attributes, scope))
-                yield from _follow(tree, inner, trees, kinds, wires)
+                yield from _follow(tree, inner, trees, kinds, wires, depth + 1)
         elif child.tag in kinds:
             yield from _connect(child, scope, kinds[child.tag], wires)
-            yield from _follow(child, scope, trees, kinds, wires)
+            yield from _follow(child, scope, trees, kinds, wires, depth + 1)
 
 
 def _connect(element: Element, scope: _Scope, kind: Kind, wires: _Wires) -> Iterator[tuple[int, str]]:

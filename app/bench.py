@@ -1,0 +1,133 @@
+"""`make bench`: what our parts cost beside the bare calls under them, timed in turn in one process."""
+
+import io
+import statistics
+import time
+from collections.abc import Callable
+from typing import Any
+
+import cv2
+import numpy as np
+import py_trees
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from app.scenario_file import load_scenario
+from app.study import print_table
+from app.tick_log import TickLog
+from perception.rgbd_pose import NoEstimate, estimate
+from perception.segmentation import SegmentationParameters
+from sim.cable import spring_torques
+from sim.renderer import make_renderer
+from sim.world import World
+
+Call = Callable[[], Any]
+
+
+def main() -> None:
+    """Print a table: milliseconds of ours and of the other, and their ratio."""
+    scenario = load_scenario("no_obstacle")
+    world = World(scenario.cell, "zero", 0)
+    try:
+        rows = {
+            "tick of 61 nodes with log / bare": ticks(),
+            "cable torques by numba / numpy and scipy": springs(scenario.cell.hidden.cable.links),
+            f"848x480 picture by {world.renderer.name} / TinyRenderer": pictures(world),
+            "colour and depth to pose / bare OpenCV calls": poses(world),
+        }
+        print_table(("pair", "ours ms", "other ms", "ratio"), [_line(name, *pair) for name, pair in rows.items()])
+    finally:
+        world.close()
+
+
+def _line(name: str, ours: Call, other: Call) -> tuple[str, ...]:
+    a, b = in_turn(ours, other)
+    return name, f"{1e3 * a:.3f}", f"{1e3 * b:.3f}", f"{a / b:.2f}"
+
+
+def in_turn(ours: Call, other: Call, seconds: float = 2.0) -> tuple[float, float]:
+    """Median seconds of a call of each, called in turn for so long (five times at least), so that load hits both."""
+    ours(), other()  # compiles, fills caches
+    took: tuple[list[float], list[float]] = ([], [])
+    end = time.perf_counter() + seconds
+    while len(took[0]) < 5 or time.perf_counter() < end:
+        for call, times in ((ours, took[0]), (other, took[1])):
+            start = time.perf_counter()
+            call()
+            times.append(time.perf_counter() - start)
+    return statistics.median(took[0]), statistics.median(took[1])
+
+
+def ticks() -> tuple[Call, Call]:
+    """The same tree with and without a log; a share of its nodes change at each tick."""
+
+    def tree() -> py_trees.trees.BehaviourTree:
+        groups = [
+            py_trees.composites.Sequence(
+                f"group_{i}",
+                memory=False,
+                children=[
+                    py_trees.behaviours.TickCounter(f"leaf_{j}", 1 + j, py_trees.common.Status.SUCCESS)
+                    for j in range(5)
+                ],
+            )
+            for i in range(10)
+        ]
+        return py_trees.trees.BehaviourTree(
+            py_trees.composites.Parallel("root", py_trees.common.ParallelPolicy.SuccessOnAll(False), groups)
+        )
+
+    logged, bare = tree(), tree()
+    logged.add_visitor(TickLog(logged.root, io.StringIO(), lambda: 0.0))
+    return logged.tick, bare.tick
+
+
+def springs(links: int) -> tuple[Call, Call]:
+    """Torques of a bent cable."""
+    rng = np.random.default_rng(0)
+    rotations = Rotation.from_rotvec(0.1 * rng.normal(size=(links, 3))).as_quat(canonical=True)
+    rates, stiffness, damping = rng.normal(size=(links, 3)), np.full(links, 2.0), np.full(links, 0.01)
+
+    def plain() -> NDArray[np.float64]:
+        turns = Rotation.from_quat(rotations).as_rotvec()
+        return np.asarray(-stiffness[:, None] * turns - damping[:, None] * rates)
+
+    assert np.allclose(spring_torques(rotations, rates, stiffness, damping), plain())
+    return lambda: spring_torques(rotations, rates, stiffness, damping), plain
+
+
+def pictures(world: World) -> tuple[Call, Call]:
+    """The rear camera's picture by the world's renderer and by PyBullet's software renderer."""
+    tiny = make_renderer(world.visuals, "tiny")
+    spec = world.cell.known.camera("rear")
+    pose = spec.mount.world_from_camera  # type: ignore[union-attr]
+
+    def draw(renderer: Any) -> Any:
+        return renderer.render(world.visuals.snapshot(), pose, spec.intrinsics, world.light)
+
+    return lambda: draw(world.renderer), lambda: draw(tiny)
+
+
+def poses(world: World) -> tuple[Call, Call]:
+    """The connector's pose from a rear frame, and OpenCV's own share of it: colour space, range, dilate, contours."""
+    frame = world.cameras["rear"].latest()
+    while frame is None:
+        world.advance(0.05)
+        frame = world.cameras["rear"].latest()
+    image, known = frame, world.cell.known
+    world_from_camera = known.camera("rear").mount.world_from_camera  # type: ignore[union-attr]
+    spans = SegmentationParameters.for_color(known.connector.color).ranges()
+    kernel = np.ones((3, 3), np.uint8)
+
+    def bare() -> Any:
+        hsv = cv2.cvtColor(image.rgb, cv2.COLOR_RGB2HSV)
+        masks = [cv2.inRange(hsv, low, high) for low, high in spans]
+        mask = cv2.dilate(masks[0] if len(masks) == 1 else cv2.bitwise_or(*masks), kernel)
+        return cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+
+    assert not isinstance(estimate(image, world_from_camera, known.connector), NoEstimate)
+    return lambda: estimate(image, world_from_camera, known.connector), bare
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,94 @@
+"""Bring the held connector before the stow clip, and into it."""
+
+import numpy as np
+from scipy.spatial.transform import RigidTransform, Rotation
+
+from behaviors.hand import HAND, HandLeaf, mean_pose
+from behaviors.leaf import Failed, Steps
+from interfaces.cause import CauseCode
+from motion.failure import PlanningError
+from motion.straight import straight_line
+from perception.rgbd_pose import Estimate
+
+BEFORE = 0.06  # m before the clip along the hand's own axis, from where it goes straight in
+CARRY_SPEED = 0.5
+INSERT_SPEED = 0.2
+LOOK_SECONDS = 0.8
+SEATED_SECONDS = 0.6  # the clip's lips take 0.2 s to close
+WAY_MARGIN = 0.0
+TRUSTED_SHIFT = 0.035  # m: what is seen further off its place in the hand than this is a false look
+
+
+class Carry(HandLeaf):
+    """Plans the held connector's way to a place before the clip and follows it."""
+
+    def steps(self) -> Steps:
+        """See the class."""
+        motion = self.services.motion
+        held = self.services.belief.held
+        assert held is not None
+        yield motion.move(HAND, self._goals(held), held=held, speed=CARRY_SPEED)
+
+    def _goals(self, held: RigidTransform) -> np.ndarray:
+        """Joints (n, 6) before the clip from which a straight way in is free, for any roll about the connector's axis."""
+        motion, clip = self.services.motion, self.services.known.clip
+        model, near = motion.model(HAND, held=held), motion.model(HAND, clip=False)
+        kin = motion.kinematics[HAND]
+        goals = []
+        for roll in np.linspace(-np.pi, np.pi, 36, endpoint=False):
+            seated = clip.world_from_seat * RigidTransform.from_rotation(Rotation.from_euler("x", roll)) * held.inv()
+            before = seated * RigidTransform.from_translation([-BEFORE, 0.0, 0.0])
+            for q in kin.ik(before):
+                if not model.free(q, WAY_MARGIN):
+                    continue
+                try:
+                    way = straight_line(kin, q, seated, 0.01)
+                except PlanningError:
+                    continue
+                if near.path_free(way, WAY_MARGIN):
+                    goals.append(q)
+        if not goals:
+            raise Failed(CauseCode.OUT_OF_REACH, "no free hand pose brings the held connector into the clip")
+        now = motion.joints(HAND)
+        goals.sort(key=lambda q: float(np.abs(q - now).max()))
+        return np.array(goals[:8])
+
+
+class Insert(HandLeaf):
+    """Looks how the connector lies in the hand, and brings it straight into the clip."""
+
+    def steps(self) -> Steps:
+        """See the class."""
+        motion = self.services.motion
+        yield from self._look()
+        held = self.services.belief.held
+        assert held is not None
+        yield motion.straight(HAND, self._seated(held), speed=INSERT_SPEED)
+        yield from self.wait(SEATED_SECONDS)
+
+    def _look(self) -> Steps:
+        """Correct the belief of how the connector lies in the hand by what the rear camera sees of it."""
+        clock, perception, belief = self.services.clock, self.services.perception, self.services.belief
+        seen: dict[float, Estimate] = {}
+        end = clock.now() + LOOK_SECONDS
+        while clock.now() < end - 1e-9:
+            yield None
+            result = perception.look("rear")
+            if isinstance(result, Estimate) and result.stamp > end - LOOK_SECONDS:
+                seen[result.stamp] = result
+        whole = [e for e in seen.values() if e.whole]
+        if not whole or belief.held is None:
+            self.say("the hand hides the connector", frames=len(seen))
+            return
+        found = self.services.motion.tool(HAND).inv() * mean_pose(whole)
+        shift = float(np.linalg.norm(found.translation - belief.held.translation))
+        self.say("connector in the hand", shift=round(shift, 4), trusted=shift < TRUSTED_SHIFT)
+        if shift < TRUSTED_SHIFT:
+            belief.held = found
+
+    def _seated(self, held: RigidTransform) -> RigidTransform:
+        """world_from_tool that seats the held connector, with the roll that turns the hand least."""
+        tool, seat = self.services.motion.tool(HAND), self.services.known.clip.world_from_seat
+        rolls = [RigidTransform.from_rotation(Rotation.from_euler("x", r)) for r in np.linspace(-np.pi, np.pi, 361)]
+        poses = [seat * roll * held.inv() for roll in rolls]
+        return min(poses, key=lambda pose: float((tool.rotation.inv() * pose.rotation).magnitude()))

@@ -1,0 +1,38 @@
+"""Consult the rear camera before any search."""
+
+from typing import Any, ClassVar
+
+from py_trees.ports import PortInformation
+
+from behaviors.hand import mean_pose
+from behaviors.leaf import Failed, Steps, StepsLeaf
+from interfaces.cause import CauseCode
+from perception.rgbd_pose import Estimate
+
+
+class CheckCameras(StepsLeaf):
+    """Looks for `seconds` through the rear camera, then asks the track the thesis's three questions.
+
+    SUCCESS with the connector's mean pose when its frame exists, is fresh and is live; else FAILURE: it must be searched.
+    """
+
+    INPUT_PORTS: ClassVar[dict[str, Any]] = {
+        "seconds": PortInformation(data_type=float, required=False, default_value=1.5)
+    }
+
+    def steps(self) -> Steps:
+        """See the class."""
+        clock, perception = self.services.clock, self.services.perception
+        begin = clock.now()
+        seen: dict[float, Estimate] = {}
+        while clock.now() < begin + self.get_input("seconds") - 1e-9:
+            yield None
+            result = perception.look("rear")
+            if isinstance(result, Estimate) and result.stamp >= begin:
+                seen[result.stamp] = result
+        health = perception.track.check(clock.now())
+        if not (health.ok and seen):
+            raise Failed(CauseCode.CONNECTOR_NOT_FOUND, health.reason)
+        self.services.belief.connector = mean_pose(list(seen.values()))
+        self.services.belief.found_by = "rear"
+        self.say("found", camera="rear", position=self.services.belief.connector.translation.round(4).tolist())

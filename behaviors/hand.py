@@ -1,0 +1,56 @@
+"""Small steps of the right hand that several states share."""
+
+import numpy as np
+from scipy.spatial.transform import RigidTransform
+
+from behaviors.leaf import Failed, Steps, StepsLeaf
+from interfaces.cause import CauseCode
+from interfaces.cell import pose_along
+from perception.rgbd_pose import Estimate
+from perception.slip import GapTest
+
+HAND = "right"  # the thesis's fixed roles: the right arm handles the cable ...
+EYE = "left"  # ... and the left one carries the wrist camera
+GRIP_FORCE = 40.0  # N a finger
+CLOSE_SECONDS = 1.0  # the jaw closes from 60 mm at 0.1 m/s a finger, and the readings settle
+BACK = 0.10  # m of straight way back from a place where something was held
+
+
+class HandLeaf(StepsLeaf):
+    """A state in which the right hand works."""
+
+    def grip(self, world_from_connector: RigidTransform) -> Steps:
+        """Close the jaw and feel whether something is in it; belief: held as it was thought to lie."""
+        services = self.services
+        services.motion.grippers[HAND].close(GRIP_FORCE)
+        test = GapTest(2 * services.known.connector.radius)
+        end = services.clock.now() + CLOSE_SECONDS
+        while services.clock.now() < end - 1e-9:
+            test.feed(services.motion.grippers[HAND].reading())
+            yield None
+        evidence = test.evidence()
+        if evidence.detected:
+            raise Failed(CauseCode.GRASP_EMPTY, f"the jaw closed on nothing: {evidence.sentence}")
+        services.belief.held = services.motion.tool(HAND).inv() * world_from_connector
+        self.say("grasped", gap=evidence.value)
+
+    def back_off(self) -> Steps:
+        """Draw the hand straight back, then bring the arm to its sleep pose."""
+        motion = self.services.motion
+        back = motion.tool(HAND).rotation.apply([-BACK, 0.0, 0.0])
+        yield motion.shift(HAND, back)
+        yield from self.go_to_sleep(HAND)
+
+    def go_to_sleep(self, arm: str) -> Steps:
+        """Bring an arm to its sleep pose, out of the cameras' and the other arm's way."""
+        yield self.services.motion.move(arm, np.array([self.services.known.arm(arm).sleep]))
+
+
+def mean_pose(estimates: list[Estimate]) -> RigidTransform:
+    """world_from_connector from several estimates: median position, mean axis of those that show most of it."""
+    whole = [e for e in estimates if e.whole] or estimates
+    longest = max(e.extent for e in whole)
+    best = [e for e in whole if e.extent >= 0.9 * longest]
+    position = np.median([e.position for e in best], axis=0)
+    axis = np.mean([e.axis for e in best], axis=0)
+    return pose_along(tuple(position), tuple(axis))

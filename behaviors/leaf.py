@@ -1,0 +1,93 @@
+"""The common ground of all leaves."""
+
+from collections.abc import Iterator
+from typing import Any, ClassVar
+
+from py_trees.common import Status
+from py_trees.ports import BehaviourWithPorts
+
+from behaviors.services import Services
+from interfaces.cause import Cause, CauseCode
+from motion.failure import PlanningError
+from motion.service import Task
+
+Steps = Iterator[Task | None]
+
+
+class Failed(Exception):  # noqa: N818 - said inside `steps`: the leaf fails with this cause
+    """Raised inside `steps`: the leaf fails with this cause."""
+
+    def __init__(self, code: CauseCode, message: str) -> None:
+        super().__init__(message)
+        self.code = code
+
+
+class Leaf(BehaviourWithPorts):  # type: ignore[misc]
+    """A leaf with services; it says why it fails."""
+
+    services: Services
+
+    def setup(self, **kwargs: Any) -> None:
+        """Take the services that `BehaviourTree.setup(services=...)` hands round."""
+        self.services = kwargs["services"]
+
+    @property
+    def path(self) -> str:
+        """Where the leaf stands in its tree: root/carry/move."""
+        return str(self.name.replace(".", "/"))
+
+    def fail(self, code: CauseCode, message: str) -> Status:
+        """Note the cause, and FAILURE."""
+        self.services.belief.causes.append(Cause(code, message, self.path))
+        self.feedback_message = message
+        self.services.log.warning("failed", node=self.path, code=code.value, message=message)
+        return Status.FAILURE
+
+    def say(self, event: str, **values: Any) -> None:
+        """An event of this leaf into the run's log."""
+        self.services.log.info(event, node=self.path, **values)
+
+
+class StepsLeaf(Leaf):
+    """A leaf whose work is a sequence of steps: `steps()` yields a `Task` to be done, or None to wait for the next tick.
+
+    It ends in SUCCESS when the steps end. `Failed` raised in them, or a motion that cannot be, ends it in FAILURE.
+    """
+
+    INPUT_PORTS: ClassVar[dict[str, Any]] = {}
+    OUTPUT_PORTS: ClassVar[dict[str, Any]] = {}
+    _task: Task | None = None
+
+    def steps(self) -> Steps:
+        """The work, as a generator."""
+        raise NotImplementedError
+
+    def initialise(self) -> None:
+        """Begin anew."""
+        self._work, self._task = self.steps(), None
+
+    def update(self) -> Status:
+        """Poll the task under way; when it is done take the next step."""
+        try:
+            while self._task is None or self._task.poll():
+                self._task = next(self._work)
+                if self._task is None:
+                    return Status.RUNNING
+        except StopIteration:
+            return Status.SUCCESS
+        except (PlanningError, Failed) as error:
+            return self.fail(error.code, str(error))
+        return Status.RUNNING
+
+    def terminate(self, new_status: Status) -> None:
+        """Stop the arm if this leaf was at work; one that had completed has nothing to stop."""
+        if self.status is Status.RUNNING and new_status is Status.INVALID:
+            if self._task is not None:
+                self._task.cancel()
+            self._work.close()
+
+    def wait(self, seconds: float) -> Steps:
+        """Steps that let so many simulated seconds pass."""
+        end = self.services.clock.now() + seconds
+        while self.services.clock.now() < end - 1e-9:
+            yield None

@@ -1,0 +1,39 @@
+"""Keep an eye on the connector while it is carried."""
+
+from typing import Any, ClassVar
+
+from py_trees.common import Status
+from py_trees.ports import PortInformation
+
+from behaviors.hand import HAND
+from behaviors.leaf import Leaf
+
+
+class Monitor(Leaf):
+    """Looks through the rear camera every `period` seconds and tells the track where the hand is; always SUCCESS.
+
+    It stands before `DetectSlip` in a Sequence without memory, so both come at every tick.
+    """
+
+    INPUT_PORTS: ClassVar[dict[str, Any]] = {
+        "period": PortInformation(data_type=float, required=False, default_value=0.1)
+    }
+    OUTPUT_PORTS: ClassVar[dict[str, Any]] = {}
+    _due = 0.0
+
+    def update(self) -> Status:
+        """See the class."""
+        perception, now = self.services.perception, self.services.clock.now()
+        perception.track.held(self.services.motion.tool(HAND).translation)
+        if now >= self._due - 1e-9:
+            perception.look("rear")
+            self._due = now + self.get_input("period")
+        state, sentence = perception.track.state(now)
+        self.feedback_message = f"{state.value}: {sentence}"
+        return Status.SUCCESS
+
+    def terminate(self, new_status: Status) -> None:
+        """Stopped from above: the hand no longer carries under watch."""
+        if new_status is Status.INVALID:
+            self.services.perception.track.held(None)
+            self._due = 0.0

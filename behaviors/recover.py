@@ -1,0 +1,43 @@
+"""After a slip: out of the way, and wait until the cable hangs still."""
+
+from typing import Any, ClassVar
+
+from py_trees.ports import PortInformation
+
+from behaviors.hand import HAND, HandLeaf
+from behaviors.leaf import Failed, Steps
+from interfaces.cause import CauseCode
+from motion.service import OPEN_GAP
+from perception.stillness import Stillness
+
+FRAME_PERIOD = 0.2  # s between the frames that are compared
+
+
+class MakeRoom(HandLeaf):
+    """Brings the hand to its sleep pose: it must not hide the connector nor stop its swing."""
+
+    def steps(self) -> Steps:
+        """See the class."""
+        self.services.belief.connector = self.services.belief.found_by = None
+        yield from self.go_to_sleep(HAND)
+        self.services.motion.grippers[HAND].open(OPEN_GAP)
+
+
+class WaitUntilStill(HandLeaf):
+    """RUNNING while the rear camera sees anything move; FAILURE after `time_limit` seconds."""
+
+    INPUT_PORTS: ClassVar[dict[str, Any]] = {
+        "time_limit": PortInformation(data_type=float, required=False, default_value=30.0)
+    }
+
+    def steps(self) -> Steps:
+        """See the class."""
+        stillness, begin = Stillness(), self.services.clock.now()
+        limit = self.get_input("time_limit")
+        while self.services.clock.now() < begin + limit:
+            frame = self.services.perception.frame("rear")
+            if frame is not None and frame.stamp >= begin and stillness.feed(frame):
+                self.say("still", waited=round(self.services.clock.now() - begin, 2))
+                return
+            yield from self.wait(FRAME_PERIOD)
+        raise Failed(CauseCode.NOT_STILL, f"the scene still moved after {limit:.0f} s")

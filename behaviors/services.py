@@ -1,0 +1,43 @@
+"""What leaves are given at `setup`, and what the robot believes between them."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from scipy.spatial.transform import RigidTransform
+
+from interfaces.cause import Cause
+from interfaces.cell import KnownCell
+from interfaces.devices import Clock
+from motion.service import Motion
+from perception.service import Perception
+
+
+@dataclass
+class Notice:
+    """A loss of the connector that the robot noticed: when (simulated s), and by which test."""
+
+    at: float
+    by: str
+
+
+@dataclass
+class Belief:
+    """What the robot holds to be so. Leaves write it, the run's record reads it."""
+
+    held: RigidTransform | None = None  # tool_from_connector of the right hand, None when it holds nothing
+    connector: RigidTransform | None = None  # world_from_connector as last found for a grasp
+    found_by: str | None = None  # the camera that found it last
+    notices: list[Notice] = field(default_factory=list)
+    causes: list[Cause] = field(default_factory=list)
+
+
+@dataclass
+class Services:
+    """The services of one run."""
+
+    known: KnownCell
+    clock: Clock
+    motion: Motion
+    perception: Perception
+    log: Any  # structlog's bound logger
+    belief: Belief = field(default_factory=Belief)

@@ -1,0 +1,50 @@
+"""Leave the connector in the clip, and look whether it stays there."""
+
+from behaviors.hand import HAND, HandLeaf
+from behaviors.leaf import Failed, Steps
+from behaviors.services import Notice
+from interfaces.cause import CauseCode
+from motion.service import OPEN_GAP
+from perception.rgbd_pose import Estimate
+from perception.slip import seen_at
+
+OPEN_SECONDS = 0.6
+LOOK_SECONDS = 1.0
+STOWED_RADIUS = 0.04  # m: 20 mm of the clip, 10 mm of the eye, and a part hidden by the clip
+
+
+class LetGo(HandLeaf):
+    """Opens the jaw, draws it back and brings the arm to its sleep pose."""
+
+    def steps(self) -> Steps:
+        """See the class."""
+        self.services.motion.grippers[HAND].open(OPEN_GAP)
+        self.services.belief.held = None
+        yield from self.wait(OPEN_SECONDS)
+        yield from self.back_off()
+
+
+class LookAtStow(HandLeaf):
+    """A look at the clip: FAILURE when the connector is not there, so that an end that fell out is not left lying."""
+
+    def steps(self) -> Steps:
+        """See the class."""
+        clock, seat = self.services.clock, self.services.known.clip.seat
+        begin = clock.now()
+        latest: Estimate | None = None
+        while clock.now() < begin + LOOK_SECONDS - 1e-9:
+            yield None
+            result = self.services.perception.look("rear")
+            if isinstance(result, Estimate) and result.stamp > begin:
+                latest = result
+        if latest is None:
+            self._lost("the rear camera sees no connector at the clip")
+        else:
+            evidence = seen_at(latest.position, seat, STOWED_RADIUS)
+            self.say("looked at the clip", distance=round(evidence.value, 4), stowed=evidence.detected)
+            if not evidence.detected:
+                self._lost(evidence.sentence)
+
+    def _lost(self, message: str) -> None:
+        self.services.belief.notices.append(Notice(self.services.clock.now(), "place"))
+        raise Failed(CauseCode.NOT_STOWED, message)

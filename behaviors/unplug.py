@@ -1,0 +1,28 @@
+"""Take the connector out of its socket; where sockets are is known."""
+
+from typing import Any, ClassVar
+
+import numpy as np
+from py_trees.ports import PortInformation
+
+from behaviors.hand import HAND, HandLeaf
+from behaviors.leaf import Steps
+
+DRAW_OUT = 0.05  # m along the plug's axis: the plug sits 0.015 deep
+CLEAR = 0.06  # m away from the panel then
+
+
+class Unplug(HandLeaf):
+    """Grips the connector in the `socket` of that name, draws it out along its axis, and away from the panel."""
+
+    INPUT_PORTS: ClassVar[dict[str, Any]] = {"socket": PortInformation(data_type=str)}
+
+    def steps(self) -> Steps:
+        """See the class."""
+        known, motion = self.services.known, self.services.motion
+        plug = known.socket(self.get_input("socket")).world_from_plug(known.connector.length)
+        yield motion.pick(HAND, plug)
+        yield from self.grip(plug)
+        axis = plug.rotation.apply([1.0, 0.0, 0.0])
+        yield motion.shift(HAND, -DRAW_OUT * axis)
+        yield motion.shift(HAND, np.array([-CLEAR, 0.0, 0.0]))

@@ -1,0 +1,143 @@
+"""How to take hold of the connector: candidates round its axis, and the first that the arm can reach freely."""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import RigidTransform, Rotation
+
+from interfaces.cause import CauseCode
+from motion.collision import CollisionModel
+from motion.failure import PlanningError
+from motion.kinematics import FloatArray
+from motion.straight import straight_line
+
+# The palm 40 degrees off the cross direction, on the cable's side, leaves three quarters of the connector in sight.
+PREFERRED_YAW = float(np.deg2rad(40.0))
+YAWS = tuple(np.deg2rad([40.0, 25.0, 10.0, 50.0, -10.0, -25.0, -40.0]).tolist())
+ROLLS = tuple(np.deg2rad([0, 30, -30, 60, -60, 90, -90, 120, -120, 150, -150, 180]).tolist())
+_MOST_YAW = np.deg2rad(50.0)  # beyond, the jaws close along rather than across the connector
+_ROLL_COST = 0.3  # of a rad of roll, in rad of yaw
+_FLIP_COST = 0.01  # orders the two equal halves of a gripper
+
+
+@dataclass(frozen=True, eq=False)
+class Grasp:
+    """A pose of the tool at which the jaws close on the connector; `cost` in rad off the preferred yaw."""
+
+    world_from_tool: RigidTransform
+    cost: float
+
+
+@dataclass(frozen=True, eq=False)
+class Approach:
+    """A grasp and the joint path (k, 6) rad to it: from the standoff, the tool in a straight line."""
+
+    grasp: Grasp
+    path: FloatArray
+
+
+def grasp_candidates(
+    world_from_connector: RigidTransform,
+    connector_length: float,
+    grip_offset: float,
+    yaws: Sequence[float] = YAWS,
+    rolls: Sequence[float] = ROLLS,
+    shallow: float = 0.0,
+) -> list[Grasp]:
+    """Grasps of the connector (its frame at its centre, x from cable to tip), cheapest first.
+
+    The fingers close across the axis, `grip_offset` metres along it from the centre (negative: towards the cable).
+    `yaws` rad tilt the approach from square to the axis, positive with the palm on the cable's side. `rolls` rad turn
+    it about the axis; 0 comes from the arms (along world x as far as the axis lets it). `shallow` metres is by how much
+    the connector lies nearer to the finger tips than the tool's centre.
+
+    Raises ValueError if the grip lies off the connector or a yaw exceeds 50 degrees.
+    """
+    if abs(grip_offset) > 0.5 * connector_length:
+        raise ValueError(f"grip {grip_offset:.3f} m from the centre is off a connector of {connector_length:.3f} m")
+    if max(abs(yaw) for yaw in yaws) > _MOST_YAW + 1e-9:
+        raise ValueError(
+            f"yaws go to {np.rad2deg(_MOST_YAW):.0f} degrees, asked for {np.rad2deg(yaws).round(1).tolist()}"
+        )
+    axis = world_from_connector.rotation.apply([1.0, 0.0, 0.0])
+    centre = world_from_connector.translation + grip_offset * axis
+    forward = _square_to(axis)
+    grasps = []
+    for yaw in yaws:
+        for roll in rolls:
+            square = Rotation.from_rotvec(roll * axis).apply(forward)
+            x = np.cos(yaw) * square + np.sin(yaw) * axis
+            for flip in (1.0, -1.0):
+                y = flip * np.cross(axis, square)
+                rotation = Rotation.from_matrix(np.column_stack([x, y, np.cross(x, y)]))
+                cost = abs(yaw - PREFERRED_YAW) + _ROLL_COST * abs(roll) + _FLIP_COST * (flip < 0)
+                grasps.append(Grasp(RigidTransform.from_components(centre - shallow * x, rotation), cost))
+    return sorted(grasps, key=lambda g: g.cost)
+
+
+def choose_grasp(
+    model: CollisionModel,
+    q_now: FloatArray,
+    candidates: Sequence[Grasp],
+    standoff: float = 0.08,
+    margin: float = 0.01,
+    near: CollisionModel | None = None,
+    near_margin: float = 0.002,
+    count: int = 4,
+) -> list[Approach]:
+    """Up to `count` approaches, of the cheapest candidates that work; plan to any first row, then follow that path.
+
+    At the standoff, `standoff` metres back along the tool, `model` must be free by `margin` metres; on the straight way
+    in, `near` (without the target's own surface; default: `model`) by `near_margin`. `q_now` (6,) rad orders branches
+    of one candidate. Raises PlanningError with a tally of what was wrong with the candidates.
+    """
+    approaches: list[Approach] = []
+    troubles: Counter[str] = Counter()
+    for grasp in candidates:
+        paths, trouble = _ways_in(model, near or model, grasp, standoff, margin, near_margin)
+        paths.sort(key=lambda path: float(np.abs(path[0] - q_now).max()))
+        approaches += [Approach(grasp, path) for path in paths]
+        if len(approaches) >= count:
+            return approaches[:count]
+        troubles[trouble] += not paths
+    if approaches:
+        return approaches
+    reachable = len(candidates) - troubles["out of reach"]
+    code = CauseCode.NO_COLLISION_FREE_GOAL if reachable else CauseCode.OUT_OF_REACH
+    tally = ", ".join(f"{n} {trouble}" for trouble, n in troubles.most_common())
+    raise PlanningError(code, f"{len(candidates)} grasp candidates: {tally}")
+
+
+def _ways_in(
+    model: CollisionModel, near: CollisionModel, grasp: Grasp, standoff: float, margin: float, near_margin: float
+) -> tuple[list[FloatArray], str]:
+    """Joint paths from standoff to grasp, one for each branch that works, and what was wrong with the last other."""
+    kin = model.kinematics
+    back = grasp.world_from_tool * RigidTransform.from_translation([-standoff, 0.0, 0.0])
+    paths, trouble = [], "out of reach"
+    for q in kin.ik(grasp.world_from_tool):
+        if not near.free(q, near_margin):
+            trouble = f"in collision with {near.nearest(q)[1]}"
+            continue
+        try:
+            path = straight_line(kin, q, back)[::-1]
+        except PlanningError:
+            trouble = "without a straight way in"
+            continue
+        if not model.free(path[0], margin):
+            trouble = f"with a standoff too near to {model.nearest(path[0])[1]}"
+        elif not near.path_free(path, near_margin):
+            trouble = "with something in the straight way in"
+        else:
+            paths.append(path)
+    return paths, trouble
+
+
+def _square_to(axis: FloatArray) -> FloatArray:
+    """Unit vector square to the axis and nearest to world x; nearest to world -z for an axis along x."""
+    wish = np.array([1.0, 0.0, 0.0]) if abs(axis[0]) < 0.95 else np.array([0.0, 0.0, -1.0])
+    square = wish - (wish @ axis) * axis
+    unit: FloatArray = square / np.linalg.norm(square)
+    return unit

@@ -1,0 +1,203 @@
+"""What the leaves ask of the arms: plan, wait for the plan's latency, follow, stop.
+
+A request returns a `Task` at once; `poll` it every tick. Nothing here reads a wall clock: a plan costs its stated latency
+on the simulated clock.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import RigidTransform
+
+from interfaces.cause import CauseCode
+from interfaces.cell import Box, Connector, KnownCell, WristMount
+from interfaces.devices import Arm, Clock, Gripper
+from interfaces.frame import RgbdFrame
+from motion.collision import CollisionModel
+from motion.distance_grid import DistanceGrid
+from motion.failure import PlanningError
+from motion.grasps import choose_grasp, grasp_candidates
+from motion.kinematics import ArmKinematics
+from motion.planner import plan
+from motion.straight import straight_line
+from motion.timing import time_path
+
+FloatArray = NDArray[np.float64]
+
+MARGIN = 0.015  # m between the arm's spheres and anything while it moves freely
+NEAR_MARGIN = 0.0  # m on the last straight centimetres
+APPROACH_SPEED = 0.3  # share of the joints' speed on straight ways near things
+GRIP_OFFSET = -0.02  # m along the connector: near the cable, so that the tip shows
+OPEN_GAP = 0.06  # m between the pads: 20 mm to each side of the connector
+ARRIVED = 0.05  # rad: an arm that ends further from its goal was blocked
+GRID_BORDER = 0.2  # m around the voxels: no sphere of an arm is thicker
+SETTLE = 0.10  # s after a trajectory before its end is judged
+
+
+class Task:
+    """Work of an arm under way, one step a `poll`."""
+
+    def __init__(self, steps: Iterator[None], stop: Callable[[], None]) -> None:
+        self._steps, self._stop = steps, stop
+
+    def poll(self) -> bool:
+        """Whether it is done. Raises PlanningError with the cause when it cannot be."""
+        try:
+            next(self._steps)
+        except StopIteration:
+            return True
+        return False
+
+    def cancel(self) -> None:
+        """Stop the arm where it is."""
+        self._steps = iter(())
+        self._stop()
+
+
+class Motion:
+    """The two arms and what they must not touch. `seed` makes the planner's draws repeatable."""
+
+    def __init__(
+        self, known: KnownCell, arms: Mapping[str, Arm], grippers: Mapping[str, Gripper], clock: Clock, seed: int
+    ) -> None:
+        self.known, self.arms, self.grippers, self._clock = known, arms, grippers, clock
+        self.kinematics = {spec.name: ArmKinematics(RigidTransform.from_translation(spec.base)) for spec in known.arms}
+        self._cameras = {c.mount.arm: c.mount for c in known.cameras if isinstance(c.mount, WristMount)}
+        self._boxes = [*known.boxes, *_socket_boxes(known), *known.clip.bracket]
+        self._grid: DistanceGrid | None = None
+        self._seed = seed
+
+    def set_obstacles(self, points: FloatArray, spacing: float) -> None:
+        """Keep clear of occupied voxels from now on: centres (n, 3) m and edge m."""
+        if not len(points):
+            self._grid = None
+            return
+        lower, upper = points.min(axis=0) - GRID_BORDER, points.max(axis=0) + GRID_BORDER
+        self._grid = DistanceGrid.from_points(points, lower, upper, spacing)
+
+    def joints(self, arm: str) -> FloatArray:
+        """The arm's joints (6,) rad as read."""
+        return self.arms[arm].reading().positions
+
+    def tool(self, arm: str) -> RigidTransform:
+        """world_from_tool as read."""
+        return self.kinematics[arm].tool(self.joints(arm))
+
+    def camera_pose(self, frame: RgbdFrame) -> RigidTransform:
+        """world_from_camera of a frame as the robot believes it."""
+        mount = self.known.camera(frame.camera).mount
+        if isinstance(mount, WristMount):
+            assert frame.joints is not None
+            return self.kinematics[mount.arm].wrist(frame.joints) * mount.wrist_from_camera
+        return mount.world_from_camera
+
+    def spheres(self) -> list[tuple[FloatArray, FloatArray]]:
+        """The arms' bodies now: centres (n, 3) m and radii (n,) m of each."""
+        both = [self.model(name, others=False).spheres(self.joints(name)) for name in self.arms]
+        return [(s[:, :3], s[:, 3]) for s in both]
+
+    def model(
+        self, arm: str, *, held: RigidTransform | None = None, others: bool = True, clip: bool = True
+    ) -> CollisionModel:
+        """What `arm` must not touch now.
+
+        `held` is tool_from_connector while it carries the connector; without `clip` the clip's bracket may be touched.
+        """
+        other = None
+        if others:
+            name = next(n for n in self.arms if n != arm)
+            other = self.model(name, others=False).spheres(self.joints(name))
+        boxes = self._boxes if clip else [b for b in self._boxes if b not in self.known.clip.bracket]
+        camera = self._cameras.get(arm)
+        return CollisionModel(
+            self.kinematics[arm],
+            boxes,
+            camera_offset=camera.offset if camera else None,
+            other_arm=other,
+            grid=self._grid if others else None,
+            carried=None if held is None else _connector_spheres(held, self.known.connector),
+        )
+
+    def move(self, arm: str, goals: FloatArray, *, held: RigidTransform | None = None, speed: float = 1.0) -> Task:
+        """Plan a free way to one of the goals (n, 6) rad and follow it; `held` is tool_from_connector when it carries."""
+
+        def steps() -> Iterator[None]:
+            path = plan(self.model(arm, held=held), self.joints(arm), goals, self._next_seed(), margin=MARGIN)
+            yield from self._follow(arm, path, speed)
+
+        return self._task(arm, steps())
+
+    def straight(self, arm: str, goal: RigidTransform, *, speed: float = APPROACH_SPEED) -> Task:
+        """Move the tool in a straight line to `goal` (world_from_tool), near things as it may be."""
+
+        def steps() -> Iterator[None]:
+            yield from self._follow(arm, straight_line(self.kinematics[arm], self.joints(arm), goal), speed)
+
+        return self._task(arm, steps())
+
+    def shift(self, arm: str, way: Sequence[float], *, speed: float = APPROACH_SPEED) -> Task:
+        """Move the tool straight by `way` (3,) m in the world, without turning."""
+        tool = self.tool(arm)
+        return self.straight(arm, RigidTransform.from_components(tool.translation + way, tool.rotation), speed=speed)
+
+    def pick(self, arm: str, world_from_connector: RigidTransform) -> Task:
+        """Open the jaw, bring it around the connector near its cable side; the jaw stays open."""
+
+        def steps() -> Iterator[None]:
+            model, near, q = self.model(arm), self.model(arm, clip=False), self.joints(arm)
+            candidates = grasp_candidates(world_from_connector, self.known.connector.length, GRIP_OFFSET)
+            ways = choose_grasp(model, q, candidates, margin=MARGIN, near=near, near_margin=NEAR_MARGIN)
+            self.grippers[arm].open(OPEN_GAP)
+            path = plan(model, q, np.array([way.path[0] for way in ways]), self._next_seed(), margin=MARGIN)
+            chosen = min(ways, key=lambda way: float(np.abs(way.path[0] - path[-1]).max()))
+            yield from self._follow(arm, path, 1.0)
+            yield from self._follow(arm, np.vstack([self.joints(arm), chosen.path[1:]]), APPROACH_SPEED)
+
+        return self._task(arm, steps())
+
+    def stop(self) -> None:
+        """Stop both arms."""
+        for arm in self.arms.values():
+            arm.stop()
+
+    def _follow(self, arm: str, path: FloatArray, speed: float) -> Iterator[None]:
+        trajectory = time_path(path, speed)
+        start = self._clock.now() + self.known.latencies.plan
+        while self._clock.now() < start - 1e-9:
+            yield
+        self.arms[arm].follow(trajectory)
+        while self.arms[arm].is_moving():
+            yield
+        end = self._clock.now() + SETTLE
+        while self._clock.now() < end - 1e-9:
+            yield
+        short = float(np.max(np.abs(self.joints(arm) - path[-1])))
+        if short > ARRIVED:
+            message = f"the {arm} arm stopped {short:.2f} rad short of its goal, more than {ARRIVED:.2f}"
+            raise PlanningError(CauseCode.MOTION_BLOCKED, message)
+
+    def _task(self, arm: str, steps: Iterator[None]) -> Task:
+        return Task(steps, self.arms[arm].stop)
+
+    def _next_seed(self) -> int:
+        self._seed += 1
+        return self._seed
+
+
+def _connector_spheres(held: RigidTransform, connector: Connector) -> FloatArray:
+    """Spheres (3, 4) that cover a carried connector, in the tool frame."""
+    along = (0.5 * connector.length - connector.radius) * np.array([-1.0, 0.0, 1.0])
+    centers = held.apply(np.column_stack([along, np.zeros(3), np.zeros(3)]))
+    return np.column_stack([centers, np.full(3, 1.2 * connector.radius)])
+
+
+def _socket_boxes(known: KnownCell) -> list[Box]:
+    """The socket blocks as boxes along the world's axes: a tilted one in the box that holds it."""
+    boxes = []
+    for socket in known.sockets:
+        axis = np.asarray(socket.axis) / np.linalg.norm(socket.axis)
+        across, along, high = socket.size
+        size = (across, along * abs(axis[1]) + high * abs(axis[2]), along * abs(axis[2]) + high * abs(axis[1]))
+        boxes.append(Box(name=socket.name, center=socket.center, size=size))
+    return boxes

@@ -1,0 +1,77 @@
+"""What the leaves ask about the scene: newest frames to estimates, the track, obstacles."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+import numpy as np
+from scipy.spatial.transform import RigidTransform
+
+from interfaces.cell import KnownCell
+from interfaces.devices import Camera, Clock
+from interfaces.frame import RgbdFrame
+from perception.depth_scale import panel_scale
+from perception.occupancy import Occupancy, Spheres
+from perception.rgbd_pose import Estimate, NoEstimate, estimate
+from perception.track import ConnectorTrack
+
+# Where obstacles may matter: the space that the arms share with the cable.
+REGION = (np.array([0.08, -0.44, 0.01]), np.array([0.50, 0.44, 0.62]))
+
+
+class Perception:
+    """Sees through the cell's cameras.
+
+    `pose_of` gives world_from_camera of a frame as the robot believes it; `arm_spheres` the robot's own bodies now.
+    """
+
+    def __init__(
+        self,
+        known: KnownCell,
+        cameras: Mapping[str, Camera],
+        clock: Clock,
+        pose_of: Callable[[RgbdFrame], RigidTransform],
+        arm_spheres: Callable[[], list[Spheres]],
+    ) -> None:
+        self._known, self._cameras, self._clock = known, cameras, clock
+        self._pose_of, self._arm_spheres = pose_of, arm_spheres
+        self._scale = dict.fromkeys(cameras, 1.0)
+        self._results: dict[str, tuple[int, Estimate | NoEstimate]] = {}
+        self.track = ConnectorTrack()
+        self.occupancy = Occupancy(*REGION, known.boxes, known.connector)
+
+    def frame(self, camera: str) -> RgbdFrame | None:
+        """The newest frame, its depth corrected by what `correct_depth` found; None before the first."""
+        frame = self._cameras[camera].latest()
+        if frame is None or self._scale[camera] == 1.0:
+            return frame
+        return replace(frame, depth=frame.depth * np.float32(self._scale[camera]))
+
+    def look(self, camera: str) -> Estimate | NoEstimate | None:
+        """What the newest frame shows of the connector; a new frame's result goes into the track. None before the first."""
+        newest = self._cameras[camera].latest()
+        if newest is None:
+            return None
+        if camera in self._results and self._results[camera][0] == newest.number:
+            return self._results[camera][1]
+        frame = self.frame(camera)
+        assert frame is not None
+        result = estimate(frame, self._pose_of(frame), self._known.connector)
+        self._results[camera] = (newest.number, result)
+        self.track.feed(result)
+        return result
+
+    def correct_depth(self, camera: str) -> float:
+        """Read the depth scale off the back panel in the newest frame; the factor in force from now on."""
+        frame = self._cameras[camera].latest()
+        panel = next(box for box in self._known.boxes if box.name == "back_panel")
+        found = None if frame is None else panel_scale(frame, self._pose_of(frame), panel)
+        if found is not None:
+            self._scale[camera] = found
+        return self._scale[camera]
+
+    def map_obstacles(self, camera: str) -> int:
+        """Take the newest frame into the occupancy; the number of occupied voxels."""
+        frame = self.frame(camera)
+        if frame is not None:
+            self.occupancy.integrate(frame, self._pose_of(frame), self._arm_spheres())
+        return len(self.occupancy.occupied_points())

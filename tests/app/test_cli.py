@@ -1,0 +1,201 @@
+import os
+import signal
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from toy_scenario import write_scenario
+from typer.testing import CliRunner
+
+from app.cli import app, parse_seeds
+from app.findings import Findings
+from app.output import free_folder
+from app.record import Expectation, Result, Slip
+from app.resources import shipped
+from interfaces.cause import Cause, CauseCode
+
+Episode = Callable[..., Result]
+
+
+def invoke(*args: str) -> Any:
+    return CliRunner().invoke(app, args)
+
+
+@pytest.fixture(autouse=True)
+def scenario(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    return write_scenario(tmp_path, monkeypatch)
+
+
+def result(**changes: Any) -> Result:
+    fields: dict[str, Any] = {
+        "scenario": "mine",
+        "seed": 7,
+        "outcome": "stowed",
+        "succeeded": True,
+        "expectations": (Expectation("slips", True, 1, 1), Expectation("unintended_force", True, 1.23456, 5.0)),
+        "slips": (Slip(12.0, 12.25, "gap"),),
+        "sim_seconds": 80.0,
+        "wall_seconds": 100.0,
+        "real_time_factor": 0.8,
+        "renderer": "moderngl",
+    }
+    return Result(**fields | changes)
+
+
+@pytest.fixture
+def calls(monkeypatch: pytest.MonkeyPatch) -> list[SimpleNamespace]:
+    """What `run_episode` was called with; it ticks five simulated seconds and succeeds."""
+    made: list[SimpleNamespace] = []
+
+    def episode(scenario: Any, out: Path, progress: Callable[[float, str], None], **rest: Any) -> Result:
+        made.append(SimpleNamespace(scenario=scenario, out=out, **rest))
+        for tick in range(100):
+            progress(tick / 20, "carry" if tick < 60 else "look")
+        return result()
+
+    use_episode(monkeypatch, episode)
+    return made
+
+
+def use_episode(monkeypatch: pytest.MonkeyPatch, episode: Episode) -> None:
+    module = SimpleNamespace(run_episode=episode)
+    monkeypatch.setitem(__import__("sys").modules, "app.episode", module)
+
+
+def test_run_ends_with_a_summary_on_stdout_and_progress_on_stderr(calls: list[SimpleNamespace]) -> None:
+    ran = invoke("run", "mine.yaml", "--seed", "7", "--video", "--set", "limits.tries=2")
+    assert ran.exit_code == 0
+    assert ran.stdout.splitlines() == [
+        "mine, seed 7: stowed, 2 of 2 expectations met",
+        "  ✓ slips: 1 (asked: 1)",
+        "  ✓ unintended_force: 1.23 (asked: 5)",
+        "  slip    lost at 12.00 s, noticed at 12.25 s by gap",
+        "  record  runs/mine-7-1",
+        "  time    80.0 s simulated in 100.0 s, real-time factor 0.80, renderer moderngl",
+    ]
+    assert ran.stderr.splitlines() == ["    0.0 s  carry", "    3.0 s  look"]
+    (call,) = calls
+    assert (call.out, call.seed, call.video, call.gui) == (Path("runs/mine-7-1"), 7, True, False)
+    assert call.scenario.file.limits.tries == 2
+
+
+def test_quiet_shows_the_summary_alone(calls: list[SimpleNamespace]) -> None:
+    assert invoke("run", "mine.yaml", "--quiet").stderr == ""
+
+
+def test_what_was_not_met_exits_1_with_the_cause(monkeypatch: pytest.MonkeyPatch) -> None:
+    cause = Cause(CauseCode.SEARCH_EXHAUSTED, "18 stops, nothing seen", "root/search")
+    unmet = result(
+        outcome="safe_stop", succeeded=False, cause=cause, expectations=(Expectation("slips", False, 0, 1),), slips=()
+    )
+    use_episode(monkeypatch, lambda *_, **__: unmet)
+    ran = invoke("run", "mine.yaml")
+    assert ran.exit_code == 1
+    assert "  cause   search_exhausted: 18 stops, nothing seen (root/search)" in ran.stdout
+    assert "  ✗ slips: 0 (asked: 1)" in ran.stdout
+
+
+def test_ctrl_c_reaches_the_episode_between_two_ticks(monkeypatch: pytest.MonkeyPatch) -> None:
+    ticks: list[str] = []
+
+    def episode(*_: Any, progress: Callable[[float, str], None], **__: Any) -> Result:
+        try:
+            for tick in range(9):
+                ticks.append(f"{tick} begins")
+                if tick == 3:
+                    os.kill(os.getpid(), signal.SIGINT)
+                ticks.append(f"{tick} ends")
+                progress(tick / 20, "carry")
+        except KeyboardInterrupt:
+            return result(outcome="interrupted", succeeded=False)
+        raise AssertionError("not interrupted")
+
+    use_episode(monkeypatch, episode)
+    before = signal.getsignal(signal.SIGINT)
+    ran = invoke("run", "mine.yaml")
+    assert (ran.exit_code, ticks[-1]) == (130, "3 ends")
+    assert "interrupted" in ran.stdout
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_bad_input_is_told_in_full_and_nothing_is_written(
+    calls: list[SimpleNamespace], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.setattr("sys.platform", "linux")
+    (tmp_path / "taken").mkdir()
+    (tmp_path / "taken" / "result.json").write_text("{}")
+    before = sorted(tmp_path.rglob("*"))
+    ran = invoke("run", "mine.yaml", "--set", "limits.tris=1", "--out", "taken", "--gui")
+    assert (ran.exit_code, ran.stdout, calls) == (2, "", [])
+    assert [line.split(" ")[0] for line in ran.stderr.splitlines()] == ["--gui:1:", "--set:1:", "taken:1:"]
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+@pytest.mark.parametrize(
+    ("out", "expected"),
+    [
+        ("mine.yaml", "mine.yaml:1: 'mine.yaml' is no folder"),
+        ("mine.yaml/run", "mine.yaml/run:1: 'mine.yaml' is no folder"),
+        ("/proc/nowhere/run", "/proc/nowhere/run:1: cannot write in '/proc'"),
+    ],
+)
+def test_an_output_folder_that_cannot_be_is_a_finding(calls: list[SimpleNamespace], out: str, expected: str) -> None:
+    ran = invoke("run", "mine.yaml", "--out", out)
+    assert (ran.exit_code, calls) == (2, [])
+    assert ran.stderr.startswith(expected)
+
+
+def test_each_run_gets_the_next_free_folder(tmp_path: Path) -> None:
+    assert free_folder("mine", 3) == Path("runs/mine-3-1")
+    (tmp_path / "runs" / "mine-3-1").mkdir(parents=True)
+    assert free_folder("mine", 3) == Path("runs/mine-3-2")
+
+
+def test_lists_name_what_is_shipped() -> None:
+    assert invoke("trees", "list").stdout.split() == list(shipped("tree"))
+    assert [line.split()[0] for line in invoke("scenarios", "list").stdout.splitlines()] == list(shipped("scenario"))
+
+
+def test_trees_show_draws_a_file_and_tells_its_findings(tmp_path: Path) -> None:
+    shown = invoke("trees", "show", "tree.xml")
+    assert (shown.exit_code, "settle" in shown.stdout) == (0, True)
+    (tmp_path / "tree.xml").write_text("<root")
+    broken = invoke("trees", "show", "tree.xml")
+    assert broken.exit_code == 2
+    assert broken.stderr.startswith("tree.xml:1: ")
+
+
+def test_study_demo_hands_on_seeds_jobs_and_overrides(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[Any] = []
+
+    def run_demo(*args: Any) -> int:
+        asked.extend(args)
+        return 130
+
+    monkeypatch.setattr("app.study.run_demo", run_demo)
+    ran = invoke("study", "demo", "--seeds", "2:5", "--jobs", "3", "--out", "study", "--set", "limits.tries=1")
+    assert ran.exit_code == 130
+    assert asked == [range(2, 5), 3, Path("study"), ["limits.tries=1"]]
+
+
+@pytest.mark.parametrize("text", ["5", "5:", ":5", "5:5", "6:5", "a:b", "-1:3", "1:2:3", ""])
+def test_a_wrong_range_of_seeds_is_a_finding(text: str) -> None:
+    with pytest.raises(Findings, match="write A:B with A below B, such as 0:20"):
+        parse_seeds(text)
+
+
+@pytest.mark.parametrize(
+    "command", [[], ["run"], ["trees", "show"], ["scenarios", "list"], ["doctor"], ["study", "demo"]]
+)
+def test_help_is_plain_and_shows_how(command: list[str]) -> None:
+    ran = invoke(*command, "--help")
+    assert ran.exit_code == 0
+    assert "\x1b" not in ran.stdout
+    assert "regrasp" in ran.stdout or command in (["scenarios", "list"], ["doctor"])
+
+
+def test_version() -> None:
+    assert invoke("--version").stdout.startswith("regrasp ")

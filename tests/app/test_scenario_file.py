@@ -1,0 +1,248 @@
+import json
+from pathlib import Path
+
+import pytest
+import yaml
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from toy_scenario import write_scenario
+
+from app.findings import Finding, Findings
+from app.resources import shipped
+from app.scenario_file import load_cell, load_scenario
+from interfaces.cause import CauseCode
+
+METRES = "expected a number in metres, such as 0.3"
+SECOND = "  - {name: short, size: [1, 1, 1], position: {zero: [-2, 0, 0], earth: [-2, 0, 0]}}\n"
+
+
+@pytest.fixture
+def scenario(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    return write_scenario(tmp_path, monkeypatch)
+
+
+def findings(*overrides: str, name: str = "mine.yaml") -> list[str]:
+    with pytest.raises(Findings) as raised:
+        load_scenario(name, overrides)
+    return str(raised.value).splitlines()
+
+
+def findings_if_any(*overrides: str) -> list[Finding]:
+    """None for a scenario that loads; any other exception goes through."""
+    try:
+        load_scenario("mine.yaml", overrides)
+    except Findings as error:
+        return error.items
+    return []
+
+
+def changed(scenario: Path, old: str, new: str) -> None:
+    text = scenario.read_text()
+    assert old in text
+    scenario.write_text(text.replace(old, new))
+
+
+def test_a_scenario_brings_its_cell_and_tree(scenario: Path) -> None:
+    loaded = load_scenario("mine.yaml")
+    assert (loaded.name, loaded.tree) == ("mine", Path("tree.xml"))
+    assert loaded.file.obstacles[0].position.zero == (0.30, 0.14, 0.16)
+    assert loaded.file.faults[0].carried == (0.3, 0.8)
+    assert loaded.cell.known.plugged_into == "back_4"
+
+
+def test_what_is_left_out_has_its_default(scenario: Path) -> None:
+    scenario.write_text("description: bare\ncell: thesis\ntree: tree.xml\ngravity: earth\n")
+    file = load_scenario("mine.yaml").file
+    assert (file.obstacles, file.faults, file.expect.outcome, file.expect.slips) == ((), (), "stowed", None)
+    assert (file.limits.sim_seconds, file.limits.tries) == (600.0, 4)
+
+
+def test_overrides_change_scenario_and_cell(scenario: Path) -> None:
+    before = scenario.read_text()
+    loaded = load_scenario(
+        "mine.yaml",
+        [
+            "gravity=earth",
+            "obstacles.0.size=[0.1, 0.1, 0.1]",
+            "limits.tries=2",
+            "expect={outcome: safe_stop, cause: search_exhausted}",
+            "cell.hidden.errors.arm_tool=0",
+            "cell.known.sockets.0.depth=0.02",
+        ],
+    )
+    assert loaded.file.gravity == "earth"
+    assert loaded.file.obstacles[0].size == (0.1, 0.1, 0.1)
+    assert loaded.file.limits.tries == 2
+    assert loaded.file.expect.cause is CauseCode.SEARCH_EXHAUSTED
+    assert loaded.cell.hidden.errors.arm_tool == 0
+    # Socket 0 is the anchor that the others are aliases of: an override holds for the one item that it names.
+    assert [s.depth for s in loaded.cell.known.sockets] == [0.02, 0.015, 0.015, 0.015, 0.015]
+    assert scenario.read_text() == before
+
+
+def test_an_override_makes_the_mappings_on_its_way(scenario: Path) -> None:
+    scenario.write_text("description: bare\ncell: thesis\ntree: tree.xml\ngravity: earth\n")
+    assert load_scenario("mine.yaml", ["limits.tries=2"]).file.limits.tries == 2
+
+
+@pytest.mark.parametrize("name", shipped("cell"))
+def test_shipped_cells_are_right(name: str) -> None:
+    assert load_cell(shipped("cell")[name]).known.arms
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        ("gravity: zero", "grvity: zero", "mine.yaml:4: unknown key 'grvity'; did you mean 'gravity'?"),
+        ("gravity: zero", "", "mine.yaml:1: key 'gravity' is missing; expected one of zero, earth"),
+        ("gravity: zero", "gravity: eart", "mine.yaml:4: gravity: no 'eart'; did you mean 'earth'?"),
+        ("gravity: zero", "gravity: 0", "mine.yaml:4: gravity is 0; expected one of zero, earth"),
+        ("0.12, 0.18", "30 cm, 0.18", "mine.yaml:7: obstacles.0.size.1 is '30 cm'; " + METRES),
+        ("0.12, 0.18", "true, 0.18", "mine.yaml:7: obstacles.0.size.1 is True; expected a number in metres"),
+        ("0.12, 0.18", "'0.12', 0.18", "mine.yaml:7: obstacles.0.size.1 is '0.12'; expected a number in metres"),
+        ("0.12, 0.18", "0, 0.18", "mine.yaml:7: obstacles.0.size.1 is 0; " + METRES + " (above 0, at most 3)"),
+        ("0.12, 0.18]", "0.12]", "mine.yaml:7: obstacles.0.size is [0.08, 0.12]; expected 3 values, each"),
+        ("0.12, 0.18]", "0.12, 0.18, 1]", "mine.yaml:7: obstacles.0.size is [0.08, 0.12, 0.18, 1]; expected 3 values"),
+        ("tries: 4", "tries: 1.5", "mine.yaml:14: limits.tries is 1.5; expected a whole number (at least 1"),
+        ("tries: 4", "tries:", "mine.yaml:14: limits.tries is empty; expected a whole number"),
+        ("hidden: true", "hidden: yep", "mine.yaml:18: expect.hidden is 'yep'; expected true or false"),
+        ("slips: 1", "cause: slipped", "mine.yaml:15: expect: a run that ends stowed has no cause; write"),
+        ("[0.3, 0.8]", "[0.8, 0.3]", "mine.yaml:13: faults.0: carried runs backwards; put the smaller share first"),
+        ("jaw_opens", "jaw_open", "mine.yaml:13: faults.0.type: no 'jaw_open'; did you mean 'jaw_opens'?"),
+        ("cell: thesis", "cell: thesi", "mine.yaml:2: no cell named 'thesi'; did you mean 'thesis'?"),
+        ("cell: thesis", "cell: gone.yaml", "mine.yaml:2: 'gone.yaml' does not exist; name a file"),
+        ("cell: thesis", "cell: 3", "mine.yaml:2: cell is 3; expected text"),
+        ("tree.xml", "gone.xml", "mine.yaml:3: 'gone.xml' does not exist; name a file"),
+        ("tree.xml", "nowhere", "mine.yaml:3: no tree named 'nowhere'"),
+        ("0.30, 0.14, 0.16", "0.48, 0.00, 0.00", "mine.yaml:9: obstacle 'short' reaches 0.022 m into back_panel"),
+        ("0.30, 0.14, 0.16", "0.30, 0.14, -0.05", "mine.yaml:9: obstacle 'short' reaches 0.050 m below the floor"),
+        ("0.30, 0.14, 0.16", "0.45, 0.15, 0.35", "mine.yaml:9: obstacle 'short' reaches 0.032 m into socket back_4"),
+        ("0.30, 0.12, 0.0]", "0.0, 0.2, 0.0]", "mine.yaml:9: obstacle 'short' reaches 0.079 m into the left arm"),
+        ("0.01, 0.0]", "0.01, 0.2]", "mine.yaml:9: obstacle 'short' reaches 0.040 m below the floor"),
+        ("faults:", SECOND + "faults:", "mine.yaml:12: two obstacles 'short'"),
+    ],
+)  # fmt: skip
+def test_a_mistake_is_a_finding_at_its_line(scenario: Path, old: str, new: str, expected: str) -> None:
+    changed(scenario, old, new)
+    assert [line for line in findings() if line.startswith(expected)]
+
+
+@pytest.mark.parametrize(
+    ("content", "expected"),
+    [
+        (b"", "mine.yaml:1: the file is empty; expected a mapping of description, cell"),
+        (b"- a", "mine.yaml:1: the file is ['a']; expected a mapping of description, cell"),
+        (b"a: \xff", "mine.yaml:1: byte 0xff is not UTF-8"),
+        (b"a: 1\n\x89PNG\r\n\x1a\n\x00", "mine.yaml:2: byte 0x89 is not UTF-8"),
+        (b"\x00\x01\x02", "mine.yaml:1: not YAML: '\\x00' is not text"),
+        (b"a: [", "mine.yaml:1: not YAML"),
+        (b"#" * 300_000, "mine.yaml:1: longer than 262144 bytes"),
+    ],
+)
+def test_what_is_no_scenario_is_a_finding(scenario: Path, content: bytes, expected: str) -> None:
+    scenario.write_bytes(content)
+    assert findings()[0].startswith(expected)
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("gone.yaml", "gone.yaml:1: 'gone.yaml' does not exist"),
+        ("folder.yaml", "folder.yaml:1: 'folder.yaml' is a folder"),
+        ("folder", "folder:1: 'folder' is a folder"),
+        ("nowhere", "nowhere:1: no scenario named 'nowhere'"),
+        ("", ":1: no scenario named ''"),
+        ("nul\0.yaml", "nul\\x00.yaml:1: "),
+        ("x" * 5000 + ".yaml", "x" * 5000 + ".yaml:1: "),
+    ],
+)
+def test_a_name_without_a_file_is_a_finding(scenario: Path, name: str, expected: str) -> None:
+    for folder in ("folder", "folder.yaml"):
+        (scenario.parent / folder).mkdir()
+    assert findings(name=name)[0].startswith(expected)
+
+
+@pytest.mark.parametrize(
+    ("override", "expected"),
+    [
+        ("limits.tris=3", "--set:1: unknown key 'tris'; did you mean 'tries'?"),
+        ("limits.tries=many", "--set:1: limits.tries is 'many'; expected a whole number"),
+        ("limits.tries", "--set:1: 'limits.tries': expected key.path=value"),
+        ("limits..tries=1", "--set:1: 'limits..tries=1': expected key.path=value"),
+        ("=1", "--set:1: '=1': expected key.path=value"),
+        ("obstacles.1.name=x", "--set:1: 'obstacles.1.name=x': obstacles has 1 items, numbered from 0"),
+        ("obstacles.x=1", "--set:1: 'obstacles.x=1': obstacles has 1 items"),
+        ("gravity.x=1", "--set:1: 'gravity.x=1': gravity is a single value"),
+        ("gravity=[", "--set:1: not YAML"),
+        ("cell.hidden.errors.arm_tol=0", "--set:1: unknown key 'arm_tol'; did you mean 'arm_tool'?"),
+        ("cell.known.plugged_into=back_9", "--set:1: no socket 'back_9'; did you mean 'back_"),
+        ("cell.known.arms.1.name=left", "cells/thesis.yaml:31: arms are left, left; give one each of left, right"),
+        ("cell.known.cameras.0.mount.position.0=x", "--set:1: known.cameras.0.mount.position.0 is 'x'; expected a"),
+        ("cell.known.cameras.0.mount={arm: middle, offset: [0, 0, 0]}", "--set:1: known.cameras.0.mount.arm: no"),
+    ],
+)  # fmt: skip
+def test_a_wrong_override_is_a_finding(scenario: Path, override: str, expected: str) -> None:
+    assert len(findings(override)) == 1
+    assert expected in findings(override)[0]
+
+
+def test_findings_of_all_files_come_at_once(scenario: Path) -> None:
+    changed(scenario, "slips: 1", "slips: -1")
+    (scenario.parent / "tree.xml").write_text((scenario.parent / "tree.xml").read_text().replace("Wait", "Wiat"))
+    lines = findings("limits.tries=x", "cell.hidden.step_rate=100", "nonsense")
+    assert [line.split(" ")[0] for line in lines] == [
+        "--set:1:",
+        "--set:2:",
+        "--set:3:",
+        "mine.yaml:17:",
+        "tree.xml:2:",
+    ]
+
+
+def test_a_cell_beside_the_scenario_is_found_from_elsewhere(scenario: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (scenario.parent / "my_cell.yaml").write_text(shipped("cell")["thesis"].read_text())
+    changed(scenario, "cell: thesis", "cell: my_cell.yaml")
+    monkeypatch.chdir(scenario.parent.parent)
+    assert load_scenario(str(scenario)).tree == scenario.parent / "tree.xml"
+
+
+_TOKENS = st.sampled_from(
+    ["", "\n", " ", "  ", ":", "- ", "[", "]", "{", "}", "&a ", "*a", "<<: *a", "!!str ", "'", '"', "#", "1e3", ".nan",
+     "-1", "99999", "null", "true", "\t", "\x00", "\\U99999999", "---\n", "%", "|", ">", "?", "ä", "0x1f"]
+)  # fmt: skip
+
+
+@settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    edits=st.lists(
+        st.tuples(st.floats(0, 1), st.integers(0, 12), _TOKENS | st.text(max_size=5)), min_size=1, max_size=4
+    )
+)
+def test_a_damaged_file_gives_findings_or_loads(scenario: Path, edits: list[tuple[float, int, str]]) -> None:
+    original = scenario.read_text(encoding="utf-8")
+    text = original
+    for share, cut, token in edits:
+        at = int(share * len(text))
+        text = text[:at] + token + text[at + cut :]
+    scenario.write_bytes(text.encode("utf-8", "surrogatepass"))
+    found = findings_if_any()
+    scenario.write_text(original, encoding="utf-8")
+    assert all(f.line >= 1 and str(f).isprintable() for f in found)
+
+
+_values = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5),
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=5), inner, max_size=3),
+    max_leaves=6,
+)
+
+
+_PATHS = """gravity obstacles obstacles.0 obstacles.0.size obstacles.0.position.zero.2 faults.0 expect expect.cause cell
+tree cell.known cell.known.clip cell.known.cameras.0.mount cell.known.sockets.0.axis cell.known.boxes.0"""
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(path=st.sampled_from(_PATHS.split()), value=_values)
+def test_any_value_anywhere_gives_findings_or_loads(scenario: Path, path: str, value: object) -> None:
+    for text in (json.dumps(value), yaml.safe_dump(value)):
+        assert all(f.line >= 1 and str(f).isprintable() for f in findings_if_any(f"{path}={text}"))
