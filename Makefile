@@ -6,7 +6,7 @@ STAMP := .venv/.installed
 .PHONY: setup run test lint bench
 .DEFAULT_GOAL := run
 
-setup: $(STAMP)
+setup: $(STAMP) ; @:
 
 $(STAMP): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \

@@ -73,6 +73,14 @@ class Socket(Model):
         return pose_along((float(centre[0]), float(centre[1]), float(centre[2])), self.axis)
 
 
+    def upright_box(self) -> Box:
+        """The smallest box along the world's axes that holds the block, which is turned so that its y edge is the axis."""
+        axis = np.abs(self.axis) / np.linalg.norm(self.axis)
+        across, along, high = self.size
+        size = (across, along * axis[1] + high * axis[2], along * axis[2] + high * axis[1])
+        return Box(name=self.name, center=self.center, size=size, color=self.color)
+
+
 class Clip(Model):
     """A snap-in clip that takes the connector's tip half: seat pose of the connector in it, and what it does."""
 
@@ -171,6 +179,10 @@ class KnownCell(Model):
     arms: tuple[ArmSpec, ...]
     cameras: tuple[CameraSpec, ...]
     latencies: Latencies
+
+    def solids(self) -> list[Box]:
+        """All that stands fast and is known: floor, panels, clip bracket, and the sockets' blocks in upright boxes."""
+        return [*self.boxes, *self.clip.bracket, *(socket.upright_box() for socket in self.sockets)]
 
     def socket(self, name: str) -> Socket:
         """The socket of that name; KeyError lists those that exist."""

@@ -10,7 +10,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from interfaces.cause import CauseCode
 from motion.collision import CollisionModel
 from motion.failure import PlanningError
-from motion.kinematics import FloatArray
+from motion.kinematics import ArmKinematics, FloatArray
 from motion.straight import straight_line
 
 # The palm 40 degrees off the cross direction, on the cable's side, leaves three quarters of the connector in sight.
@@ -18,7 +18,10 @@ PREFERRED_YAW = float(np.deg2rad(40.0))
 YAWS = tuple(np.deg2rad([40.0, 25.0, 10.0, 50.0, -10.0, -25.0, -40.0]).tolist())
 ROLLS = tuple(np.deg2rad([0, 30, -30, 60, -60, 90, -90, 120, -120, 150, -150, 180]).tolist())
 _MOST_YAW = np.deg2rad(50.0)  # beyond, the jaws close along rather than across the connector
+GRIP_OFFSET = -0.02  # metres from the connector's centre: on the cable's side, the tip stays in sight
+JAW_OPENING = 0.075  # metres between the pads, 6 mm each, of fully open fingers
 _ROLL_COST = 0.3  # of a rad of roll, in rad of yaw
+_FAR = "out of reach"
 _FLIP_COST = 0.01  # orders the two equal halves of a gripper
 
 
@@ -31,32 +34,40 @@ class Grasp:
 
 
 @dataclass(frozen=True, eq=False)
-class Approach:
-    """A grasp and the joint path (k, 6) rad to it: from the standoff, the tool in a straight line."""
+class GraspChoice:
+    """A grasp and joint paths (k, 6) rad to it, one a branch, nearest first: tool in a straight line from the standoff."""
 
     grasp: Grasp
-    path: FloatArray
+    paths: tuple[FloatArray, ...]
+
+    @property
+    def standoffs(self) -> FloatArray:
+        """Where the paths begin, (n, 6) rad: goals for a planner."""
+        return np.array([path[0] for path in self.paths])
 
 
 def grasp_candidates(
     world_from_connector: RigidTransform,
-    connector_length: float,
-    grip_offset: float,
+    length: float,
+    radius: float,
+    grip_offset: float = GRIP_OFFSET,
     yaws: Sequence[float] = YAWS,
     rolls: Sequence[float] = ROLLS,
     shallow: float = 0.0,
 ) -> list[Grasp]:
-    """Grasps of the connector (its frame at its centre, x from cable to tip), cheapest first.
+    """Grasps of a connector of `length` and `radius` metres (frame at its centre, x from cable to tip), cheapest first.
 
     The fingers close across the axis, `grip_offset` metres along it from the centre (negative: towards the cable).
     `yaws` rad tilt the approach from square to the axis, positive with the palm on the cable's side. `rolls` rad turn
     it about the axis; 0 comes from the arms (along world x as far as the axis lets it). `shallow` metres is by how much
     the connector lies nearer to the finger tips than the tool's centre.
 
-    Raises ValueError if the grip lies off the connector or a yaw exceeds 50 degrees.
+    Raises ValueError if the grip lies off the connector, the connector does not fit the jaws, or a yaw exceeds 50 degrees.
     """
-    if abs(grip_offset) > 0.5 * connector_length:
-        raise ValueError(f"grip {grip_offset:.3f} m from the centre is off a connector of {connector_length:.3f} m")
+    if abs(grip_offset) > 0.5 * length:
+        raise ValueError(f"grip {grip_offset:.3f} m from the centre is off a connector of {length:.3f} m")
+    if 2 * radius > JAW_OPENING:
+        raise ValueError(f"a connector {2 * radius:.3f} m thick does not fit jaws that open {JAW_OPENING:.3f} m")
     if max(abs(yaw) for yaw in yaws) > _MOST_YAW + 1e-9:
         raise ValueError(
             f"yaws go to {np.rad2deg(_MOST_YAW):.0f} degrees, asked for {np.rad2deg(yaws).round(1).tolist()}"
@@ -78,6 +89,7 @@ def grasp_candidates(
 
 
 def choose_grasp(
+    kin: ArmKinematics,
     model: CollisionModel,
     q_now: FloatArray,
     candidates: Sequence[Grasp],
@@ -85,38 +97,37 @@ def choose_grasp(
     margin: float = 0.01,
     near: CollisionModel | None = None,
     near_margin: float = 0.002,
-    count: int = 4,
-) -> list[Approach]:
-    """Up to `count` approaches, of the cheapest candidates that work; plan to any first row, then follow that path.
+) -> GraspChoice:
+    """The cheapest candidate that works: plan to one of its standoffs, then follow the path that begins there.
 
     At the standoff, `standoff` metres back along the tool, `model` must be free by `margin` metres; on the straight way
-    in, `near` (without the target's own surface; default: `model`) by `near_margin`. `q_now` (6,) rad orders branches
-    of one candidate. Raises PlanningError with a tally of what was wrong with the candidates.
+    in, `near` (without the target's own surface; default: `model`) by `near_margin`. `q_now` (6,) rad orders the branches.
+    Raises PlanningError with a tally of what was wrong with the candidates.
     """
-    approaches: list[Approach] = []
     troubles: Counter[str] = Counter()
     for grasp in candidates:
-        paths, trouble = _ways_in(model, near or model, grasp, standoff, margin, near_margin)
-        paths.sort(key=lambda path: float(np.abs(path[0] - q_now).max()))
-        approaches += [Approach(grasp, path) for path in paths]
-        if len(approaches) >= count:
-            return approaches[:count]
-        troubles[trouble] += not paths
-    if approaches:
-        return approaches
-    reachable = len(candidates) - troubles["out of reach"]
-    code = CauseCode.NO_COLLISION_FREE_GOAL if reachable else CauseCode.OUT_OF_REACH
+        paths, trouble = _ways_in(kin, model, near or model, grasp, standoff, margin, near_margin)
+        if paths:
+            paths.sort(key=lambda path: float(np.abs(path[0] - q_now).max()))
+            return GraspChoice(grasp, tuple(paths))
+        troubles[trouble] += 1
+    code = CauseCode.OUT_OF_REACH if set(troubles) <= {_FAR} else CauseCode.NO_COLLISION_FREE_GOAL
     tally = ", ".join(f"{n} {trouble}" for trouble, n in troubles.most_common())
     raise PlanningError(code, f"{len(candidates)} grasp candidates: {tally}")
 
 
 def _ways_in(
-    model: CollisionModel, near: CollisionModel, grasp: Grasp, standoff: float, margin: float, near_margin: float
+    kin: ArmKinematics,
+    model: CollisionModel,
+    near: CollisionModel,
+    grasp: Grasp,
+    standoff: float,
+    margin: float,
+    near_margin: float,
 ) -> tuple[list[FloatArray], str]:
     """Joint paths from standoff to grasp, one for each branch that works, and what was wrong with the last other."""
-    kin = model.kinematics
     back = grasp.world_from_tool * RigidTransform.from_translation([-standoff, 0.0, 0.0])
-    paths, trouble = [], "out of reach"
+    paths, trouble = [], _FAR
     for q in kin.ik(grasp.world_from_tool):
         if not near.free(q, near_margin):
             trouble = f"in collision with {near.nearest(q)[1]}"

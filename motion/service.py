@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
 from interfaces.cause import CauseCode
-from interfaces.cell import Box, Connector, KnownCell, WristMount
+from interfaces.cell import Connector, KnownCell, WristMount
 from interfaces.devices import Arm, Clock, Gripper
 from interfaces.frame import RgbdFrame
 from motion.collision import CollisionModel
@@ -64,7 +64,7 @@ class Motion:
         self.known, self.arms, self.grippers, self._clock = known, arms, grippers, clock
         self.kinematics = {spec.name: ArmKinematics(RigidTransform.from_translation(spec.base)) for spec in known.arms}
         self._cameras = {c.mount.arm: c.mount for c in known.cameras if isinstance(c.mount, WristMount)}
-        self._boxes = [*known.boxes, *_socket_boxes(known), *known.clip.bracket]
+        self._boxes = known.solids()
         self._grid: DistanceGrid | None = None
         self._seed = seed
 
@@ -191,13 +191,3 @@ def _connector_spheres(held: RigidTransform, connector: Connector) -> FloatArray
     centers = held.apply(np.column_stack([along, np.zeros(3), np.zeros(3)]))
     return np.column_stack([centers, np.full(3, 1.2 * connector.radius)])
 
-
-def _socket_boxes(known: KnownCell) -> list[Box]:
-    """The socket blocks as boxes along the world's axes: a tilted one in the box that holds it."""
-    boxes = []
-    for socket in known.sockets:
-        axis = np.asarray(socket.axis) / np.linalg.norm(socket.axis)
-        across, along, high = socket.size
-        size = (across, along * abs(axis[1]) + high * abs(axis[2]), along * abs(axis[2]) + high * abs(axis[1]))
-        boxes.append(Box(name=socket.name, center=socket.center, size=size))
-    return boxes

@@ -15,7 +15,7 @@ FloatArray = NDArray[np.float64]
 
 MIN_POINTS = 20  # choice: n-mean and min/max need distinct points
 MIDDLE_SHARE = 0.2  # choice: n for the position is a fifth of the points: averages noise and stays in the middle
-FIT_STEPS, FIT_POINTS = 4, 400  # choice: eight steps and all points changed the errors by less than a tenth
+FIT_STEPS, FIT_POINTS = 4, 400  # choice: eight steps changed the errors by less than a tenth; 400 points are quick
 FIT_FADE = 0.004  # m; choice: the depth noise at 0.75 m is 3 mm
 FIT_COSINE = 0.9  # choice: a fit that turns the principal axis by more than 25 degrees went astray
 WHOLE_SHARE = 0.9  # choice: a visible part of nine tenths of the length has its centre within 5 mm
@@ -135,7 +135,7 @@ def refine_axis_and_center(points: FloatArray, radius: float) -> tuple[FloatArra
     Gauss-Newton steps on the distance from the axis less the radius. Optical frame.
 
     Measured at 0.75 m, mean axis error (free, 30 %, 50 % hidden): min/max 7.5, 11, 17 degrees; principal axis 1.9, 4.1,
-    7.7; after the fit 1.0, 2.3, 3.7.
+    7.7; after the fit 1.0, 2.3, 3.7 (150 to 200 draws each, subpixel noise 0.2).
     """
     axis, mean = pca_axis(points), points.mean(axis=0)
     away = mean - (mean @ axis) * axis

@@ -37,7 +37,7 @@ class Perception:
         self._scale = dict.fromkeys(cameras, 1.0)
         self._results: dict[str, tuple[int, Estimate | NoEstimate]] = {}
         self.track = ConnectorTrack()
-        self.occupancy = Occupancy(*REGION, known.boxes, known.connector)
+        self.occupancy = Occupancy(*REGION, known.solids(), known.connector)
 
     def frame(self, camera: str) -> RgbdFrame | None:
         """The newest frame, its depth corrected by what `correct_depth` found; None before the first."""

@@ -86,7 +86,7 @@ class SimCamera:
         return frame, image.ids
 
 
-def camera_error(_spec: CameraSpec, errors: Errors, rng: np.random.Generator) -> RigidTransform:
+def camera_error(errors: Errors, rng: np.random.Generator) -> RigidTransform:
     """A draw of nominal_from_true: where a camera's optical frame really is, seen from where it is believed to be."""
     axis = rng.standard_normal(3)
     angle = np.deg2rad(errors.camera_angle_deg) * rng.standard_normal()

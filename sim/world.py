@@ -4,10 +4,11 @@ Time moves only in `advance`. Every physics step runs the same schedule: servos,
 contacts; camera exposures and finger samples fall on fixed steps, so nothing depends on who looks or how often.
 """
 
-from typing import Literal
+from collections.abc import Callable
 
 import numpy as np
 import pybullet as p
+from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation, Slerp
 
 from interfaces.cell import Box, Cell, Socket, WristMount
@@ -18,10 +19,10 @@ from sim.camera import SimCamera, camera_error
 from sim.depth_noise import DepthNoise
 from sim.faults import JawOpensFault
 from sim.fixtures import ClipHold, Hold, SocketHold
-from sim.renderer import LightState, make_renderer
+from sim.renderer import LightState, RendererName, make_renderer
 from sim.visuals import Visuals
 
-RendererChoice = Literal["auto", "moderngl", "tiny"]
+FloatArray = NDArray[np.float64]
 LAY_SECONDS, SETTLE_SECONDS = 1.5, 2.5  # the cable is drawn from straight into its socket, then comes to rest
 CONTACT_EVERY = 4  # physics steps between looks at the arms' contacts
 
@@ -36,7 +37,7 @@ class World:
         seed: int,
         obstacles: tuple[Obstacle, ...] = (),
         faults: tuple[JawOpens, ...] = (),
-        renderer: RendererChoice = "auto",
+        renderer: RendererName = "auto",
         gui: bool = False,
     ) -> None:
         self.cell, self.gravity = cell, gravity
@@ -101,17 +102,22 @@ class World:
         self.renderer.close()
         p.disconnect(self.client)
 
-    def held(self, arm: str) -> bool:
-        """Whether both pads of an arm touch the connector now (ground truth)."""
-        body, link = self.cable.body, self.cable.connector_link
-        return all(
-            p.getContactPoints(self.arms[arm].body, body, pad, link, physicsClientId=self.client)
-            for pad in self.arms[arm].gripper.pads
+    def pads_touching(self, arm: str) -> tuple[bool, bool]:
+        """Whether the left and the right pad of an arm touch the connector now."""
+        body, link, client = self.cable.body, self.cable.connector_link, self.client
+        hand = self.arms[arm]
+        left, right = (
+            bool(p.getContactPoints(hand.body, body, pad, link, physicsClientId=client)) for pad in hand.gripper.pads
         )
+        return left, right
 
     def connector_pose(self) -> RigidTransform:
         """True world_from_connector after the last step."""
         return self._connector
+
+    def connector_velocity(self) -> FloatArray:
+        """True velocity (3,) m/s of the connector's centre."""
+        return self._velocity
 
     def _step(self) -> None:
         for arm in self.arms.values():
@@ -127,7 +133,7 @@ class World:
             if not self.socket.holds:
                 for fault in self.faults:
                     if fault.fired_at is None:
-                        fault.step(self.now(), self._connector.translation, self.held("right"))
+                        fault.step(self.now(), self._connector.translation, all(self.pads_touching("right")))
         self._expose()
 
     def _expose(self) -> None:
@@ -242,7 +248,7 @@ class World:
         known, errors = self.cell.known, self.cell.hidden.errors
         cameras = {}
         for spec in known.cameras:
-            error = camera_error(spec, errors, rng)
+            error = camera_error(errors, rng)
             mount = spec.mount
             if isinstance(mount, WristMount):
                 arm = self.arms[mount.arm]
@@ -264,13 +270,13 @@ class World:
         return cameras
 
 
-def _wrist_camera_pose(arm: SimArm, mount: WristMount, error: RigidTransform):  # type: ignore[no-untyped-def]
+def _wrist_camera_pose(arm: SimArm, mount: WristMount, error: RigidTransform) -> Callable[[], RigidTransform]:
     return lambda: arm.wrist_pose() * mount.wrist_from_camera * error
 
 
-def _encoder(arm: SimArm):  # type: ignore[no-untyped-def]
+def _encoder(arm: SimArm) -> Callable[[], FloatArray]:
     return lambda: arm.reading().positions
 
 
-def _constant(pose: RigidTransform):  # type: ignore[no-untyped-def]
+def _constant(pose: RigidTransform) -> Callable[[], RigidTransform]:
     return lambda: pose

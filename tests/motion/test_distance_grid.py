@@ -15,7 +15,9 @@ def look_up(grid: DistanceGrid, p: np.ndarray) -> float:
 
 
 @given(st.lists(point, min_size=1, max_size=20), point)
-def test_never_farther_than_the_nearest_occupied_voxel(points: list[tuple[float, ...]], query: tuple[float, ...]) -> None:
+def test_never_farther_than_the_nearest_occupied_voxel(
+    points: list[tuple[float, ...]], query: tuple[float, ...]
+) -> None:
     grid = DistanceGrid.from_points(np.array(points), LOWER, UPPER, H)
     centres = LOWER + (np.floor((np.array(points) - LOWER) / H) + 0.5) * H
     truth = np.linalg.norm(centres - np.array(query), axis=1).min()

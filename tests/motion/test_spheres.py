@@ -4,12 +4,24 @@ import numpy as np
 import pytest
 import rtbdata
 import trimesh
+from scipy.spatial.transform import Rotation
 
 from motion.spheres import LINKS, SPHERES
 
 MESHES = Path(rtbdata.__file__).parent / "xacro/trossen_descriptions/meshes/meshes_vx300s"
-# Mesh, link, its origin and turn about z in the link's frame: values of rtb-data's URDF.
-PARTS = [("vxsa_300_3_upper_arm", 2), ("vxsa_300_4_upper_forearm", 3)]
+
+# Mesh, link, and the mesh's pose in the link's frame as in rtb-data's URDF; the finger stands 0.057 m out.
+UPRIGHT = Rotation.from_euler("z", 90, degrees=True)
+FLIPPED = Rotation.from_euler("x", 180, degrees=True)
+PARTS = [
+    ("3-UA", 2, UPRIGHT, [0.0, 0.0, 0.0]),
+    ("4-UF", 3, FLIPPED, [0.0, 0.0, 0.0]),
+    ("5-LF", 4, FLIPPED, [0.0, 0.0, 0.0]),
+    ("6-Wrist", 5, UPRIGHT, [0.0, 0.0, 0.0]),
+    ("7-Gripper", 6, UPRIGHT, [-0.02, 0.0, 0.0]),
+    ("9-Gripper-Bar", 6, UPRIGHT, [-0.02017, 0.0, 0.0]),
+    ("10-Finger", 6, Rotation.from_euler("xyz", [-90, 0, -90], degrees=True), [0.0283, -0.0005, 0.0]),
+]
 
 
 def test_spheres_are_small_at_the_finger_tips() -> None:
@@ -24,10 +36,11 @@ def test_left_and_right_finger_mirror_each_other() -> None:
     assert sorted(map(tuple, tips)) == pytest.approx(sorted(map(tuple, mirrored)))
 
 
-@pytest.mark.parametrize(("name", "link"), PARTS)
-def test_spheres_cover_the_mesh(name: str, link: int) -> None:
-    found = sorted(MESHES.glob(f"*{name.rsplit('_', 2)[-2]}_{name.rsplit('_', 1)[-1]}*"))
-    assert found, sorted(p.name for p in MESHES.iterdir())
-    mesh = trimesh.load_mesh(found[0])
-    points = np.asarray(mesh.vertices) * 1e-3
-    assert len(points)
+@pytest.mark.parametrize(("name", "link", "turn", "origin"), PARTS)
+def test_spheres_cover_the_mesh(name: str, link: int, turn: Rotation, origin: list[float]) -> None:
+    mesh = trimesh.load_mesh(MESHES / f"VXSA-300-M-{name}.stl")
+    points, _ = trimesh.sample.sample_surface(mesh, 3000, seed=0)
+    points = turn.apply(np.asarray(points) * 1e-3) + origin
+    own = SPHERES[LINKS == link]
+    outside = (np.linalg.norm(points[:, None] - own[None, :, :3], axis=2) - own[:, 3]).min(axis=1)
+    assert outside.max() < 0.003

@@ -7,10 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
+from interfaces.cell import Connector, FixedMount
 from interfaces.frame import Intrinsics, RgbdFrame
 
 Image = NDArray[np.float64]
 RED, BLACK, PURPLE, WOOD = (0.75, 0.05, 0.06), (0.06, 0.06, 0.06), (0.45, 0.2, 0.6), (0.80, 0.66, 0.45)
+CONNECTOR = Connector(length=0.09, radius=0.010, color=RED)
+REAR_POSE = FixedMount(position=(-0.3556, 0.0, 0.4064), pitch_down_deg=14.0).world_from_camera
+MIDDLE_THIRD = Intrinsics(280, 240, 665.6, 665.6, 139.5, 119.5)  # of the rear camera: as sharp, faster to render
 
 
 @dataclass(frozen=True, eq=False)

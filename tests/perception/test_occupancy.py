@@ -3,7 +3,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from raycast import BLACK, PURPLE, RED, WOOD, Block, Cylinder, Sensor, render
+from raycast import BLACK, CONNECTOR, PURPLE, REAR_POSE, RED, WOOD, Block, Cylinder, Sensor, render
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import RigidTransform
 
@@ -64,52 +64,50 @@ def inside(block: Block) -> Points:
     return np.stack(np.meshgrid(*axes), -1).reshape(-1, 3)
 
 
-def test_an_obstacle_is_covered_and_nothing_else_is(connector: Connector, rear: RigidTransform) -> None:
-    occupancy = empty(connector)
-    look(occupancy, [TALL, CABLE, HIDDEN_END], rear)
+def test_an_obstacle_is_covered_and_nothing_else_is() -> None:
+    occupancy = empty(CONNECTOR)
+    look(occupancy, [TALL, CABLE, HIDDEN_END], REAR_POSE)
     points = occupancy.occupied_points()
     assert farthest(points, inside(TALL)) < occupancy.h
     assert outside(points, TALL).max() < 0.03  # depth scale, camera ray, a voxel
 
 
 @pytest.mark.parametrize("scale", [-0.015, 0.0, 0.015])
-def test_an_empty_cell_with_cable_and_connector_stays_empty(
-    connector: Connector, rear: RigidTransform, scale: float
-) -> None:
-    occupancy = empty(connector)
-    look(occupancy, [CABLE, HIDDEN_END], rear, scale=scale)
+def test_an_empty_cell_with_cable_and_connector_stays_empty(scale: float) -> None:
+    occupancy = empty(CONNECTOR)
+    look(occupancy, [CABLE, HIDDEN_END], REAR_POSE, scale=scale)
     assert len(occupancy.occupied_points()) == 0
 
 
-def test_the_wrist_camera_close_by_takes_no_cable_for_an_obstacle(connector: Connector) -> None:
-    occupancy = empty(connector)
+def test_the_wrist_camera_close_by_takes_no_cable_for_an_obstacle() -> None:
+    occupancy = empty(CONNECTOR)
     near = looking((0.15, -0.25, 0.33), (0.21, 0.0, -0.08))
     look(occupancy, [CABLE], near, WRIST)
     assert len(occupancy.occupied_points()) == 0
 
 
-def test_a_black_obstacle_is_an_obstacle(connector: Connector, rear: RigidTransform) -> None:
-    occupancy = empty(connector)
+def test_a_black_obstacle_is_an_obstacle() -> None:
+    occupancy = empty(CONNECTOR)
     block = Block(TALL.lower, TALL.upper, BLACK)
-    look(occupancy, [block], rear)
+    look(occupancy, [block], REAR_POSE)
     assert farthest(occupancy.occupied_points(), inside(block)) < 2 * occupancy.h
 
 
-def test_the_robot_is_no_obstacle(connector: Connector, rear: RigidTransform) -> None:
+def test_the_robot_is_no_obstacle() -> None:
     arm = Cylinder(np.array([0.2, 0.2, 0.3]), np.array([0.3, 0.1, 1.0]), 0.3, 0.03, (0.3, 0.3, 0.3))
     axis = arm.axis / np.linalg.norm(arm.axis)
     spheres = (arm.center + np.linspace(-0.15, 0.15, 11)[:, None] * axis, np.full(11, 0.035))
-    seen, ignored = empty(connector), empty(connector)
-    look(seen, [arm], rear)
-    look(ignored, [arm], rear, ignore=[spheres])
+    seen, ignored = empty(CONNECTOR), empty(CONNECTOR)
+    look(seen, [arm], REAR_POSE)
+    look(ignored, [arm], REAR_POSE, ignore=[spheres])
     assert len(seen.occupied_points()) > 100
     assert len(ignored.occupied_points()) == 0
 
 
-def test_a_look_from_the_side_clears_what_was_assumed_behind(connector: Connector, rear: RigidTransform) -> None:
+def test_a_look_from_the_side_clears_what_was_assumed_behind() -> None:
     thin = Block(np.array([0.30, -0.06, 0.0]), np.array([0.32, 0.06, 0.36]), PURPLE)
-    occupancy = empty(connector)
-    look(occupancy, [thin], rear)
+    occupancy = empty(CONNECTOR)
+    look(occupancy, [thin], REAR_POSE)
     assert np.count_nonzero(outside(occupancy.occupied_points(), thin) > 0.04) > 100
     look(occupancy, [thin], looking((0.36, 0.35, 0.5), (0.0, -0.8, -0.6)), WRIST)
     behind = occupancy.occupied_points()
@@ -118,11 +116,11 @@ def test_a_look_from_the_side_clears_what_was_assumed_behind(connector: Connecto
     assert farthest(occupancy.occupied_points(), inside(thin)) < 0.02
 
 
-def test_the_connectors_own_place_is_freed_when_it_is_found(connector: Connector, rear: RigidTransform) -> None:
+def test_the_connectors_own_place_is_freed_when_it_is_found() -> None:
     end = Cylinder(np.array([0.36, 0.0, 0.25]), np.array([0.0, 1.0, 0.1]), color=RED)
     thin = Block(np.array([0.30, -0.06, 0.0]), np.array([0.31, 0.06, 0.36]), PURPLE)
-    occupancy = empty(connector)
-    look(occupancy, [thin, end], rear)
+    occupancy = empty(CONNECTOR)
+    look(occupancy, [thin, end], REAR_POSE)
     assert farthest(occupancy.occupied_points(), end.center[None]) < occupancy.h  # the guess covers it
     look(occupancy, [thin, end], looking((0.40, 0.12, 0.55), (-0.04, -0.12, -0.3)), WRIST)
     assert farthest(occupancy.occupied_points(), end.center[None]) > 0.015

@@ -1,9 +1,8 @@
 import numpy as np
 import pytest
-from raycast import BLACK, PURPLE, RED, WOOD, Block, Cylinder, Sensor, render
+from raycast import BLACK, MIDDLE_THIRD, PURPLE, REAR_POSE, RED, WOOD, Block, Cylinder, Sensor, render
 from scipy.spatial.transform import RigidTransform
 
-from interfaces.frame import Intrinsics
 from perception.segmentation import NoSegment, NotSeen, Segment, SegmentationParameters, segment
 
 PARAMETERS = SegmentationParameters.for_color(RED)
@@ -20,9 +19,9 @@ def test_red_takes_two_hue_ranges_and_blue_one() -> None:
 
 
 @pytest.mark.parametrize("light", [0.64, 0.8, 1.0, 1.2])  # 0.64: 20 % less light on an already dim day
-def test_the_mask_is_the_connector_in_any_light(rear: RigidTransform, camera: Intrinsics, light: float) -> None:
-    frame = render(scene(rear), rear, camera, Sensor(light=light, gray_noise=2.0), 3)
-    bare = render(scene(rear)[1:], rear, camera, Sensor(subpixel=0, shadow=False, flying=False), 3)
+def test_the_mask_is_the_connector_in_any_light(light: float) -> None:
+    frame = render(scene(REAR_POSE), REAR_POSE, MIDDLE_THIRD, Sensor(light=light, gray_noise=2.0), 3)
+    bare = render(scene(REAR_POSE)[1:], REAR_POSE, MIDDLE_THIRD, Sensor(subpixel=0, shadow=False, flying=False), 3)
     truth = bare.depth > 0
     found = segment(frame.rgb, PARAMETERS)
     assert isinstance(found, Segment)
@@ -35,18 +34,18 @@ def test_the_mask_is_the_connector_in_any_light(rear: RigidTransform, camera: In
     assert (v0 <= v.min(), v.max() < v1) == (True, True)
 
 
-def test_in_full_shadow_it_is_still_found(rear: RigidTransform, camera: Intrinsics) -> None:
-    frame = render(scene(rear), rear, camera, Sensor(to_light=(1.0, 0.0, 0.0), light=0.8, gray_noise=2.0), 5)
+def test_in_full_shadow_it_is_still_found() -> None:
+    frame = render(
+        scene(REAR_POSE), REAR_POSE, MIDDLE_THIRD, Sensor(to_light=(1.0, 0.0, 0.0), light=0.8, gray_noise=2.0), 5
+    )
     found = segment(frame.rgb, PARAMETERS)
     assert isinstance(found, Segment)
     assert found.area > 1200
 
 
 @pytest.mark.parametrize("color", [BLACK, PURPLE, WOOD, (0.1, 0.3, 0.8), (0.8, 0.8, 0.8)])
-def test_other_things_of_the_cell_are_not_taken_for_it(
-    rear: RigidTransform, camera: Intrinsics, color: tuple[float, float, float]
-) -> None:
-    found = segment(render(scene(rear, color), rear, camera, Sensor(gray_noise=2.0), 1).rgb, PARAMETERS)
+def test_other_things_of_the_cell_are_not_taken_for_it(color: tuple[float, float, float]) -> None:
+    found = segment(render(scene(REAR_POSE, color), REAR_POSE, MIDDLE_THIRD, Sensor(gray_noise=2.0), 1).rgb, PARAMETERS)
     assert isinstance(found, NoSegment)
     assert found.reason is NotSeen.NO_COLOR
 

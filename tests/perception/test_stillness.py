@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from raycast import BLACK, IDEAL, WOOD, Block, Cylinder, Sensor, render
+from raycast import BLACK, IDEAL, MIDDLE_THIRD, REAR_POSE, WOOD, Block, Cylinder, Sensor, render
 from scipy.spatial.transform import RigidTransform
 
 from interfaces.frame import Intrinsics, RgbdFrame
@@ -38,16 +38,16 @@ def test_sensor_noise_and_flicker_are_not_motion() -> None:
 
 
 @pytest.mark.parametrize("sensor", [IDEAL, Sensor(gray_noise=2.0)], ids=["clean", "noisy"])
-def test_a_swinging_cable_is_seen_and_then_its_rest(rear: RigidTransform, camera: Intrinsics, sensor: Sensor) -> None:
+def test_a_swinging_cable_is_seen_and_then_its_rest(sensor: Sensor) -> None:
     # 2 mm of swing at 0.8 Hz for 1.6 s, then rest; the end itself is not in the picture
     heights = [0.25 + 0.002 * np.sin(2 * np.pi * 0.8 * i / RATE) if i < 24 else 0.25 for i in range(44)]
-    verdicts = feed(Stillness(1.0), [cable_at(z, rear, camera, i, sensor) for i, z in enumerate(heights)])
+    verdicts = feed(Stillness(1.0), [cable_at(z, REAR_POSE, MIDDLE_THIRD, i, sensor) for i, z in enumerate(heights)])
     assert verdicts[15:24] == [False] * 9  # also at the turning points
     assert verdicts[40:] == [True] * 4
 
 
-def test_a_slow_creep_is_motion(rear: RigidTransform, camera: Intrinsics) -> None:
-    images = [cable_at(0.25 - 0.003 * i / RATE, rear, camera, i, IDEAL) for i in range(16)]
+def test_a_slow_creep_is_motion() -> None:
+    images = [cable_at(0.25 - 0.003 * i / RATE, REAR_POSE, MIDDLE_THIRD, i, IDEAL) for i in range(16)]
     assert feed(Stillness(1.0), images)[-1] is False
 
 

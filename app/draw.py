@@ -1,0 +1,32 @@
+"""What a seed makes of a scenario's varying parts."""
+
+import numpy as np
+
+from app.scenario_file import ScenarioFile
+from interfaces.cell import Box
+from interfaces.scene import JawOpens, Obstacle
+
+STAND = 0.02  # m: the edge of the post that holds a foam piece off the floor
+STAND_COLOR = (0.35, 0.35, 0.38)
+
+
+def draw_obstacles(file: ScenarioFile, rng: np.random.Generator) -> tuple[Obstacle, ...]:
+    """The foam pieces where this seed puts them, each with a stand if it does not stand on the floor."""
+    drawn = []
+    for piece in file.obstacles:
+        x, y, bottom = (
+            np.asarray(getattr(piece.position, file.gravity)) + rng.uniform(-1.0, 1.0, 3) * piece.jitter
+        ).tolist()
+        center = (x, y, bottom + piece.size[2] / 2)
+        box = Box(name=piece.name, center=center, size=piece.size, color=piece.color)
+        stand = None
+        if bottom > 1e-3:
+            post = (STAND, STAND, bottom)
+            stand = Box(name=f"{piece.name} stand", center=(x, y, bottom / 2), size=post, color=STAND_COLOR)
+        drawn.append(Obstacle(box, float(np.deg2rad(piece.yaw_deg)), stand))
+    return tuple(drawn)
+
+
+def draw_faults(file: ScenarioFile, rng: np.random.Generator) -> tuple[JawOpens, ...]:
+    """The faults at this seed's moments."""
+    return tuple(JawOpens(float(rng.uniform(*fault.carried)), fault.seconds) for fault in file.faults)

@@ -1,0 +1,76 @@
+"""Whether a run came out as its scenario expects, by ground truth."""
+
+from app.record import Expectation, Slip
+from app.scenario_file import Expect
+from behaviors.services import Belief
+from sim.ground_truth import GroundTruth
+
+LOST_SECONDS = 0.2  # without any pad's touch, out of clip and socket: the hold is really lost, not regripped
+STILL_SPEED = 0.01  # m/s ...
+STILL_SECONDS = 1.0  # ... for so long: settled
+
+
+class Judge:
+    """Watches the truth at every tick and holds it against a scenario's expectations at the end."""
+
+    def __init__(self, truth: GroundTruth, expect: Expect) -> None:
+        self._truth, self._expect = truth, expect
+        self._was_held = False
+        self._let_go_at: float | None = None
+        self._still_since: float | None = None
+        self.losses: list[float] = []
+        self.settled_pixels: int | None = None  # of the connector in the rear image once it had settled after a loss
+        self.found_by: str | None = None
+
+    def observe(self, now: float, belief: Belief) -> None:
+        """Look at the truth after a tick at second `now`."""
+        self.found_by = belief.found_by or self.found_by
+        if self._truth.held():
+            self._was_held, self._let_go_at, self._still_since = True, None, None
+            return
+        if self._was_held and not self._truth.touched() and not self._truth.stowed():
+            self._let_go_at = now if self._let_go_at is None else self._let_go_at
+            if now - self._let_go_at >= LOST_SECONDS:
+                self.losses.append(self._let_go_at)
+                self._was_held = False
+        if self.losses and not self._was_held and self.settled_pixels is None:
+            self._watch_settling(now)
+
+    def slips(self, belief: Belief) -> tuple[Slip, ...]:
+        """Each real loss with the first notice that came after it and before the next."""
+        ends = [*self.losses[1:], float("inf")]
+        slips = []
+        for released, end in zip(self.losses, ends, strict=True):
+            notice = next((n for n in belief.notices if released <= n.at < end), None)
+            slips.append(Slip(released, notice.at if notice else None, notice.by if notice else None))
+        return tuple(slips)
+
+    def expectations(self, outcome: str, cause: str | None, belief: Belief) -> tuple[Expectation, ...]:
+        """Every expectation of the scenario, met or not."""
+        wanted = self._expect
+        stowed = self._truth.stowed()
+        ended = "stowed" if outcome == "stowed" and stowed else "lost" if outcome == "stowed" else outcome
+        found = [Expectation("outcome", ended == wanted.outcome, ended, wanted.outcome)]
+        if wanted.slips is not None:
+            noticed = sum(slip.detected_at is not None for slip in self.slips(belief))
+            met = noticed >= wanted.slips and noticed == len(self.losses)
+            found.append(Expectation("slips", met, noticed, wanted.slips))
+        if wanted.hidden is not None:
+            hidden = self.settled_pixels == 0 and self.found_by == "wrist"
+            found.append(Expectation("hidden", hidden == wanted.hidden, hidden, wanted.hidden))
+        if wanted.unintended_force is not None:
+            peak = max(self._truth.contact_peaks().values(), default=0.0)
+            found.append(
+                Expectation("unintended_force", peak <= wanted.unintended_force, round(peak, 2), wanted.unintended_force)
+            )
+        if wanted.cause is not None:
+            found.append(Expectation("cause", cause == wanted.cause, cause, wanted.cause.value))
+        return tuple(found)
+
+    def _watch_settling(self, now: float) -> None:
+        if self._truth.connector_speed() > STILL_SPEED:
+            self._still_since = None
+        elif self._still_since is None:
+            self._still_since = now
+        elif now - self._still_since >= STILL_SECONDS:
+            self.settled_pixels = self._truth.connector_pixels("rear")

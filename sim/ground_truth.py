@@ -1,0 +1,50 @@
+"""The truth of a world, for the judge of expectations, studies and tests. The robot's software never reads it."""
+
+import numpy as np
+from scipy.spatial.transform import RigidTransform
+
+from sim.world import World
+
+_LINK_SHIFT = 24
+
+
+class GroundTruth:
+    """Reads one world."""
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+
+    def connector_pose(self) -> RigidTransform:
+        """world_from_connector."""
+        return self._world.connector_pose()
+
+    def connector_speed(self) -> float:
+        """Speed of the connector's centre in m/s."""
+        return float(np.linalg.norm(self._world.connector_velocity()))
+
+    def held(self) -> bool:
+        """Whether both pads of the right hand touch the connector."""
+        return all(self._world.pads_touching("right"))
+
+    def touched(self) -> bool:
+        """Whether any pad of the right hand touches the connector."""
+        return any(self._world.pads_touching("right"))
+
+    def plugged(self) -> bool:
+        """Whether the connector sits in its socket."""
+        return self._world.socket.holds
+
+    def stowed(self) -> bool:
+        """Whether the connector sits in the clip."""
+        return self._world.clip.holds
+
+    def connector_pixels(self, camera: str) -> int:
+        """Pixels of the connector in a camera's newest frame."""
+        ids = self._world.cameras[camera].true_ids()
+        cable = self._world.cable
+        wanted = cable.body + ((cable.connector_link + 1) << _LINK_SHIFT)
+        return 0 if ids is None else int(np.count_nonzero(ids == wanted))
+
+    def contact_peaks(self) -> dict[str, float]:
+        """Largest normal force in N between an arm and each thing that it must not touch, so far."""
+        return dict(self._world.contact_peaks)
