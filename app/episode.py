@@ -4,6 +4,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import py_trees
@@ -88,7 +89,7 @@ def _world(scenario: Scenario, seed: int, renderer: RendererName, gui: bool) -> 
     return World(scenario.cell, scenario.file.gravity, seed, obstacles, faults, renderer, gui)
 
 
-def _assemble(scenario: Scenario, world: World, seed: int, log: object) -> Episode:
+def _assemble(scenario: Scenario, world: World, seed: int, log: Any) -> Episode:
     known = scenario.cell.known
     grippers = {name: arm.gripper for name, arm in world.arms.items()}
     motion = Motion(known, world.arms, grippers, world, seed * 1000)
@@ -101,7 +102,7 @@ def _assemble(scenario: Scenario, world: World, seed: int, log: object) -> Episo
 
 
 def _loop(
-    episode: Episode, scenario: Scenario, film: Film, progress: Progress | None, log: object
+    episode: Episode, scenario: Scenario, film: Film, progress: Progress | None, log: Any
 ) -> tuple[Outcome, Cause | None]:
     """Tick until the tree ends, the time is over or somebody interrupts; the arms are stopped in the end."""
     world, root = episode.world, episode.tree.root
@@ -122,8 +123,8 @@ def _loop(
     except KeyboardInterrupt:
         return "interrupted", Cause(CauseCode.INTERRUPTED, "stopped from outside", _running(root))
     except Exception as error:
-        node = _running(root)
-        log.exception("exception in a leaf", node=node)  # type: ignore[attr-defined]
+        node = _raising(error, root)
+        log.exception("exception in a leaf", node=node)
         return "internal_error", Cause(CauseCode.INTERNAL_ERROR, f"{type(error).__name__}: {error}", node)
     finally:
         if root.status is Status.RUNNING:
@@ -139,6 +140,17 @@ def _running(root: py_trees.behaviour.Behaviour) -> str:
     paths = node_paths(root)
     running = [paths[node.id] for node in root.iterate() if node.status is Status.RUNNING]
     return max(running, key=len, default="")
+
+
+def _raising(error: BaseException, root: py_trees.behaviour.Behaviour) -> str:
+    """Tree path of the innermost node that an exception came through."""
+    path, trace = "", error.__traceback__
+    while trace is not None:
+        node = trace.tb_frame.f_locals.get("self")
+        if isinstance(node, py_trees.behaviour.Behaviour):
+            path = node_paths(root).get(node.id, path)
+        trace = trace.tb_next
+    return path
 
 
 def _result(

@@ -1,5 +1,7 @@
 """Whether a run came out as its scenario expects, by ground truth."""
 
+from itertools import pairwise
+
 from app.record import Expectation, Slip
 from app.scenario_file import Expect
 from behaviors.services import Belief
@@ -38,9 +40,8 @@ class Judge:
 
     def slips(self, belief: Belief) -> tuple[Slip, ...]:
         """Each real loss with the first notice that came after it and before the next."""
-        ends = [*self.losses[1:], float("inf")]
         slips = []
-        for released, end in zip(self.losses, ends, strict=True):
+        for released, end in pairwise([*self.losses, float("inf")]):
             notice = next((n for n in belief.notices if released <= n.at < end), None)
             slips.append(Slip(released, notice.at if notice else None, notice.by if notice else None))
         return tuple(slips)

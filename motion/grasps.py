@@ -35,7 +35,7 @@ class Grasp:
 
 @dataclass(frozen=True, eq=False)
 class GraspChoice:
-    """A grasp and joint paths (k, 6) rad to it, one a branch, nearest first: tool in a straight line from the standoff."""
+    """A grasp and joint paths (k, 6) rad to it, one a branch, nearest first: straight in from the standoff."""
 
     grasp: Grasp
     paths: tuple[FloatArray, ...]
@@ -62,7 +62,7 @@ def grasp_candidates(
     it about the axis; 0 comes from the arms (along world x as far as the axis lets it). `shallow` metres is by how much
     the connector lies nearer to the finger tips than the tool's centre.
 
-    Raises ValueError if the grip lies off the connector, the connector does not fit the jaws, or a yaw exceeds 50 degrees.
+    Raises ValueError if the grip lies off the connector, it does not fit the jaws, or a yaw exceeds 50 degrees.
     """
     if abs(grip_offset) > 0.5 * length:
         raise ValueError(f"grip {grip_offset:.3f} m from the centre is off a connector of {length:.3f} m")
@@ -101,8 +101,8 @@ def choose_grasp(
     """The cheapest candidate that works: plan to one of its standoffs, then follow the path that begins there.
 
     At the standoff, `standoff` metres back along the tool, `model` must be free by `margin` metres; on the straight way
-    in, `near` (without the target's own surface; default: `model`) by `near_margin`. `q_now` (6,) rad orders the branches.
-    Raises PlanningError with a tally of what was wrong with the candidates.
+    in, `near` (without the target's own surface; default: `model`) by `near_margin`. `q_now` (6,) rad orders the
+    branches. Raises PlanningError with a tally of what was wrong with the candidates.
     """
     troubles: Counter[str] = Counter()
     for grasp in candidates:

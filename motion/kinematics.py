@@ -98,7 +98,7 @@ class ArmKinematics:
 
         Every row is checked by forward kinematics (0.1 mm, 1 mrad): the solver also answers poses out of reach.
         """
-        return self._solve(world_from_tool.as_matrix())
+        return _within_limits(self._solve(world_from_tool.as_matrix()))
 
     def ik_view(self, world_from_camera: RigidTransform, wrist_from_camera: RigidTransform) -> FloatArray:
         """Joint vectors (n, 6) rad that bring a wrist camera to a place and direction of view, upright images first.
@@ -112,7 +112,7 @@ class ArmKinematics:
             raise ValueError(f"the camera must look along the wrist link's x axis, not along {mount[:3, 2]}")
         found = [q for q in self._view_solutions(wanted, mount) if self._sees(q, wanted, mount)]
         found.sort(key=lambda q: -float(self._camera_up(q, mount) @ -wanted[:3, 1]))
-        return _distinct(found)
+        return _within_limits(_distinct(found))
 
     def _tool_matrix(self, q: FloatArray) -> FloatArray:
         frame: FloatArray = self.link_frames(q)[6]
@@ -120,7 +120,7 @@ class ArmKinematics:
         return frame
 
     def _solve(self, target: FloatArray) -> FloatArray:
-        """`ik` of a (4, 4) matrix."""
+        """`ik` of a (4, 4) matrix, whatever the limits."""
         good = []
         for raw in self._solver.IK(self._base_inverse @ target).Q:
             q = wrap(np.asarray(raw, float))
@@ -128,8 +128,7 @@ class ArmKinematics:
                 q = self._straight_wrist(q, target)
                 if not _reaches(self.base, q, target):
                     continue
-            if np.all((q >= LOWER) & (q <= UPPER)):
-                good.append(q)
+            good.append(q)
         return _distinct(good)
 
     def _straight_wrist(self, raw: FloatArray, target: FloatArray) -> FloatArray:
@@ -176,6 +175,10 @@ def _rolled(tool_target: FloatArray, wanted: FloatArray, roll: float) -> FloatAr
     turn[:3, :3] = np.eye(3) + np.sin(roll) * cross + (1 - np.cos(roll)) * cross @ cross
     turn[:3, 3] = wanted[:3, 3] - turn[:3, :3] @ wanted[:3, 3]
     return turn @ tool_target
+
+
+def _within_limits(rows: FloatArray) -> FloatArray:
+    return rows[np.all((rows >= LOWER) & (rows <= UPPER), axis=1)]
 
 
 def _distinct(rows: list[FloatArray]) -> FloatArray:

@@ -147,12 +147,13 @@ class Motion:
         def steps() -> Iterator[None]:
             model, near, q = self.model(arm), self.model(arm, clip=False), self.joints(arm)
             candidates = grasp_candidates(world_from_connector, self.known.connector.length, GRIP_OFFSET)
-            ways = choose_grasp(model, q, candidates, margin=MARGIN, near=near, near_margin=NEAR_MARGIN)
+            kin = self.kinematics[arm]
+            choice = choose_grasp(kin, model, q, candidates, margin=MARGIN, near=near, near_margin=NEAR_MARGIN)
             self.grippers[arm].open(OPEN_GAP)
-            path = plan(model, q, np.array([way.path[0] for way in ways]), self._next_seed(), margin=MARGIN)
-            chosen = min(ways, key=lambda way: float(np.abs(way.path[0] - path[-1]).max()))
+            path = plan(model, q, np.array([way[0] for way in choice.paths]), self._next_seed(), margin=MARGIN)
+            way = min(choice.paths, key=lambda way: float(np.abs(way[0] - path[-1]).max()))
             yield from self._follow(arm, path, 1.0)
-            yield from self._follow(arm, np.vstack([self.joints(arm), chosen.path[1:]]), APPROACH_SPEED)
+            yield from self._follow(arm, np.vstack([self.joints(arm), way[1:]]), APPROACH_SPEED)
 
         return self._task(arm, steps())
 

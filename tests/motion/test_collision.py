@@ -55,8 +55,8 @@ def test_free_agrees_with_clearance(q: FloatArray, margin: float) -> None:
 
 
 def test_the_sleeping_arms_of_the_thesis_cell_touch_nothing(known: KnownCell, boxes: Sequence[Box]) -> None:
-    arms = {a.name: ArmKinematics(RigidTransform.from_translation(a.base)) for a in known.arms}
-    sleep = {a.name: np.array(a.sleep) for a in known.arms}
+    arms = {str(a.name): ArmKinematics(RigidTransform.from_translation(a.base)) for a in known.arms}
+    sleep = {str(a.name): np.array(a.sleep) for a in known.arms}
     for name, other in (("left", "right"), ("right", "left")):
         others = CollisionModel(arms[other], []).spheres(sleep[other])
         camera = (0.0, 0.0, 0.06) if name == "left" else None
@@ -77,7 +77,7 @@ def test_nearest_names_what_is_in_the_way() -> None:
 
 def test_joint_limits_are_not_free() -> None:
     assert CollisionModel(KIN, []).free(HOME, 0.0)
-    assert not CollisionModel(KIN, []).free(HOME + [0, 2.2, 0, 0, 0, 0], 0.0)
+    assert not CollisionModel(KIN, []).free(HOME + np.array([0, 2.2, 0, 0, 0, 0]), 0.0)
 
 
 def test_another_arm_in_the_way() -> None:
@@ -94,7 +94,7 @@ def test_another_arm_in_the_way() -> None:
 def test_seen_surface_blocks_within_the_grids_error() -> None:
     tool = KIN.tool(FORWARD).translation
     for distance, free in ((0.02, False), (0.12, True)):
-        point = tool + [0.03 + distance, 0.0, 0.0]
+        point = tool + np.array([0.03 + distance, 0.0, 0.0])
         grid = DistanceGrid.from_points(point[None], np.full(3, -1.0), np.full(3, 1.0), 0.02)
         assert CollisionModel(KIN, [], grid=grid).free(FORWARD, 0.01) is free
 

@@ -1,3 +1,5 @@
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -18,7 +20,7 @@ def finely(trajectory: Trajectory) -> tuple[FloatArray, FloatArray]:
 
 def distance_to_path(point: FloatArray, path: FloatArray) -> float:
     best = np.inf
-    for a, b in zip(path[:-1], path[1:], strict=True):
+    for a, b in pairwise(path):
         s = np.clip((point - a) @ (b - a) / max((b - a) @ (b - a), 1e-12), 0, 1)
         best = min(best, float(np.linalg.norm(a + s * (b - a) - point)))
     return best
@@ -50,7 +52,7 @@ def test_one_row_is_a_trajectory_that_stays() -> None:
 
 def test_half_the_speed_takes_twice_as_long() -> None:
     path = np.array([np.zeros(6), np.ones(6), [1, 1, 1, 0, 0, 0.0]])
-    assert time_path(path, speed=0.5).duration == pytest.approx(2 * time_path(path).duration, rel=0.02)
+    assert time_path(path, speed=0.5).duration == pytest.approx(2 * time_path(path).duration, rel=0.05)
 
 
 @given(arrays(float, 6, elements=st.floats(-1.5, 1.5)))

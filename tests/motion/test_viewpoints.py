@@ -53,7 +53,7 @@ def test_main_points_spiral_outwards_in_view(known: KnownCell) -> None:
     rear = known.camera("rear")
     assert not isinstance(rear.mount, WristMount)
     for right, up in mains:
-        x, y, z = rear.mount.world_from_camera.inv().apply(START + [0, -right, up])
+        x, y, z = rear.mount.world_from_camera.inv().apply(START + np.array([0, -right, up]))
         assert z > 0
         assert abs(rear.intrinsics.fx * x / z) <= 424
         assert abs(rear.intrinsics.fy * y / z) <= 240
