@@ -50,9 +50,7 @@ class Film:
             f"gravity: {world.gravity}",
             f"renderer: {world.renderer.name}",
         ]
-        self._writer.write(
-            compose(overview(world), rear.rgb if rear else None, wrist.rgb if wrist else None, lines)
-        )
+        self._writer.write(compose(overview(world), rear.rgb if rear else None, wrist.rgb if wrist else None, lines))
 
 
 def overview(world: World) -> np.ndarray:  # type: ignore[type-arg]

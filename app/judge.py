@@ -62,7 +62,9 @@ class Judge:
         if wanted.unintended_force is not None:
             peak = max(self._truth.contact_peaks().values(), default=0.0)
             found.append(
-                Expectation("unintended_force", peak <= wanted.unintended_force, round(peak, 2), wanted.unintended_force)
+                Expectation(
+                    "unintended_force", peak <= wanted.unintended_force, round(peak, 2), wanted.unintended_force
+                )
             )
         if wanted.cause is not None:
             found.append(Expectation("cause", cause == wanted.cause, cause, wanted.cause.value))

@@ -5,6 +5,7 @@ from behaviors.check_cameras import CheckCameras
 from behaviors.detect_slip import DetectSlip
 from behaviors.holding import Holding
 from behaviors.leaf import Leaf
+from behaviors.look_closer import LookCloser
 from behaviors.monitor import Monitor
 from behaviors.recover import MakeRoom, WaitUntilStill
 from behaviors.regrasp import Regrasp
@@ -24,6 +25,7 @@ LEAVES: dict[str, type[Leaf]] = {
         Insert,
         LetGo,
         LookAtStow,
+        LookCloser,
         MakeRoom,
         Monitor,
         Regrasp,

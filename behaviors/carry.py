@@ -3,11 +3,12 @@
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from behaviors.hand import HAND, HandLeaf, mean_pose
+from behaviors.hand import HAND, HandLeaf
 from behaviors.leaf import Failed, Steps
 from interfaces.cause import CauseCode
 from motion.failure import PlanningError
 from motion.straight import straight_line
+from perception.mean_pose import mean_pose
 from perception.rgbd_pose import Estimate
 
 BEFORE = 0.06  # m before the clip along the hand's own axis, from where it goes straight in
@@ -80,7 +81,7 @@ class Insert(HandLeaf):
         if not whole or belief.held is None:
             self.say("the hand hides the connector", frames=len(seen))
             return
-        found = self.services.motion.tool(HAND).inv() * mean_pose(whole)
+        found = self.services.motion.tool(HAND).inv() * mean_pose(whole)[0]
         shift = float(np.linalg.norm(found.translation - belief.held.translation))
         self.say("connector in the hand", shift=round(shift, 4), trusted=shift < TRUSTED_SHIFT)
         if shift < TRUSTED_SHIFT:

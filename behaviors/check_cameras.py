@@ -4,9 +4,9 @@ from typing import Any, ClassVar
 
 from py_trees.ports import PortInformation
 
-from behaviors.hand import mean_pose
 from behaviors.leaf import Failed, Steps, StepsLeaf
 from interfaces.cause import CauseCode
+from perception.mean_pose import mean_pose
 from perception.rgbd_pose import Estimate
 
 
@@ -33,6 +33,6 @@ class CheckCameras(StepsLeaf):
         health = perception.track.check(clock.now())
         if not (health.ok and seen):
             raise Failed(CauseCode.CONNECTOR_NOT_FOUND, health.reason)
-        self.services.belief.connector = mean_pose(list(seen.values()))
+        self.services.belief.connector, self.services.belief.sure = mean_pose(list(seen.values()))
         self.services.belief.found_by = "rear"
         self.say("found", camera="rear", position=self.services.belief.connector.translation.round(4).tolist())

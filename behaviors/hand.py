@@ -5,8 +5,6 @@ from scipy.spatial.transform import RigidTransform
 
 from behaviors.leaf import Failed, Steps, StepsLeaf
 from interfaces.cause import CauseCode
-from interfaces.cell import pose_along
-from perception.rgbd_pose import Estimate
 from perception.slip import GapTest
 
 HAND = "right"  # the thesis's fixed roles: the right arm handles the cable ...
@@ -44,13 +42,3 @@ class HandLeaf(StepsLeaf):
     def go_to_sleep(self, arm: str) -> Steps:
         """Bring an arm to its sleep pose, out of the cameras' and the other arm's way."""
         yield self.services.motion.move(arm, np.array([self.services.known.arm(arm).sleep]))
-
-
-def mean_pose(estimates: list[Estimate]) -> RigidTransform:
-    """world_from_connector from several estimates: median position, mean axis of those that show most of it."""
-    whole = [e for e in estimates if e.whole] or estimates
-    longest = max(e.extent for e in whole)
-    best = [e for e in whole if e.extent >= 0.9 * longest]
-    position = np.median([e.position for e in best], axis=0)
-    axis = np.mean([e.axis for e in best], axis=0)
-    return pose_along(tuple(position), tuple(axis))

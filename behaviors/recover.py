@@ -35,6 +35,7 @@ class WaitUntilStill(HandLeaf):
         stillness, begin = Stillness(), self.services.clock.now()
         limit = self.get_input("time_limit")
         while self.services.clock.now() < begin + limit:
+            self.services.perception.look("rear")  # the search starts where the end was seen last
             frame = self.services.perception.frame("rear")
             if frame is not None and frame.stamp >= begin and stillness.feed(frame):
                 self.say("still", waited=round(self.services.clock.now() - begin, 2))

@@ -1,9 +1,14 @@
 """Take the found connector again."""
 
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import RigidTransform
+
 from behaviors.hand import HAND, HandLeaf
 from behaviors.leaf import Failed, Steps
 from motion.failure import PlanningError
 
+CLEAR = 0.05  # m around the connector's axis that are known to be free: it was seen there
 LIFT = 0.05  # m straight up from where it lay
 
 
@@ -17,6 +22,11 @@ class Regrasp(HandLeaf):
         """See the class."""
         motion, connector = self.services.motion, self.services.belief.connector
         assert connector is not None
+        perception = self.services.perception
+        # What was taken for an obstacle where the connector now is known to lie was a guess.
+        points = perception.occupancy.occupied_points()
+        free = points[_distance_to_axis(points, connector, 0.5 * self.services.known.connector.length) > CLEAR]
+        motion.set_obstacles(free, perception.occupancy.h)
         yield motion.pick(HAND, connector)
         try:
             yield from self.grip(connector)
@@ -31,3 +41,12 @@ class Regrasp(HandLeaf):
                 yield None
         except PlanningError as error:
             self.say("not lifted", why=str(error))
+
+
+def _distance_to_axis(points: NDArray[np.float64], connector: RigidTransform, half: float) -> NDArray[np.float64]:
+    """Distances (n,) m of points (n, 3) from the connector's axis, `half` m to each side of its centre."""
+    if not len(points):
+        return np.empty(0)
+    local = connector.inv().apply(points)
+    local[:, 0] -= np.clip(local[:, 0], -half, half)
+    return np.asarray(np.linalg.norm(local, axis=1))

@@ -26,6 +26,7 @@ class Belief:
 
     held: RigidTransform | None = None  # tool_from_connector of the right hand, None when it holds nothing
     connector: RigidTransform | None = None  # world_from_connector as last found for a grasp
+    sure: bool = False  # whether the whole of it was seen there
     found_by: str | None = None  # the camera that found it last
     notices: list[Notice] = field(default_factory=list)
     causes: list[Cause] = field(default_factory=list)

@@ -9,6 +9,9 @@ from behaviors.hand import HAND, HandLeaf
 from behaviors.leaf import Steps
 
 DRAW_OUT = 0.05  # m along the plug's axis: the plug sits 0.015 deep
+SHALLOW = (
+    0.008  # m from the pads' middle to the finger tips: they end 12 mm past it, the panel is 20 mm behind the plug
+)
 CLEAR = 0.06  # m away from the panel then
 
 
@@ -21,7 +24,7 @@ class Unplug(HandLeaf):
         """See the class."""
         known, motion = self.services.known, self.services.motion
         plug = known.socket(self.get_input("socket")).world_from_plug(known.connector.length)
-        yield motion.pick(HAND, plug)
+        yield motion.pick(HAND, plug, shallow=SHALLOW)
         yield from self.grip(plug)
         axis = plug.rotation.apply([1.0, 0.0, 0.0])
         yield motion.shift(HAND, -DRAW_OUT * axis)

@@ -72,7 +72,6 @@ class Socket(Model):
         centre = np.asarray(self.center) - axis * (0.5 * self.size[1] + 0.5 * connector_length - self.depth)
         return pose_along((float(centre[0]), float(centre[1]), float(centre[2])), self.axis)
 
-
     def upright_box(self) -> Box:
         """The smallest box along the world's axes that holds the block, which is turned so that its y edge is the axis."""
         axis = np.abs(self.axis) / np.linalg.norm(self.axis)

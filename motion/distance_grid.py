@@ -43,3 +43,11 @@ class DistanceGrid:
         occupied = np.zeros(tuple(shape), dtype=np.bool_)
         occupied[tuple(index.T)] = True
         return cls.from_occupied(occupied, lower, h)
+
+    def at(self, points: NDArray[np.float64]) -> NDArray[np.float32]:
+        """Distances (n,) m at points (n, 3) in world; `FAR` outside the grid."""
+        index = np.floor((points - self.lower) / self.h).astype(int)
+        inside = np.all((index >= 0) & (index < self.distance.shape), axis=1)
+        found = np.full(len(points), FAR, np.float32)
+        found[inside] = self.distance[tuple(index[inside].T)]
+        return found

@@ -26,9 +26,10 @@ from motion.timing import time_path
 FloatArray = NDArray[np.float64]
 
 MARGIN = 0.015  # m between the arm's spheres and anything while it moves freely
+TIGHT_MARGIN = 0.005  # m where nothing is found with that
+WAYS = 12  # ways to grasp that the planner may choose from
 NEAR_MARGIN = 0.0  # m on the last straight centimetres
 APPROACH_SPEED = 0.3  # share of the joints' speed on straight ways near things
-GRIP_OFFSET = -0.02  # m along the connector: near the cable, so that the tip shows
 OPEN_GAP = 0.06  # m between the pads: 20 mm to each side of the connector
 ARRIVED = 0.05  # rad: an arm that ends further from its goal was blocked
 GRID_BORDER = 0.2  # m around the voxels: no sphere of an arm is thicker
@@ -123,7 +124,7 @@ class Motion:
         """Plan a free way to one of the goals (n, 6) rad and follow it; `held` is tool_from_connector when it carries."""
 
         def steps() -> Iterator[None]:
-            path = plan(self.model(arm, held=held), self.joints(arm), goals, self._next_seed(), margin=MARGIN)
+            path = self._plan(self.model(arm, held=held), self.joints(arm), goals)
             yield from self._follow(arm, path, speed)
 
         return self._task(arm, steps())
@@ -141,21 +142,32 @@ class Motion:
         tool = self.tool(arm)
         return self.straight(arm, RigidTransform.from_components(tool.translation + way, tool.rotation), speed=speed)
 
-    def pick(self, arm: str, world_from_connector: RigidTransform) -> Task:
-        """Open the jaw, bring it around the connector near its cable side; the jaw stays open."""
+    def pick(self, arm: str, world_from_connector: RigidTransform, *, shallow: float = 0.0) -> Task:
+        """Open the jaw, bring it around the connector near its cable side; the jaw stays open.
+
+        `shallow` metres is by how much the connector lies nearer to the finger tips than the pads' middle.
+        """
 
         def steps() -> Iterator[None]:
-            model, near, q = self.model(arm), self.model(arm, clip=False), self.joints(arm)
-            candidates = grasp_candidates(world_from_connector, self.known.connector.length, GRIP_OFFSET)
-            kin = self.kinematics[arm]
-            choice = choose_grasp(kin, model, q, candidates, margin=MARGIN, near=near, near_margin=NEAR_MARGIN)
+            model, q = self.model(arm), self.joints(arm)
+            ways = self._ways_to_grasp(arm, model, world_from_connector, shallow)
             self.grippers[arm].open(OPEN_GAP)
-            path = plan(model, q, np.array([way[0] for way in choice.paths]), self._next_seed(), margin=MARGIN)
-            way = min(choice.paths, key=lambda way: float(np.abs(way[0] - path[-1]).max()))
+            path = self._plan(model, q, np.array([way[0] for way in ways]))
+            way = min(ways, key=lambda way: float(np.abs(way[0] - path[-1]).max()))
             yield from self._follow(arm, path, 1.0)
             yield from self._follow(arm, np.vstack([self.joints(arm), way[1:]]), APPROACH_SPEED)
 
         return self._task(arm, steps())
+
+    def sees(self, world_from_camera: RigidTransform, points: FloatArray) -> bool:
+        """Whether nothing known or seen stands between a camera and any of the points (n, 3) m."""
+        eye = world_from_camera.translation
+        shares = np.linspace(0.15, 0.85, 24)[:, None, None]
+        rays = (eye + shares * (points - eye)).reshape(-1, 3)
+        for box in self._boxes:
+            if np.any(np.all(np.abs(rays - box.center) < 0.5 * np.array(box.size), axis=1)):
+                return False
+        return self._grid is None or bool(np.min(self._grid.at(rays)) > 0.0)
 
     def stop(self) -> None:
         """Stop both arms."""
@@ -178,6 +190,34 @@ class Motion:
             message = f"the {arm} arm stopped {short:.2f} rad short of its goal, more than {ARRIVED:.2f}"
             raise PlanningError(CauseCode.MOTION_BLOCKED, message)
 
+    def _ways_to_grasp(
+        self, arm: str, model: CollisionModel, world_from_connector: RigidTransform, shallow: float
+    ) -> list[FloatArray]:
+        """Ways in (k, 6) from standoff to grasp of the cheapest candidates that work, at most `WAYS`."""
+        kin, near, q = self.kinematics[arm], self.model(arm, clip=False), self.joints(arm)
+        connector = self.known.connector
+        left = grasp_candidates(world_from_connector, connector.length, connector.radius, shallow=shallow)
+        ways: list[FloatArray] = []
+        while left and len(ways) < WAYS:
+            try:
+                choice = choose_grasp(kin, model, q, left, margin=MARGIN, near=near, near_margin=NEAR_MARGIN)
+            except PlanningError:
+                if ways:
+                    break
+                raise
+            ways += choice.paths
+            left = left[left.index(choice.grasp) + 1 :]
+        return ways
+
+    def _plan(self, model: CollisionModel, start: FloatArray, goals: FloatArray) -> FloatArray:
+        """A path (k, 6) with the full margin, else with a smaller one."""
+        try:
+            return plan(model, start, goals, self._next_seed(), margin=MARGIN)
+        except PlanningError as error:
+            if error.code is CauseCode.OUT_OF_REACH:
+                raise
+            return plan(model, start, goals, self._next_seed(), margin=TIGHT_MARGIN)
+
     def _task(self, arm: str, steps: Iterator[None]) -> Task:
         return Task(steps, self.arms[arm].stop)
 
@@ -191,4 +231,3 @@ def _connector_spheres(held: RigidTransform, connector: Connector) -> FloatArray
     along = (0.5 * connector.length - connector.radius) * np.array([-1.0, 0.0, 1.0])
     centers = held.apply(np.column_stack([along, np.zeros(3), np.zeros(3)]))
     return np.column_stack([centers, np.full(3, 1.2 * connector.radius)])
-

@@ -15,6 +15,7 @@ SUB_SPACING = 0.125
 TURN = np.pi / 6  # of a subpoint's view towards its main point
 DISTANCE = 0.30  # metres from the plane through the start; the thesis leaves it out
 _RINGS = 8  # 2 m: more than the rear camera sees
+CLOSE_DISTANCES = (0.30, 0.24, 0.36)  # metres of a closer look: the wrist camera has no depth under 0.18
 _ROUND = ((1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1), (0, 1), (1, 1))  # right first, then downwards
 _RIGHT = np.array([0.0, -1.0, 0.0])  # as seen when looking at the back panel
 _UP = np.array([0.0, 0.0, 1.0])
@@ -73,3 +74,22 @@ def _in_view(point: FloatArray, world_from_camera: RigidTransform, camera: Intri
         return False
     u, v = camera.fx * x / z + camera.cx, camera.fy * y / z + camera.cy
     return bool(-0.5 <= u < camera.width - 0.5 and -0.5 <= v < camera.height - 0.5)
+
+
+def closer_views(world_from_connector: RigidTransform) -> list[RigidTransform]:
+    """Places to look closely at a connector that was seen: world_from_camera, the best first.
+
+    From the arms' side (towards -x), as square to its axis as may be: there its whole length shows, and its tilt in depth.
+    """
+    center = world_from_connector.translation
+    axis = world_from_connector.rotation.apply([1.0, 0.0, 0.0])
+    views = []
+    for distance in CLOSE_DISTANCES:
+        for yaw in np.deg2rad(np.arange(-75.0, 76.0, 15.0)):
+            for pitch in np.deg2rad(np.arange(-15.0, 76.0, 15.0)):
+                # ZY: first down by the pitch, then left by the yaw
+                turn = Rotation.from_euler("ZY", [yaw, pitch])
+                sight = turn.apply([1.0, 0.0, 0.0])
+                cost = abs(float(sight @ axis)) + 0.2 * abs(distance - CLOSE_DISTANCES[0])
+                views.append((cost, RigidTransform.from_components(center - distance * sight, turn * OPTICAL)))
+    return [pose for _, pose in sorted(views, key=lambda view: view[0])]

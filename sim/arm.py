@@ -55,7 +55,14 @@ class SimArm:
         }
         self.joints = [
             self.links[n]
-            for n in ("shoulder_link", "upper_arm_link", "upper_forearm_link", "lower_forearm_link", "wrist_link", "gripper_link")
+            for n in (
+                "shoulder_link",
+                "upper_arm_link",
+                "upper_forearm_link",
+                "lower_forearm_link",
+                "wrist_link",
+                "gripper_link",
+            )
         ]
         self.offsets = self._draw_offsets(errors.arm_tool, rng)
         self._trajectory: Trajectory | None = None
@@ -176,11 +183,17 @@ class SimGripper:
         self._noise_key = int(rng.integers(2**31))
         client, body = arm.client, arm.body
         for pad in self.pads:
-            p.changeDynamics(
-                body, pad, lateralFriction=spec.friction, spinningFriction=0.005, physicsClientId=client
-            )
+            p.changeDynamics(body, pad, lateralFriction=spec.friction, spinningFriction=0.005, physicsClientId=client)
         gear = p.createConstraint(
-            body, self._fingers[0], body, self._fingers[1], p.JOINT_GEAR, [0, 1, 0], [0, 0, 0], [0, 0, 0], physicsClientId=client
+            body,
+            self._fingers[0],
+            body,
+            self._fingers[1],
+            p.JOINT_GEAR,
+            [0, 1, 0],
+            [0, 0, 0],
+            [0, 0, 0],
+            physicsClientId=client,
         )
         # One servo moves both fingers: the URDF's right finger runs the other way.
         p.changeConstraint(gear, gearRatio=1, maxForce=500, erp=0.3, physicsClientId=client)
@@ -257,7 +270,12 @@ class SimGripper:
         for finger, side in zip(self._fingers, (1, -1), strict=True):
             if target is None:
                 p.setJointMotorControl2(
-                    body, finger, p.VELOCITY_CONTROL, targetVelocity=side * velocity, force=force, physicsClientId=client
+                    body,
+                    finger,
+                    p.VELOCITY_CONTROL,
+                    targetVelocity=side * velocity,
+                    force=force,
+                    physicsClientId=client,
                 )
             else:
                 p.setJointMotorControl2(

@@ -110,7 +110,9 @@ def build_cable(
     inertia_floor = max(4 * bend * step**2 / STABILITY**2, mass * length**2 / 12)
     along_x = p.getQuaternionFromEuler([0.0, np.pi / 2, 0.0])
 
-    def shapes(radius: float, size: float, offset: float, color: tuple[float, float, float], round_ends: bool) -> tuple[int, int]:
+    def shapes(
+        radius: float, size: float, offset: float, color: tuple[float, float, float], round_ends: bool
+    ) -> tuple[int, int]:
         kind = p.GEOM_CAPSULE if round_ends else p.GEOM_CYLINDER
         frame = {"FramePosition": [offset, 0, 0], "FrameOrientation": along_x}
         c = p.createCollisionShape(
@@ -154,9 +156,7 @@ def build_cable(
         p.changeDynamics(body, link, localInertiaDiagonal=[inertia_floor] * 3, physicsClientId=client)
     r, h = connector.radius, connector.length
     across = connector_mass * (3 * r**2 + h**2) / 12
-    p.changeDynamics(
-        body, n, localInertiaDiagonal=[connector_mass * r**2 / 2, across, across], physicsClientId=client
-    )
+    p.changeDynamics(body, n, localInertiaDiagonal=[connector_mass * r**2 / 2, across, across], physicsClientId=client)
     # The default motors of spherical joints cost forty times a step and hold the joint: off.
     p.setJointMotorControlMultiDofArray(
         body,

@@ -131,9 +131,7 @@ class ClipHold:
         turning = rate - axis * float(rate @ axis)
         torque = _limited(self._torsion * np.cross(axis, self._axis), LIP_TORQUE) - self._torsion_damping * turning
         at = connector.translation.tolist()
-        p.applyExternalForce(
-            self._body, self._link, force.tolist(), at, p.WORLD_FRAME, physicsClientId=self._client
-        )
+        p.applyExternalForce(self._body, self._link, force.tolist(), at, p.WORLD_FRAME, physicsClientId=self._client)
         p.applyExternalTorque(self._body, self._link, torque.tolist(), p.WORLD_FRAME, physicsClientId=self._client)
 
 

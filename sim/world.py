@@ -184,9 +184,7 @@ class World:
             p.GEOM_BOX, halfExtents=half, rgbaColor=[*box.color, 1], physicsClientId=self.client
         )
         turn = Rotation.identity() if turn is None else turn
-        body = p.createMultiBody(
-            0, collision, visual, box.center, turn.as_quat().tolist(), physicsClientId=self.client
-        )
+        body = p.createMultiBody(0, collision, visual, box.center, turn.as_quat().tolist(), physicsClientId=self.client)
         p.changeDynamics(body, -1, lateralFriction=0.5, physicsClientId=self.client)
         return int(body)
 
@@ -224,9 +222,7 @@ class World:
         for i in range(steps + round(SETTLE_SECONDS / self.step_seconds)):
             s = min(1.0, (i + 1) / steps)
             s = s * s * (3 - 2 * s)
-            hold.move(
-                RigidTransform.from_components((1 - s) * start.translation + s * goal.translation, turn(s))
-            )
+            hold.move(RigidTransform.from_components((1 - s) * start.translation + s * goal.translation, turn(s)))
             self.cable.apply_springs()
             p.stepSimulation(physicsClientId=self.client)
         return SocketHold(hold, socket.pull_out_force)

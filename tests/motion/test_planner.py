@@ -73,7 +73,7 @@ def test_the_budget_ends_a_search_without_a_way() -> None:
         Box(name="lid", center=(0.0, 0.0, 0.8), size=(0.3, 0.02, 0.7)),
     ]
     model = CollisionModel(KIN, walls)
-    up = np.array([1.2, -0.3, 0.3, 0.0, 0.0, 0.0])
+    up = np.array([1.2, 0.3, 0.3, 0.0, 0.0, 0.0])
     with pytest.raises(PlanningError, match="no path to 1 goals at 10 mm margin in 3000 checked") as caught:
         plan(model, up, (up * [-1, 1, 1, 1, 1, 1])[None], seed=0, max_checks=3000)
     assert caught.value.code is CauseCode.PLANNING_FAILED

@@ -42,6 +42,6 @@ def test_spheres_cover_the_mesh(name: str, link: int, turn: Rotation, origin: li
     mesh = trimesh.load_mesh(MESHES / f"VXSA-300-M-{name}.stl")
     points, _ = trimesh.sample.sample_surface(mesh, 3000, seed=0)
     points = turn.apply(np.asarray(points) * 1e-3) + origin
-    own = SPHERES[LINKS == link]
+    own = SPHERES[link == LINKS]
     outside = (np.linalg.norm(points[:, None] - own[None, :, :3], axis=2) - own[:, 3]).min(axis=1)
-    assert outside.max() < 0.003
+    assert float(outside.max()) < 0.003
