@@ -33,6 +33,7 @@ APPROACH_SPEED = 0.3  # share of the joints' speed on straight ways near things
 OPEN_GAP = 0.06  # m between the pads: 20 mm to each side of the connector
 ARRIVED = 0.05  # rad: an arm that ends further from its goal was blocked
 GRID_BORDER = 0.2  # m around the voxels: no sphere of an arm is thicker
+ARM_MARGIN = 0.04  # m round an arm: 5 mm of arm error, 13 mm of depth, a voxel, and the planner's margin
 SETTLE = 0.10  # s after a trajectory before its end is judged
 
 
@@ -67,15 +68,44 @@ class Motion:
         self._cameras = {c.mount.arm: c.mount for c in known.cameras if isinstance(c.mount, WristMount)}
         self._boxes = known.solids()
         self._grid: DistanceGrid | None = None
+        self._points, self._spacing = np.empty((0, 3)), 0.0
         self._seed = seed
 
     def set_obstacles(self, points: FloatArray, spacing: float) -> None:
-        """Keep clear of occupied voxels from now on: centres (n, 3) m and edge m."""
-        if not len(points):
+        """Keep clear of occupied voxels from now on: centres (n, 3) m and edge m.
+
+        Points where an arm is now, or sleeps, do not count: what was seen there was an arm.
+        """
+        self._points, self._spacing = points, spacing
+        for spec in self.known.arms:
+            for q in (self.joints(spec.name), np.array(spec.sleep)):
+                self._clear(self.model(spec.name, others=False).spheres(q), ARM_MARGIN)
+        self._rebuild_grid()
+
+    def _clear(self, spheres: FloatArray, margin: float) -> None:
+        """Forget the points within `margin` m of spheres (m, 4)."""
+        distance = np.linalg.norm(self._points[:, None] - spheres[None, :, :3], axis=2)
+        self._points = self._points[np.all(distance > spheres[:, 3] + margin, axis=1)]
+
+    def _rebuild_grid(self) -> None:
+        if not len(self._points):
             self._grid = None
             return
-        lower, upper = points.min(axis=0) - GRID_BORDER, points.max(axis=0) + GRID_BORDER
-        self._grid = DistanceGrid.from_points(points, lower, upper, spacing)
+        lower, upper = self._points.min(axis=0) - GRID_BORDER, self._points.max(axis=0) + GRID_BORDER
+        self._grid = DistanceGrid.from_points(self._points, lower, upper, self._spacing)
+
+    def _start_model(self, arm: str, held: RigidTransform | None = None) -> CollisionModel:
+        """`model` for a motion that begins now: seen points that the arm touches where it stands were none.
+
+        Voxels are coarse and cameras err by millimetres; a hand that came in beside an obstacle must get out again.
+        """
+        model = self.model(arm, held=held)
+        distance, what = model.nearest(self.joints(arm))
+        if what == "seen surface" and distance < TIGHT_MARGIN:
+            self._clear(model.spheres(self.joints(arm)), TIGHT_MARGIN + self._spacing)
+            self._rebuild_grid()
+            model = self.model(arm, held=held)
+        return model
 
     def joints(self, arm: str) -> FloatArray:
         """The arm's joints (6,) rad as read."""
@@ -124,7 +154,7 @@ class Motion:
         """Plan a free way to one of the goals (n, 6) rad and follow it; `held` is tool_from_connector when it carries."""
 
         def steps() -> Iterator[None]:
-            path = self._plan(self.model(arm, held=held), self.joints(arm), goals)
+            path = self._plan(self._start_model(arm, held), self.joints(arm), goals)
             yield from self._follow(arm, path, speed)
 
         return self._task(arm, steps())
@@ -149,7 +179,7 @@ class Motion:
         """
 
         def steps() -> Iterator[None]:
-            model, q = self.model(arm), self.joints(arm)
+            model, q = self._start_model(arm), self.joints(arm)
             ways = self._ways_to_grasp(arm, model, world_from_connector, shallow)
             self.grippers[arm].open(OPEN_GAP)
             path = self._plan(model, q, np.array([way[0] for way in ways]))

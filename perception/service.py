@@ -15,7 +15,8 @@ from perception.rgbd_pose import Estimate, NoEstimate, estimate
 from perception.track import ConnectorTrack
 
 # Where obstacles may matter: the space that the arms share with the cable.
-REGION = (np.array([0.08, -0.44, 0.01]), np.array([0.50, 0.44, 0.62]))
+VOXEL = 0.010  # m; obstacles stand within 0.1 of the connector, and a hand must pass between
+REGION = (np.array([0.16, -0.44, 0.01]), np.array([0.50, 0.44, 0.62]))
 
 
 class Perception:
@@ -37,7 +38,7 @@ class Perception:
         self._scale = dict.fromkeys(cameras, 1.0)
         self._results: dict[str, tuple[int, Estimate | NoEstimate]] = {}
         self.track = ConnectorTrack()
-        self.occupancy = Occupancy(*REGION, known.solids(), known.connector)
+        self.occupancy = Occupancy(*REGION, known.solids(), known.connector, VOXEL)
 
     def frame(self, camera: str) -> RgbdFrame | None:
         """The newest frame, its depth corrected by what `correct_depth` found; None before the first."""
