@@ -22,11 +22,11 @@ class Judge:
         self._still_since: float | None = None
         self.losses: list[float] = []
         self.settled_pixels: int | None = None  # of the connector in the rear image once it had settled after a loss
-        self.found_by: str | None = None
+        self.found_by: str | None = None  # the camera that found the connector first after its loss
 
     def observe(self, now: float, belief: Belief) -> None:
         """Look at the truth after a tick at second `now`."""
-        self.found_by = belief.found_by or self.found_by
+        self.found_by = self.found_by or belief.found_by
         if self._truth.held():
             self._was_held, self._let_go_at, self._still_since = True, None, None
             return

@@ -1,17 +1,21 @@
 """Small steps of the right hand that several states share."""
 
+from collections.abc import Generator
+
 import numpy as np
 from scipy.spatial.transform import RigidTransform
 
 from behaviors.leaf import Failed, Steps, StepsLeaf
 from interfaces.cause import CauseCode
+from motion.failure import PlanningError
+from motion.service import Task
 from perception.slip import GapTest
 
 HAND = "right"  # the thesis's fixed roles: the right arm handles the cable ...
 EYE = "left"  # ... and the left one carries the wrist camera
 GRIP_FORCE = 40.0  # N a finger
 CLOSE_SECONDS = 1.0  # the jaw closes from 60 mm at 0.1 m/s a finger, and the readings settle
-BACK = 0.10  # m of straight way back from a place where something was held
+BACK = (0.10, 0.06, 0.03)  # m of straight way back from a place where something was held, the first that goes
 
 
 class HandLeaf(StepsLeaf):
@@ -32,11 +36,22 @@ class HandLeaf(StepsLeaf):
         services.belief.held = services.motion.tool(HAND).inv() * world_from_connector
         self.say("grasped", gap=evidence.value)
 
+    def attempt(self, task: Task) -> Generator[None, None, bool]:
+        """Do a motion if it can be done; False (and a line in the log) when not."""
+        try:
+            while not task.poll():
+                yield None
+        except PlanningError as error:
+            self.say("left out", why=str(error))
+            return False
+        return True
+
     def back_off(self) -> Steps:
-        """Draw the hand straight back, then bring the arm to its sleep pose."""
+        """Draw the hand straight back as far as may be, then bring the arm to its sleep pose."""
         motion = self.services.motion
-        back = motion.tool(HAND).rotation.apply([-BACK, 0.0, 0.0])
-        yield motion.shift(HAND, back)
+        for distance in BACK:
+            if (yield from self.attempt(motion.shift(HAND, motion.tool(HAND).rotation.apply([-distance, 0.0, 0.0])))):
+                break
         yield from self.go_to_sleep(HAND)
 
     def go_to_sleep(self, arm: str) -> Steps:

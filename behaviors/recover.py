@@ -2,6 +2,7 @@
 
 from typing import Any, ClassVar
 
+import numpy as np
 from py_trees.ports import PortInformation
 
 from behaviors.hand import HAND, HandLeaf
@@ -10,6 +11,7 @@ from interfaces.cause import CauseCode
 from motion.service import OPEN_GAP
 from perception.stillness import Stillness
 
+STILL = 0.25  # of the mean brightness: a cable that moves by about 1 mm; the jaw forgives 20
 FRAME_PERIOD = 0.2  # s between the frames that are compared
 
 
@@ -18,9 +20,13 @@ class MakeRoom(HandLeaf):
 
     def steps(self) -> Steps:
         """See the class."""
+        motion, perception = self.services.motion, self.services.perception
         self.services.belief.connector = self.services.belief.found_by = None
-        yield from self.go_to_sleep(HAND)
-        self.services.motion.grippers[HAND].open(OPEN_GAP)
+        task = motion.move(HAND, np.array([self.services.known.arm(HAND).sleep]))
+        while not task.poll():
+            perception.look("rear")  # the search starts where the end was seen last
+            yield None
+        motion.grippers[HAND].open(OPEN_GAP)
 
 
 class WaitUntilStill(HandLeaf):
@@ -32,10 +38,10 @@ class WaitUntilStill(HandLeaf):
 
     def steps(self) -> Steps:
         """See the class."""
-        stillness, begin = Stillness(), self.services.clock.now()
+        stillness, begin = Stillness(threshold=STILL), self.services.clock.now()
         limit = self.get_input("time_limit")
         while self.services.clock.now() < begin + limit:
-            self.services.perception.look("rear")  # the search starts where the end was seen last
+            self.services.perception.look("rear")
             frame = self.services.perception.frame("rear")
             if frame is not None and frame.stamp >= begin and stillness.feed(frame):
                 self.say("still", waited=round(self.services.clock.now() - begin, 2))

@@ -6,7 +6,6 @@ from scipy.spatial.transform import RigidTransform
 
 from behaviors.hand import HAND, HandLeaf
 from behaviors.leaf import Failed, Steps
-from motion.failure import PlanningError
 
 CLEAR = 0.05  # m around the connector's axis that are known to be free: it was seen there
 LIFT = 0.05  # m straight up from where it lay
@@ -35,12 +34,7 @@ class Regrasp(HandLeaf):
             yield from self.wait(0.6)
             yield from self.back_off()
             raise
-        task = motion.shift(HAND, [0.0, 0.0, LIFT])
-        try:
-            while not task.poll():
-                yield None
-        except PlanningError as error:
-            self.say("not lifted", why=str(error))
+        yield from self.attempt(motion.shift(HAND, [0.0, 0.0, LIFT]))
 
 
 def _distance_to_axis(points: NDArray[np.float64], connector: RigidTransform, half: float) -> NDArray[np.float64]:

@@ -26,7 +26,7 @@ class CauseCode(StrEnum):
 
 @dataclass(frozen=True)
 class Cause:
-    """A cause: its code, one sentence with the numbers, and the tree path of the node that names it ('' before a tree)."""
+    """A cause: its code, one sentence with the numbers, and the tree path of its node ('' before a tree)."""
 
     code: CauseCode
     message: str

@@ -56,7 +56,7 @@ class Box(Model):
 
 
 class Socket(Model):
-    """A socket: a block whose mouth is the middle of its face opposite to `axis`, the direction in which a plug goes in."""
+    """A socket: a block with its mouth in the middle of its face opposite to `axis`, along which a plug goes in."""
 
     name: str
     center: Vector
@@ -73,7 +73,7 @@ class Socket(Model):
         return pose_along((float(centre[0]), float(centre[1]), float(centre[2])), self.axis)
 
     def upright_box(self) -> Box:
-        """The smallest box along the world's axes that holds the block, which is turned so that its y edge is the axis."""
+        """The smallest box along the world's axes around the block, which is turned so that its y edge is the axis."""
         axis = np.abs(self.axis) / np.linalg.norm(self.axis)
         across, along, high = self.size
         size = (across, along * axis[1] + high * axis[2], along * axis[2] + high * axis[1])

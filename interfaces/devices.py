@@ -59,5 +59,5 @@ class Camera(Protocol):
     name: str
 
     def latest(self) -> RgbdFrame | None:
-        """The newest frame whose latency has passed; None before the first. The same frame whoever asks, however often."""
+        """The newest frame whose latency has passed, the same however often it is asked for; None before the first."""
         ...

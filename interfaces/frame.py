@@ -30,7 +30,8 @@ class RgbdFrame:
 
     `rgb` is (H, W, 3) uint8; `depth` is (H, W) float32 metres along the optical axis, 0 where there is no reading;
     `stamp` is the simulated second of the exposure; `number` counts exposures of this camera since the start.
-    `joints` are the encoder readings (6,) rad of the arm that carries the camera, at the exposure; None for a fixed one.
+    `joints` are the encoder readings (6,) rad, at the exposure, of the arm that carries the camera; None for a fixed
+    one.
     """
 
     camera: str

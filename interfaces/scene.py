@@ -11,7 +11,7 @@ EARTH_GRAVITY = 9.81  # m/s2
 
 @dataclass(frozen=True)
 class Obstacle:
-    """A foam piece: a box turned by `yaw` rad about z, and the thin stand under it when it does not stand on the floor."""
+    """A foam piece: a box turned by `yaw` rad about z, and the thin stand under one that is off the floor."""
 
     box: Box
     yaw: float
@@ -20,7 +20,7 @@ class Obstacle:
 
 @dataclass(frozen=True)
 class JawOpens:
-    """The right jaw opens for `seconds` when the held end has gone the share `carried` of the way from socket to clip."""
+    """The right jaw opens for `seconds` once the held end has gone the share `carried` of the way socket to clip."""
 
     carried: float
     seconds: float

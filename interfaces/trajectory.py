@@ -10,7 +10,7 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """Joint samples in time: `times` (n,) s from 0, strictly increasing; `positions` and `velocities` (n, 6) rad, rad/s."""
+    """Joint samples: `times` (n,) s from 0, strictly increasing; `positions`, `velocities` (n, 6) rad, rad/s."""
 
     times: FloatArray
     positions: FloatArray
@@ -22,7 +22,7 @@ class Trajectory:
         return float(self.times[-1])
 
     def sample(self, t: float) -> tuple[FloatArray, FloatArray]:
-        """Position (6,) rad and velocity (6,) rad/s at second `t`, by cubic Hermite interpolation; clamped at the ends."""
+        """Position (6,) rad and velocity (6,) rad/s at second `t`: cubic Hermite pieces, clamped at the ends."""
         if t <= 0.0:
             return self.positions[0], self.velocities[0]
         if t >= self.times[-1]:

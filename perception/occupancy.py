@@ -60,11 +60,17 @@ class Occupancy:
         """Centres (n, 3) m, world frame, of the voxels seen or assumed to be full."""
         return np.asarray(self._centers[self._state >= Voxel.BEHIND])
 
-    def integrate(self, frame: RgbdFrame, world_from_camera: RigidTransform, ignore: Sequence[Spheres] = ()) -> None:
+    def integrate(
+        self,
+        frame: RgbdFrame,
+        world_from_camera: RigidTransform,
+        ignore: Sequence[Spheres] = (),
+        assumed_depth: float = ASSUMED_DEPTH,
+    ) -> None:
         """Take in a frame. Depth readings within `ROBOT_MARGIN` of the `ignore` spheres, the arms, are no obstacles.
 
         Each voxel in view is compared with the reading on its pixel: before it the voxel is free, at it a surface, up
-        to `ASSUMED_DEPTH` behind it assumed full. A look overrules a guess, and any look but from much closer.
+        to `assumed_depth` m behind it assumed full. A look overrules a guess, and any look but from much closer.
         """
         k = subsampled(frame.intrinsics, STEP)
         depth = cv2.medianBlur(np.where(np.isfinite(frame.depth), frame.depth, 0), 3)[::STEP, ::STEP]
@@ -82,13 +88,15 @@ class Occupancy:
         pixels = np.nan_to_num(np.rint(project(local, k)), nan=-1.0)
         seen = np.flatnonzero(np.all((pixels >= 0) & (pixels < [k.width, k.height]), axis=1))
         u, v = pixels[seen].astype(int).T
-        self._update(seen, local[seen, 2], depth[v, u], through[v, u], solid[v, u])
+        self._update(assumed_depth, seen, local[seen, 2], depth[v, u], through[v, u], solid[v, u])
 
-    def _update(self, seen: NDArray[np.intp], z: FloatArray, reading: Depth, through: Depth, solid: Mask) -> None:
+    def _update(
+        self, assumed_depth: float, seen: NDArray[np.intp], z: FloatArray, reading: Depth, through: Depth, solid: Mask
+    ) -> None:
         """Voxels `seen` (n,) at depth `z` against their pixels: the `reading`, and how far one looks `through`."""
         free = z < through
         surface = solid & (np.abs(z - reading) <= self.h)
-        behind = solid & (z > reading + self.h) & (z <= reading + ASSUMED_DEPTH)
+        behind = solid & (z > reading + self.h) & (z <= reading + assumed_depth)
         state = self._state[seen]
         open_to_look = (state == Voxel.UNSEEN) | (state == Voxel.BEHIND) | (z <= CLOSER * self._range[seen])
         for looked, value in ((free, Voxel.FREE), (surface, Voxel.SURFACE)):

@@ -10,7 +10,7 @@ from interfaces.cell import KnownCell
 from interfaces.devices import Camera, Clock
 from interfaces.frame import RgbdFrame
 from perception.depth_scale import panel_scale
-from perception.occupancy import Occupancy, Spheres
+from perception.occupancy import ASSUMED_DEPTH, Occupancy, Spheres
 from perception.rgbd_pose import Estimate, NoEstimate, estimate
 from perception.track import ConnectorTrack
 
@@ -71,8 +71,12 @@ class Perception:
         return self._scale[camera]
 
     def map_obstacles(self, camera: str) -> int:
-        """Take the newest frame into the occupancy; the number of occupied voxels."""
+        """Take the newest frame into the occupancy; the number of occupied voxels.
+
+        Only the rear camera's look makes a guess of what lies behind a surface: slanting looks would put it beside.
+        """
         frame = self.frame(camera)
         if frame is not None:
-            self.occupancy.integrate(frame, self._pose_of(frame), self._arm_spheres())
+            depth = ASSUMED_DEPTH if camera == "rear" else 0.0
+            self.occupancy.integrate(frame, self._pose_of(frame), self._arm_spheres(), depth)
         return len(self.occupancy.occupied_points())

@@ -1,8 +1,8 @@
 """The cable: one chain of capsules with spherical joints and an explicit spring-damper torque at every step.
 
 Discretised rod: bending stiffness k = EI / l between links, 2 k at the clamp. An explicit spring is stable only while
-k dt^2 / I is small, so each link's inertia has a floor, and its joint damping a cap, both from the step (measured: without
-the joint damping the explicit spring gains energy). Material damping is Rayleigh's mass-proportional term.
+k dt^2 / I is small, so each link's inertia has a floor, and its joint damping a cap, both from the step (measured:
+without the joint damping the explicit spring gains energy). Material damping is Rayleigh's mass-proportional term.
 """
 
 from dataclasses import dataclass
@@ -22,11 +22,12 @@ JOINT_DAMPING = 0.6  # share of the critical step damping
 _IDENTITY = [0.0, 0.0, 0.0, 1.0]
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+@numba.njit(cache=True)
 def spring_torques(rotations: FloatArray, rates: FloatArray, stiffness: FloatArray, damping: FloatArray) -> FloatArray:
     """Joint torques (n, 3) N m of linear springs on the rotation vectors.
 
-    `rotations` (n, 4) are the joints' quaternions x, y, z, w; `rates` (n, 3) rad/s and the result are in the child frames.
+    `rotations` (n, 4) are the joints' quaternions x, y, z, w; `rates` (n, 3) rad/s and the result are in the child
+    frames; `stiffness` (n,) N m/rad, `damping` (n,) N m s/rad.
     """
     torques = np.empty_like(rates)
     for i in range(rotations.shape[0]):
@@ -42,7 +43,7 @@ def spring_torques(rotations: FloatArray, rates: FloatArray, stiffness: FloatArr
 
 
 def first_frequency(stiffness: float, length: float, mass_per_length: float, tip_mass: float) -> float:
-    """First bending frequency in rad/s of a cantilever with a tip mass (Rayleigh: 0.243 of the beam's mass at the tip)."""
+    """First bending frequency, rad/s, of a cantilever with a tip mass (Rayleigh: 0.243 of the beam's mass joins it)."""
     return float(np.sqrt(3 * stiffness / ((tip_mass + 0.243 * mass_per_length * length) * length**3)))
 
 
@@ -84,20 +85,23 @@ class CableBody:
         return RigidTransform.from_components(s[4], Rotation.from_quat(s[5])), np.array(s[6]), np.array(s[7])
 
     def energy(self) -> float:
-        """Kinetic plus bending energy in J (without gravity); the links' inertia floor counts, as it does in the motion."""
+        """Kinetic plus bending energy in J (without gravity); the links' inertia floor counts, as in the motion."""
+        return self._kinetic_energy() + self._bending_energy()
+
+    def _kinetic_energy(self) -> float:
         links = range(self.links + 1)
-        states = p.getLinkStates(self.body, links, 1, 1, physicsClientId=self.client)
-        kinetic = 0.0
-        for link, s in zip(links, states, strict=True):
-            info = p.getDynamicsInfo(self.body, link, physicsClientId=self.client)
+        energy = 0.0
+        for link, s in zip(links, p.getLinkStates(self.body, links, 1, 1, physicsClientId=self.client), strict=True):
+            mass, _, inertia = p.getDynamicsInfo(self.body, link, physicsClientId=self.client)[:3]
             turn = np.array(p.getMatrixFromQuaternion(s[1])).reshape(3, 3)
             rate = turn.T @ np.array(s[7])
-            kinetic += 0.5 * info[0] * float(np.dot(s[6], s[6])) + 0.5 * float(np.dot(info[2], rate**2))
-        joints = p.getJointStatesMultiDof(self.body, range(self.links), physicsClientId=self.client)
-        vectors = spring_torques(
-            np.array([j[0] for j in joints]), np.zeros((self.links, 3)), np.ones(self.links), np.zeros(self.links)
-        )
-        return kinetic + 0.5 * float(np.sum(self.stiffness * np.sum(vectors**2, axis=1)))
+            energy += 0.5 * mass * float(np.dot(s[6], s[6])) + 0.5 * float(np.dot(inertia, rate**2))
+        return energy
+
+    def _bending_energy(self) -> float:
+        states = p.getJointStatesMultiDof(self.body, range(self.links), physicsClientId=self.client)
+        bend = Rotation.from_quat([s[0] for s in states]).magnitude()
+        return 0.5 * float(np.sum(self.stiffness * bend**2))
 
 
 def build_cable(
@@ -105,71 +109,103 @@ def build_cable(
 ) -> CableBody:
     """Create the chain, straight and at rest. `stiffness` is EI in N m2, `step` the physics step in s."""
     n, length = cable.links, cable.length / cable.links
-    mass = cable.mass_per_length * length
     bend = stiffness / length
-    inertia_floor = max(4 * bend * step**2 / STABILITY**2, mass * length**2 / 12)
-    along_x = p.getQuaternionFromEuler([0.0, np.pi / 2, 0.0])
-
-    def shapes(
-        radius: float, size: float, offset: float, color: tuple[float, float, float], round_ends: bool
-    ) -> tuple[int, int]:
-        kind = p.GEOM_CAPSULE if round_ends else p.GEOM_CYLINDER
-        frame = {"FramePosition": [offset, 0, 0], "FrameOrientation": along_x}
-        c = p.createCollisionShape(
-            kind, radius=radius, height=size, physicsClientId=client, **{f"collision{k}": v for k, v in frame.items()}
-        )
-        v = p.createVisualShape(
-            kind,
-            radius=radius,
-            length=size,
-            rgbaColor=[*color, 1],
-            physicsClientId=client,
-            **{f"visual{k}": v for k, v in frame.items()},
-        )
-        return c, v
-
-    link_shape = shapes(cable.radius, length, length / 2, cable.color, True)
-    end_shape = shapes(connector.radius, connector.length, 0.0, connector.color, False)
-    origin = pose_along(cable.anchor, cable.anchor_axis)
-    body = p.createMultiBody(
-        0,
-        -1,
-        -1,
-        origin.translation.tolist(),
-        origin.rotation.as_quat().tolist(),
-        linkMasses=[mass] * n + [connector_mass],
-        linkCollisionShapeIndices=[link_shape[0]] * n + [end_shape[0]],
-        linkVisualShapeIndices=[link_shape[1]] * n + [end_shape[1]],
-        linkPositions=[[0, 0, 0]] + [[length, 0, 0]] * (n - 1) + [[length + connector.length / 2, 0, 0]],
-        linkOrientations=[_IDENTITY] * (n + 1),
-        linkInertialFramePositions=[[length / 2, 0, 0]] * n + [[0, 0, 0]],
-        linkInertialFrameOrientations=[_IDENTITY] * (n + 1),
-        linkParentIndices=list(range(n + 1)),
-        linkJointTypes=[p.JOINT_SPHERICAL] * n + [p.JOINT_FIXED],
-        linkJointAxis=[[0, 0, 1]] * (n + 1),
-        physicsClientId=client,
-    )
-    rayleigh = 2 * cable.damping_ratio * first_frequency(stiffness, cable.length, cable.mass_per_length, connector_mass)
+    inertia = max(4 * bend * step**2 / STABILITY**2, cable.mass_per_length * length**3 / 12)
+    body = _create_chain(client, cable, connector, connector_mass)
+    across = _set_inertias(client, body, n, inertia, connector, connector_mass)
+    first = first_frequency(stiffness, cable.length, cable.mass_per_length, connector_mass)
     for link in range(-1, n + 1):
-        p.changeDynamics(body, link, linearDamping=rayleigh, angularDamping=0, jointDamping=0, physicsClientId=client)
-    for link in range(n):
-        p.changeDynamics(body, link, localInertiaDiagonal=[inertia_floor] * 3, physicsClientId=client)
-    r, h = connector.radius, connector.length
-    across = connector_mass * (3 * r**2 + h**2) / 12
-    p.changeDynamics(body, n, localInertiaDiagonal=[connector_mass * r**2 / 2, across, across], physicsClientId=client)
-    # The default motors of spherical joints cost forty times a step and hold the joint: off.
-    p.setJointMotorControlMultiDofArray(
-        body,
-        range(n),
-        p.POSITION_CONTROL,
-        targetPositions=[_IDENTITY] * n,
-        targetVelocities=[[0, 0, 0]] * n,
-        positionGains=[0] * n,
-        velocityGains=[0] * n,
-        forces=[[0, 0, 0]] * n,
-        physicsClientId=client,
-    )
+        p.changeDynamics(
+            body,
+            link,
+            linearDamping=2 * cable.damping_ratio * first,
+            angularDamping=0,
+            jointDamping=0,
+            physicsClientId=client,
+        )
+    _switch_motors_off(client, body, n)
     springs = np.full(n, bend)
     springs[0] *= 2
-    damping_time = JOINT_DAMPING / (step * 4 * bend / inertia_floor)
+    damping_time = JOINT_DAMPING / (step * 4 * bend / inertia)
     return CableBody(client, body, n, length, springs, springs * damping_time, across)
+
+
+def _create_chain(client: int, cable: Cable, connector: Connector, connector_mass: float) -> int:
+    n, length = cable.links, cable.length / cable.links
+    link = _shapes(client, p.GEOM_CAPSULE, cable.radius, length, length / 2, cable.color)
+    end = _shapes(client, p.GEOM_CYLINDER, connector.radius, connector.length, 0.0, connector.color)
+    collisions, visuals = zip(*[link] * n, end, strict=True)
+    origin = pose_along(cable.anchor, cable.anchor_axis)
+    return int(
+        p.createMultiBody(
+            0,
+            -1,
+            -1,
+            origin.translation.tolist(),
+            origin.rotation.as_quat().tolist(),
+            linkMasses=[cable.mass_per_length * length] * n + [connector_mass],
+            linkCollisionShapeIndices=collisions,
+            linkVisualShapeIndices=visuals,
+            linkPositions=[[0, 0, 0]] + [[length, 0, 0]] * (n - 1) + [[length + connector.length / 2, 0, 0]],
+            linkOrientations=[_IDENTITY] * (n + 1),
+            linkInertialFramePositions=[[length / 2, 0, 0]] * n + [[0, 0, 0]],
+            linkInertialFrameOrientations=[_IDENTITY] * (n + 1),
+            linkParentIndices=list(range(n + 1)),
+            linkJointTypes=[p.JOINT_SPHERICAL] * n + [p.JOINT_FIXED],
+            linkJointAxis=[[0, 0, 1]] * (n + 1),
+            physicsClientId=client,
+        )
+    )
+
+
+def _shapes(
+    client: int, kind: int, radius: float, length: float, offset: float, color: tuple[float, float, float]
+) -> tuple[int, int]:
+    """Collision and visual shape of a capsule or cylinder along x, its middle `offset` metres ahead of the frame."""
+    place, turn = [offset, 0, 0], p.getQuaternionFromEuler([0.0, np.pi / 2, 0.0])
+    collision = p.createCollisionShape(
+        kind,
+        radius=radius,
+        height=length,
+        collisionFramePosition=place,
+        collisionFrameOrientation=turn,
+        physicsClientId=client,
+    )
+    visual = p.createVisualShape(
+        kind,
+        radius=radius,
+        length=length,
+        rgbaColor=[*color, 1],
+        visualFramePosition=place,
+        visualFrameOrientation=turn,
+        physicsClientId=client,
+    )
+    return collision, visual
+
+
+def _set_inertias(
+    client: int, body: int, links: int, link_inertia: float, connector: Connector, connector_mass: float
+) -> float:
+    """Set the inertias of the links (kg m2, alike in all axes) and of the connector, a full cylinder: its transverse one."""
+    for link in range(links):
+        p.changeDynamics(body, link, localInertiaDiagonal=[link_inertia] * 3, physicsClientId=client)
+    r, h = connector.radius, connector.length
+    across = connector_mass * (3 * r**2 + h**2) / 12
+    diagonal = [connector_mass * r**2 / 2, across, across]
+    p.changeDynamics(body, links, localInertiaDiagonal=diagonal, physicsClientId=client)
+    return across
+
+
+def _switch_motors_off(client: int, body: int, links: int) -> None:
+    """Take out the default motors of the spherical joints: they cost forty times a step and hold the joints."""
+    p.setJointMotorControlMultiDofArray(
+        body,
+        range(links),
+        p.POSITION_CONTROL,
+        targetPositions=[_IDENTITY] * links,
+        targetVelocities=[[0, 0, 0]] * links,
+        positionGains=[0] * links,
+        velocityGains=[0] * links,
+        forces=[[0, 0, 0]] * links,
+        physicsClientId=client,
+    )

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from interfaces.scene import JawOpens
-from sim.arm import SimGripper
+from sim.gripper import SimGripper
 
 
 class JawOpensFault:

@@ -89,8 +89,8 @@ class SocketHold:
 class ClipHold:
     """The stow clip: rubber lips that close on an end resting in their mouth and then draw it to the seat.
 
-    Their force grows to `hold_force` over `LIP_TRAVEL` and stays there; an end drawn out past `capture_distance` is free.
-    They align the end's axis with a torque that grows likewise; turning about the end's own axis is free.
+    Their force grows to `hold_force` over `LIP_TRAVEL` and stays there; an end drawn out past `capture_distance` is
+    free. They align the end's axis with a torque that grows likewise; turning about the end's own axis is free.
     """
 
     def __init__(self, client: int, body: int, link: int, clip: Clip, mass: float, across: float, step: float) -> None:

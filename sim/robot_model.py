@@ -1,4 +1,4 @@
-"""The ViperX 300 S as a URDF, made from the `rtb-data` package: rubber pads on the fingers, a camera body on the wrist."""
+"""The ViperX 300 S as a URDF, made from the `rtb-data` package: rubber pads on the fingers, a camera on the wrist."""
 
 import xml.etree.ElementTree as ET
 from importlib.resources import files
@@ -7,9 +7,9 @@ import xacro
 
 PACKAGE = "package://trossen_descriptions/"
 NAME = "vx300s"
-# Measured on rtb-data's finger meshes: a finger's inner face stands this far behind its joint's position. The pads sit at
-# the tips: their centre, which is our tool centre, lies PAD_AHEAD of the fingers' link (the maker's ee_gripper_link is
-# 0.018 behind it), so that a finger ends 0.012 past what it holds and can hold a plug close to a panel.
+# Measured on rtb-data's finger meshes: a finger's inner face stands this far behind its joint's position. The pads sit
+# at the tips: their centre, which is our tool centre, lies PAD_AHEAD of the fingers' link (the maker's ee_gripper_link
+# is 0.018 behind it), so that a finger ends 0.012 past what it holds and can hold a plug close to a panel.
 FINGER_FACE = 0.0135
 PAD_AHEAD = 0.0565
 PAD_LENGTH = 0.024  # along the fingers, metres
@@ -18,7 +18,7 @@ CAMERA_SIZE = (0.025, 0.090, 0.025)  # D435i's body
 
 
 def robot_urdf(pad_thickness: float, camera_offset: tuple[float, float, float] | None) -> str:
-    """The URDF text. Pads are links `left_pad`, `right_pad`; `camera_offset` (m, wrist link's frame) adds a camera body."""
+    """The URDF text. Pads are links `left_pad`, `right_pad`; `camera_offset` (m, in our wrist link) adds a camera."""
     root = files("rtbdata") / "xacro" / "trossen_descriptions"
     document = xacro.process_file(str(root / "urdf" / "vx300s.urdf.xacro"), mappings={"robot_name": NAME})
     # PyBullet cannot parse a one-line URDF.
