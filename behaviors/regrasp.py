@@ -6,6 +6,8 @@ from scipy.spatial.transform import RigidTransform
 
 from behaviors.hand import HAND, HandLeaf
 from behaviors.leaf import Failed, Steps
+from motion.service import OPEN_GAP
+from perception.cable_shape import cable_course
 
 CLEAR = 0.05  # m around the connector's axis that are known to be free: it was seen there
 LIFT = 0.05  # m straight up from where it lay
@@ -26,11 +28,11 @@ class Regrasp(HandLeaf):
         points = perception.occupancy.occupied_points()
         free = points[_distance_to_axis(points, connector, 0.5 * self.services.known.connector.length) > CLEAR]
         motion.set_obstacles(free, perception.occupancy.h)
-        yield motion.pick(HAND, connector)
+        yield motion.pick(HAND, connector, cable=cable_course(self.services.known, connector))
         try:
             yield from self.grip(connector)
         except Failed:
-            motion.grippers[HAND].open(0.06)
+            motion.grippers[HAND].open(OPEN_GAP)
             yield from self.wait(0.6)
             yield from self.back_off()
             raise

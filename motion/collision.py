@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from interfaces.cell import Box
 from motion.distance_grid import FAR, DistanceGrid
 from motion.kinematics import LOWER, TOOL_OFFSET, UPPER, ArmKinematics, FloatArray, link_frames_in
-from motion.spheres import CAMERA_RADIUS, LINKS, SPHERES
+from motion.spheres import CAMERA_RADIUS, JAW_OPENING, LINKS, spheres_at
 
 IntArray = NDArray[np.int64]
 
@@ -167,8 +167,8 @@ class CollisionModel:
     """One arm, and all that it must not touch. Does not change; make a new one when the surroundings do.
 
     `camera_offset` (3,) m is where a wrist camera sits in the wrist link's frame. `other_arm` (m, 4) are another arm's
-    spheres in world (`spheres` of its model). `carried` (m, 4) are spheres fixed in the tool frame. A `margin` is
-    metres between surfaces; the arm's own links must only not touch, whatever the margin.
+    spheres in world (`spheres` of its model). `carried` (m, 4) are spheres fixed in the tool frame; the pads
+    stand `opening` m apart. A `margin` is metres between surfaces; the arm's own links must only not touch, whatever the margin.
     """
 
     def __init__(
@@ -179,10 +179,11 @@ class CollisionModel:
         other_arm: FloatArray | None = None,
         grid: DistanceGrid | None = None,
         carried: FloatArray | None = None,
+        opening: float = JAW_OPENING,
     ) -> None:
         self.kinematics = kinematics
         self._names = [box.name for box in boxes]
-        links, local = [LINKS], [SPHERES]
+        links, local = [LINKS], [spheres_at(opening)]
         pairs = list(_self_pairs(camera_offset is not None))
         if camera_offset is not None:
             links.append(np.array([5]))

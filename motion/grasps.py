@@ -11,15 +11,15 @@ from interfaces.cause import CauseCode
 from motion.collision import CollisionModel
 from motion.failure import PlanningError
 from motion.kinematics import ArmKinematics, FloatArray
+from motion.spheres import JAW_OPENING
 from motion.straight import straight_line
 
 # The palm 40 degrees off the cross direction, on the cable's side, leaves three quarters of the connector in sight.
 PREFERRED_YAW = float(np.deg2rad(40.0))
 YAWS = tuple(np.deg2rad([40.0, 25.0, 10.0, 50.0, 60.0, -10.0, -25.0, -40.0]).tolist())
-ROLLS = tuple(np.deg2rad([0, 30, -30, 60, -60, 90, -90, 120, -120, 150, -150, 180]).tolist())
+ROLLS = tuple(np.deg2rad(np.arange(-165, 181, 15)).tolist())
 _MOST_YAW = np.deg2rad(65.0)  # beyond, the jaws close along rather than across the connector
 GRIP_OFFSET = -0.02  # metres from the connector's centre: on the cable's side, the tip stays in sight
-JAW_OPENING = 0.075  # metres between the pads, 6 mm each, of fully open fingers
 _ROLL_COST = 0.3  # of a rad of roll, in rad of yaw
 _FAR = "out of reach"
 _FLIP_COST = 0.01  # orders the two equal halves of a gripper

@@ -26,11 +26,14 @@ from motion.timing import time_path
 FloatArray = NDArray[np.float64]
 
 MARGIN = 0.015  # m between the arm's spheres and anything while it moves freely
+JAW_REACH = 0.13  # m round a connector's centre where the jaw may be: half its length, a finger's width, 5 cm of palm
+_NO_POINTS = np.empty((0, 3))
 TIGHT_MARGIN = 0.005  # m where nothing is found with that
 WAYS = 12  # ways to grasp that the planner may choose from
 NEAR_MARGIN = 0.0  # m on the last straight centimetres
 APPROACH_SPEED = 0.3  # share of the joints' speed on straight ways near things
-OPEN_GAP = 0.06  # m between the pads: 20 mm to each side of the connector
+OPEN_GAP = 0.05  # m between the pads: 15 mm to each side of the connector, about 8 mm is how far off a pose may be
+GRIP_OFFSETS = (-0.02, -0.03, 0.0)  # m along the connector from its centre, tried in turn: near the cable the tip shows
 ARRIVED = 0.05  # rad: an arm that ends further from its goal was blocked
 GRID_BORDER = 0.2  # m around the voxels: no sphere of an arm is thicker
 ARM_MARGIN = 0.04  # m round an arm: 5 mm of arm error, 13 mm of depth, a voxel, and the planner's margin
@@ -68,7 +71,8 @@ class Motion:
         self._cameras = {c.mount.arm: c.mount for c in known.cameras if isinstance(c.mount, WristMount)}
         self._boxes = known.solids()
         self._grid: DistanceGrid | None = None
-        self._points, self._spacing = np.empty((0, 3)), 0.0
+        self._points = self._cable = _NO_POINTS
+        self._spacing = 0.01
         self._seed = seed
 
     def set_obstacles(self, points: FloatArray, spacing: float) -> None:
@@ -88,11 +92,12 @@ class Motion:
         self._points = self._points[np.all(distance > spheres[:, 3] + margin, axis=1)]
 
     def _rebuild_grid(self) -> None:
-        if not len(self._points):
+        points = np.vstack([self._points, self._cable])
+        if not len(points):
             self._grid = None
             return
-        lower, upper = self._points.min(axis=0) - GRID_BORDER, self._points.max(axis=0) + GRID_BORDER
-        self._grid = DistanceGrid.from_points(self._points, lower, upper, self._spacing)
+        lower, upper = points.min(axis=0) - GRID_BORDER, points.max(axis=0) + GRID_BORDER
+        self._grid = DistanceGrid.from_points(points, lower, upper, self._spacing)
 
     def _start_model(self, arm: str, held: RigidTransform | None = None) -> CollisionModel:
         """`model` for a motion that begins now: seen points that the arm touches where it stands were none.
@@ -148,6 +153,7 @@ class Motion:
             other_arm=other,
             grid=self._grid if others else None,
             carried=None if held is None else _connector_spheres(held, self.known.connector),
+            opening=2 * self.known.connector.radius if held is not None else OPEN_GAP,
         )
 
     def move(self, arm: str, goals: FloatArray, *, held: RigidTransform | None = None, speed: float = 1.0) -> Task:
@@ -172,20 +178,28 @@ class Motion:
         tool = self.tool(arm)
         return self.straight(arm, RigidTransform.from_components(tool.translation + way, tool.rotation), speed=speed)
 
-    def pick(self, arm: str, world_from_connector: RigidTransform, *, shallow: float = 0.0) -> Task:
+    def pick(
+        self, arm: str, world_from_connector: RigidTransform, *, shallow: float = 0.0, cable: FloatArray | None = None
+    ) -> Task:
         """Open the jaw, bring it around the connector near its cable side; the jaw stays open.
 
-        `shallow` metres is by how much the connector lies nearer to the finger tips than the pads' middle.
+        `shallow` metres is by how much the connector lies nearer to the finger tips than the pads' middle. The arm keeps
+        clear of the `cable`'s points (n, 3) m, except where the jaw takes hold: pushing the cable moves the connector.
         """
 
         def steps() -> Iterator[None]:
-            model, q = self._start_model(arm), self.joints(arm)
+            q = self.joints(arm)
+            self._cable = _clear_of(cable, world_from_connector.translation, JAW_REACH)
+            self._rebuild_grid()
+            model = self._start_model(arm)
             ways = self._ways_to_grasp(arm, model, world_from_connector, shallow)
             self.grippers[arm].open(OPEN_GAP)
             path = self._plan(model, q, np.array([way[0] for way in ways]))
             way = min(ways, key=lambda way: float(np.abs(way[0] - path[-1]).max()))
             yield from self._follow(arm, path, 1.0)
             yield from self._follow(arm, np.vstack([self.joints(arm), way[1:]]), APPROACH_SPEED)
+            self._cable = _NO_POINTS
+            self._rebuild_grid()
 
         return self._task(arm, steps())
 
@@ -226,7 +240,13 @@ class Motion:
         """Ways in (k, 6) from standoff to grasp of the cheapest candidates that work, at most `WAYS`."""
         kin, near, q = self.kinematics[arm], self.model(arm, clip=False), self.joints(arm)
         connector = self.known.connector
-        left = grasp_candidates(world_from_connector, connector.length, connector.radius, shallow=shallow)
+        left = [
+            grasp
+            for offset in GRIP_OFFSETS
+            for grasp in grasp_candidates(
+                world_from_connector, connector.length, connector.radius, offset, shallow=shallow
+            )
+        ]
         ways: list[FloatArray] = []
         while left and len(ways) < WAYS:
             try:
@@ -261,3 +281,10 @@ def _connector_spheres(held: RigidTransform, connector: Connector) -> FloatArray
     along = (0.5 * connector.length - connector.radius) * np.array([-1.0, 0.0, 1.0])
     centers = held.apply(np.column_stack([along, np.zeros(3), np.zeros(3)]))
     return np.column_stack([centers, np.full(3, 1.2 * connector.radius)])
+
+
+def _clear_of(points: FloatArray | None, place: FloatArray, radius: float) -> FloatArray:
+    """The points (n, 3) further than `radius` m from a place (3,)."""
+    if points is None:
+        return _NO_POINTS
+    return points[np.linalg.norm(points - place, axis=1) > radius]

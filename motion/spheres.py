@@ -6,6 +6,7 @@ no mesh point lies more than 3 mm outside. Fingers stand fully open, 0.057 m eac
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
 # link frame (0 base ... 6 last link), centre x, y, z in that frame, radius; metres
 _ROWS = [
@@ -41,8 +42,8 @@ _ROWS = [
     (6, 0.0217, 0.0001, 0.0213, 0.029),
     (6, 0.0446, -0.0183, -0.0164, 0.033),
     (6, 0.0476, 0.0191, -0.0173, 0.033),
-    (6, 0.0567, -0.0602, -0.0016, 0.032),
-    (6, 0.0566, 0.0600, -0.0002, 0.033),
+    (6, 0.0567, -0.0540, -0.0016, 0.030),
+    (6, 0.0566, 0.0540, -0.0002, 0.030),
     (6, 0.0474, 0.0229, 0.0097, 0.033),
     (6, 0.0494, -0.0189, 0.0159, 0.034),
 ]
@@ -57,7 +58,16 @@ _ROWS += [(0, 0.042 * np.cos(a), 0.042 * np.sin(a), 0.052, 0.038) for a in np.ar
 _ROWS += [(0, x, y, 0.024, 0.043) for x in (-0.170, -0.125, -0.085) for y in (-0.03, 0.03)]  # box behind the column
 _ROWS += [(1, 0.0, y, z, 0.0255) for y in (-0.038, -0.012, 0.012, 0.038) for z in (0.018, 0.045)]  # yoke
 _ROWS += [(6, x, sy * y, sz * z, r) for sy in (-1, 1) for x, y, z, r in _FINGER for sz in (-1, 1)]
+_FINGERS = slice(len(_ROWS) - 4 * len(_FINGER), None)
+JAW_OPENING = 0.075  # metres between the pads, 6 mm each, of fully open fingers
 
 LINKS = np.array([row[0] for row in _ROWS], dtype=np.int64)
 SPHERES = np.array([row[1:] for row in _ROWS], dtype=np.float64)  # (n, 4): centre and radius
 CAMERA_RADIUS = 0.025  # metres; a RealSense is 0.09 x 0.025 x 0.025
+
+
+def spheres_at(opening: float) -> NDArray[np.float64]:
+    """`SPHERES` (n, 4) with the pads `opening` metres apart."""
+    moved = SPHERES.copy()
+    moved[_FINGERS, 1] -= np.sign(moved[_FINGERS, 1]) * 0.5 * (JAW_OPENING - opening)
+    return moved

@@ -60,8 +60,7 @@ class SimArm:
         self.offsets = self._draw_offsets(errors.arm_tool, rng)
         self._trajectory: Trajectory | None = None
         self._started = 0.0
-        self._command = np.array(spec.sleep, float)
-        self._place(self._command)
+        self._place(np.array(spec.sleep, float))
         self.gripper = SimGripper(client, self.body, self.links, self.now, gripper, errors, rng)
 
     def reading(self) -> JointReading:
@@ -95,7 +94,7 @@ class SimArm:
         q, v = self._trajectory.sample(self.now() - self._started)
         seconds = float(np.max(np.abs(v))) / BRAKE
         if seconds < self._dt:
-            self._command, self._trajectory = q, None
+            self._trajectory = None
             self._drive(q, np.zeros(6))
             return
         times = np.linspace(0.0, seconds, 12)
@@ -125,7 +124,7 @@ class SimArm:
             t = self.now() + self._dt - self._started
             q, v = self._trajectory.sample(t)
             if t >= self._trajectory.duration:
-                self._command, self._trajectory, v = q, None, np.zeros(6)
+                self._trajectory, v = None, np.zeros(6)
             self._drive(q, v)
         self.gripper.step()
         self._steps += 1

@@ -186,7 +186,7 @@ def _shapes(
 def _set_inertias(
     client: int, body: int, links: int, link_inertia: float, connector: Connector, connector_mass: float
 ) -> float:
-    """Set the inertias of the links (kg m2, alike in all axes) and of the connector, a full cylinder: its transverse one."""
+    """Set the links' inertia (kg m2, about every axis) and the connector's; returns the latter's across its axis."""
     for link in range(links):
         p.changeDynamics(body, link, localInertiaDiagonal=[link_inertia] * 3, physicsClientId=client)
     r, h = connector.radius, connector.length

@@ -1,4 +1,4 @@
-"""The ViperX's jaw: two coupled fingers that hold by friction only, a noisy finger encoder, and a fault that opens it."""
+"""The ViperX's jaw: two coupled fingers that hold by friction only, and their noisy encoder."""
 
 from collections.abc import Callable, Mapping
 

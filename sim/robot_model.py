@@ -15,6 +15,9 @@ PAD_AHEAD = 0.0565
 PAD_LENGTH = 0.024  # along the fingers, metres
 PAD_HEIGHT = 0.018
 CAMERA_SIZE = (0.025, 0.090, 0.025)  # D435i's body
+BRACKET = (0.008, 0.030)  # m, thickness and width of what carries the camera from the wrist's axis up: seen, never felt
+# The real arms are black. Choice: grey enough that in light no part of them is as dark as the cable.
+ARM_COLOR = (0.30, 0.30, 0.31)
 
 
 def robot_urdf(pad_thickness: float, camera_offset: tuple[float, float, float] | None) -> str:
@@ -24,6 +27,7 @@ def robot_urdf(pad_thickness: float, camera_offset: tuple[float, float, float] |
     # PyBullet cannot parse a one-line URDF.
     text = document.toprettyxml(indent=" ").replace(PACKAGE, f"{root}/")
     robot = ET.fromstring(text)
+    _set_color(robot.find("material"))
     for finger, side in (("left", 1.0), ("right", -1.0)):
         # The finger link's origin is at its joint's position: the face is FINGER_FACE nearer to the middle.
         y = -side * (FINGER_FACE + pad_thickness / 2)
@@ -38,7 +42,9 @@ def robot_urdf(pad_thickness: float, camera_offset: tuple[float, float, float] |
     if camera_offset is not None:
         # The optical centre sits at the front of the body; the URDF's wrist link is ours turned by pi about x.
         behind = (camera_offset[0] - CAMERA_SIZE[0] / 2 - 0.004, -camera_offset[1], -camera_offset[2])
-        _add_box(robot, "camera_body", f"{NAME}/wrist_link", behind, CAMERA_SIZE, (0.75, 0.75, 0.75))
+        body = _add_box(robot, "camera_body", f"{NAME}/wrist_link", behind, CAMERA_SIZE, (0.75, 0.75, 0.75))
+        span = camera_offset[2]
+        _add_visual(body, (*BRACKET, span), ARM_COLOR, (0.0, 0.0, span / 2))
     ET.indent(robot)
     return ET.tostring(robot, encoding="unicode")
 
@@ -60,19 +66,43 @@ def _add_box(
     position: tuple[float, float, float],
     size: tuple[float, float, float],
     color: tuple[float, float, float],
-) -> None:
+) -> ET.Element:
+    """A box fixed on the link `parent`; returns its own link."""
     link = ET.SubElement(robot, "link", name=name)
-    for kind in ("visual", "collision"):
-        element = ET.SubElement(link, kind)
-        geometry = ET.SubElement(element, "geometry")
-        ET.SubElement(geometry, "box", size=" ".join(map(str, size)))
-        if kind == "visual":
-            material = ET.SubElement(element, "material", name=f"{name}_color")
-            ET.SubElement(material, "color", rgba=" ".join(map(str, (*color, 1))))
+    _add_visual(link, size, color, (0.0, 0.0, 0.0))
+    ET.SubElement(ET.SubElement(ET.SubElement(link, "collision"), "geometry"), "box", size=_numbers(size))
     inertial = ET.SubElement(link, "inertial")
     ET.SubElement(inertial, "mass", value="0.005")
     ET.SubElement(inertial, "inertia", ixx="1e-6", iyy="1e-6", izz="1e-6", ixy="0", ixz="0", iyz="0")
     joint = ET.SubElement(robot, "joint", name=f"{name}_joint", type="fixed")
     ET.SubElement(joint, "parent", link=parent)
     ET.SubElement(joint, "child", link=name)
-    ET.SubElement(joint, "origin", xyz=" ".join(map(str, position)), rpy="0 0 0")
+    ET.SubElement(joint, "origin", xyz=_numbers(position), rpy="0 0 0")
+    return link
+
+
+def _add_visual(
+    link: ET.Element,
+    size: tuple[float, float, float],
+    color: tuple[float, float, float],
+    position: tuple[float, float, float],
+) -> None:
+    """A box that is seen, at `position` in the link."""
+    visual = ET.SubElement(link, "visual")
+    ET.SubElement(visual, "origin", xyz=_numbers(position), rpy="0 0 0")
+    ET.SubElement(ET.SubElement(visual, "geometry"), "box", size=_numbers(size))
+    material = ET.SubElement(visual, "material", name=f"{link.get('name')}_color_{len(link)}")
+    ET.SubElement(material, "color", rgba=_numbers((*color, 1.0)))
+
+
+def _set_color(material: ET.Element | None) -> None:
+    """Put the arms' colour in the place of the texture of rtb-data's only material."""
+    if material is None:
+        raise ValueError("rtb-data's ViperX model names no material")
+    material.clear()
+    material.set("name", "interbotix_black")
+    ET.SubElement(material, "color", rgba=_numbers((*ARM_COLOR, 1.0)))
+
+
+def _numbers(values: tuple[float, ...]) -> str:
+    return " ".join(map(str, values))

@@ -9,21 +9,21 @@ from collections.abc import Callable
 import numpy as np
 import pybullet as p
 from numpy.typing import NDArray
-from scipy.spatial.transform import RigidTransform, Rotation, Slerp
+from scipy.spatial.transform import RigidTransform, Rotation
 
-from interfaces.cell import Box, Cell, Socket, WristMount
-from interfaces.scene import EARTH_GRAVITY, Gravity, JawOpens, Obstacle
+from interfaces.cell import Cell, WristMount
+from interfaces.scene import Gravity, JawOpens, Obstacle
 from sim.arm import SimArm
-from sim.cable import build_cable
+from sim.build import build_boxes, configure, filter_collisions, lay_cable
+from sim.cable import CableBody, build_cable
 from sim.camera import SimCamera, camera_error
 from sim.depth_noise import DepthNoise
 from sim.faults import JawOpensFault
-from sim.fixtures import ClipHold, Hold, SocketHold
+from sim.fixtures import ClipHold, SocketHold
 from sim.renderer import LightState, RendererName, make_renderer
 from sim.visuals import Visuals
 
 FloatArray = NDArray[np.float64]
-LAY_SECONDS, SETTLE_SECONDS = 1.5, 2.5  # the cable is drawn from straight into its socket, then comes to rest
 CONTACT_EVERY = 4  # physics steps between looks at the arms' contacts
 
 
@@ -45,38 +45,15 @@ class World:
         self.step_seconds = 1.0 / cell.hidden.step_rate
         self._steps = 0
         errors_rng, light_rng = (np.random.default_rng(s) for s in np.random.SeedSequence([seed, 1]).spawn(2))
-        self._configure(gravity)
-        self.boxes = self._build_boxes(obstacles)
-        hidden, known = cell.hidden, cell.known
-        mounts = {c.mount.arm: c.mount.offset for c in known.cameras if isinstance(c.mount, WristMount)}
-        self.arms = {
-            spec.name: SimArm(
-                self.client, spec, hidden.gripper, hidden.errors, self.step_seconds, mounts.get(spec.name), errors_rng
-            )
-            for spec in known.arms
-        }
-        stiffness = hidden.cable.stiffness.zero if gravity == "zero" else hidden.cable.stiffness.earth
-        self.cable = build_cable(
-            self.client, hidden.cable, known.connector, hidden.connector_mass, stiffness, self.step_seconds
+        configure(self.client, cell.hidden, gravity)
+        self.boxes = build_boxes(self.client, cell.known, obstacles)
+        self.arms = self._build_arms(errors_rng)
+        self.cable = self._build_cable()
+        self._named = filter_collisions(
+            self.client, cell.known, self.boxes, {arm.body: name for name, arm in self.arms.items()}, self.cable
         )
-        p.changeDynamics(
-            self.cable.body,
-            self.cable.connector_link,
-            lateralFriction=hidden.connector_friction,
-            spinningFriction=0.005,
-            physicsClientId=self.client,
-        )
-        self._filter_collisions()
         self.socket = self._plug()
-        self.clip = ClipHold(
-            self.client,
-            self.cable.body,
-            self.cable.connector_link,
-            known.clip,
-            hidden.connector_mass,
-            self.cable.connector_inertia,
-            self.step_seconds,
-        )
+        self.clip = self._build_clip()
         self.faults = self._build_faults(faults)
         self.contact_peaks: dict[str, float] = {}
         self._connector, self._velocity, self._rate = self.cable.connector_state()
@@ -130,11 +107,15 @@ class World:
         self.socket.step()
         if self._steps % CONTACT_EVERY == 0:
             self._watch_contacts()
-            if not self.socket.holds:
-                for fault in self.faults:
-                    if fault.fired_at is None:
-                        fault.step(self.now(), self._connector.translation, all(self.pads_touching("right")))
+            self._watch_faults()
         self._expose()
+
+    def _watch_faults(self) -> None:
+        if self.socket.holds or all(fault.fired_at is not None for fault in self.faults):
+            return
+        held = all(self.pads_touching("right"))
+        for fault in self.faults:
+            fault.step(self.now(), self._connector.translation, held)
 
     def _expose(self) -> None:
         rate = self.cell.hidden.step_rate
@@ -156,76 +137,48 @@ class World:
                 key = f"{name} arm - {other}"
                 self.contact_peaks[key] = max(self.contact_peaks.get(key, 0.0), force)
 
-    def _configure(self, gravity: Gravity) -> None:
-        p.resetSimulation(physicsClientId=self.client)
-        p.setGravity(0, 0, -EARTH_GRAVITY if gravity == "earth" else 0.0, physicsClientId=self.client)
-        p.setTimeStep(self.step_seconds, physicsClientId=self.client)
-        p.setPhysicsEngineParameter(
-            numSolverIterations=self.cell.hidden.solver_iterations,
-            deterministicOverlappingPairs=1,
+    def _build_arms(self, rng: np.random.Generator) -> dict[str, SimArm]:
+        known, hidden = self.cell.known, self.cell.hidden
+        mounts = {c.mount.arm: c.mount.offset for c in known.cameras if isinstance(c.mount, WristMount)}
+        return {
+            spec.name: SimArm(
+                self.client, spec, hidden.gripper, hidden.errors, self.step_seconds, mounts.get(spec.name), rng
+            )
+            for spec in known.arms
+        }
+
+    def _build_cable(self) -> CableBody:
+        hidden = self.cell.hidden
+        stiffness = hidden.cable.stiffness.zero if self.gravity == "zero" else hidden.cable.stiffness.earth
+        cable = build_cable(
+            self.client, hidden.cable, self.cell.known.connector, hidden.connector_mass, stiffness, self.step_seconds
+        )
+        p.changeDynamics(
+            cable.body,
+            cable.connector_link,
+            lateralFriction=hidden.connector_friction,
+            spinningFriction=0.005,
             physicsClientId=self.client,
         )
-
-    def _build_boxes(self, obstacles: tuple[Obstacle, ...]) -> dict[str, int]:
-        known = self.cell.known
-        bodies = {box.name: self._box(box) for box in (*known.boxes, *known.clip.bracket)}
-        bodies |= {socket.name: self._socket_block(socket) for socket in known.sockets}
-        for obstacle in obstacles:
-            turn = Rotation.from_euler("z", obstacle.yaw)
-            bodies[f"obstacle {obstacle.box.name}"] = self._box(obstacle.box, turn)
-            if obstacle.stand is not None:
-                bodies[f"obstacle {obstacle.stand.name}"] = self._box(obstacle.stand, turn)
-        return bodies
-
-    def _box(self, box: Box, turn: Rotation | None = None) -> int:
-        half = [s / 2 for s in box.size]
-        collision = p.createCollisionShape(p.GEOM_BOX, halfExtents=half, physicsClientId=self.client)
-        visual = p.createVisualShape(
-            p.GEOM_BOX, halfExtents=half, rgbaColor=[*box.color, 1], physicsClientId=self.client
-        )
-        turn = Rotation.identity() if turn is None else turn
-        body = p.createMultiBody(0, collision, visual, box.center, turn.as_quat().tolist(), physicsClientId=self.client)
-        p.changeDynamics(body, -1, lateralFriction=0.5, physicsClientId=self.client)
-        return int(body)
-
-    def _socket_block(self, socket: Socket) -> int:
-        # A plug that goes in along y needs the block turned so that its y edge is the axis; one along -y is the same box.
-        axis = np.asarray(socket.axis) / np.linalg.norm(socket.axis)
-        tilt = Rotation.from_euler("x", float(np.arctan2(axis[2], abs(axis[1]))) * float(np.sign(axis[1])))
-        return self._box(Box(name=socket.name, center=socket.center, size=socket.size, color=socket.color), tilt)
-
-    def _filter_collisions(self) -> None:
-        """Switch off the pairs that are joined by design: bases and floor, the plug and what takes it in, the clamp."""
-        for arm in self.arms.values():
-            p.setCollisionFilterPair(arm.body, self.boxes["floor"], -1, -1, 0, physicsClientId=self.client)
-        cable, plug = self.cable.body, self.cable.connector_link
-        takers = [s.name for s in self.cell.known.sockets] + [b.name for b in self.cell.known.clip.bracket]
-        for name in takers:
-            p.setCollisionFilterPair(cable, self.boxes[name], plug, -1, 0, physicsClientId=self.client)
-        right_end = self.cell.known.sockets[-1].name
-        for link in range(4):
-            for name in (right_end, "right_panel"):
-                p.setCollisionFilterPair(cable, self.boxes[name], link, -1, 0, physicsClientId=self.client)
-        allowed = {cable, *(self.boxes[n] for n in takers)}
-        self._named = {body: name for name, body in self.boxes.items() if body not in allowed}
-        self._named |= {arm.body: name for name, arm in self.arms.items()}
+        return cable
 
     def _plug(self) -> SocketHold:
         """Lay the straight cable into its socket and let it come to rest, before time begins."""
         known = self.cell.known
         socket = known.socket(known.plugged_into)
-        start, _, _ = self.cable.connector_state()
         goal = socket.world_from_plug(known.connector.length)
-        hold = Hold(self.client, self.cable.body, self.cable.connector_link, start)
-        turn = Slerp([0, 1], Rotation.concatenate([start.rotation, goal.rotation]))
-        steps = round(LAY_SECONDS / self.step_seconds)
-        for i in range(steps + round(SETTLE_SECONDS / self.step_seconds)):
-            s = min(1.0, (i + 1) / steps)
-            s = s * s * (3 - 2 * s)
-            hold.move(RigidTransform.from_components((1 - s) * start.translation + s * goal.translation, turn(s)))
-            self.cable.apply_springs()
-            p.stepSimulation(physicsClientId=self.client)
-        return SocketHold(hold, socket.pull_out_force)
+        return SocketHold(lay_cable(self.client, self.cable, goal, self.step_seconds), socket.pull_out_force)
+
+    def _build_clip(self) -> ClipHold:
+        return ClipHold(
+            self.client,
+            self.cable.body,
+            self.cable.connector_link,
+            self.cell.known.clip,
+            self.cell.hidden.connector_mass,
+            self.cable.connector_inertia,
+            self.step_seconds,
+        )
 
     def _build_faults(self, faults: tuple[JawOpens, ...]) -> list[JawOpensFault]:
         known = self.cell.known
@@ -242,7 +195,7 @@ class World:
 
     def _build_cameras(self, seed: int, rng: np.random.Generator) -> dict[str, SimCamera]:
         known, errors = self.cell.known, self.cell.hidden.errors
-        cameras = {}
+        cameras: dict[str, SimCamera] = {}
         for spec in known.cameras:
             error = camera_error(errors, rng)
             mount = spec.mount

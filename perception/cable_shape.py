@@ -1,0 +1,24 @@
+"""Where the cable runs, from what is known of its two ends."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicHermiteSpline
+from scipy.spatial.transform import RigidTransform
+
+from interfaces.cell import KnownCell
+
+
+def cable_course(known: KnownCell, world_from_connector: RigidTransform, spacing: float = 0.01) -> NDArray[np.float64]:
+    """Points (n, 3) m about `spacing` apart along the cable of a connector at rest, from the plugged end to the loose one.
+
+    A cubic between the two ends with their directions: the shape of a lightly bent rod (small deflections). The plugged
+    end's socket is the one that the loose end was not plugged into and whose face the cable leaves: the last of the cell.
+    """
+    socket = known.sockets[-1]
+    axis = np.asarray(socket.axis) / np.linalg.norm(socket.axis)
+    start = np.asarray(socket.center) - 0.5 * socket.size[1] * axis
+    end = world_from_connector.apply([-0.5 * known.connector.length, 0.0, 0.0])
+    direction = world_from_connector.rotation.apply([1.0, 0.0, 0.0])
+    chord = float(np.linalg.norm(end - start))
+    curve = CubicHermiteSpline([0.0, chord], np.stack([start, end]), np.stack([-axis, direction]))
+    return np.asarray(curve(np.linspace(0.0, chord, max(2, round(chord / spacing)))))

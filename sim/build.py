@@ -1,0 +1,91 @@
+"""What a world is made of: physics settings, bodies that stand fast, which pairs may touch, the cable in its socket."""
+
+from collections.abc import Mapping
+
+import numpy as np
+import pybullet as p
+from scipy.spatial.transform import RigidTransform, Rotation, Slerp
+
+from interfaces.cell import Box, HiddenWorld, KnownCell, Socket
+from interfaces.scene import EARTH_GRAVITY, Gravity, Obstacle
+from sim.cable import CableBody
+from sim.fixtures import Hold
+
+LAY_SECONDS, SETTLE_SECONDS = 1.5, 2.5  # the cable is drawn from straight into its socket, then comes to rest
+BOX_FRICTION = 0.5
+CLAMPED_LINKS = 4  # so many links at the cable's fixed end may pass through the socket and panel that they start in
+
+
+def configure(client: int, hidden: HiddenWorld, gravity: Gravity) -> None:
+    """Empty the client and set its gravity, step and solver."""
+    p.resetSimulation(physicsClientId=client)
+    p.setGravity(0, 0, -EARTH_GRAVITY if gravity == "earth" else 0.0, physicsClientId=client)
+    p.setTimeStep(1.0 / hidden.step_rate, physicsClientId=client)
+    p.setPhysicsEngineParameter(
+        numSolverIterations=hidden.solver_iterations, deterministicOverlappingPairs=1, physicsClientId=client
+    )
+
+
+def build_boxes(client: int, known: KnownCell, obstacles: tuple[Obstacle, ...]) -> dict[str, int]:
+    """Body ids of all that stands fast: floor, panels, clip bracket, sockets, and `obstacle NAME` for the obstacles."""
+    bodies = {box.name: _box(client, box) for box in (*known.boxes, *known.clip.bracket)}
+    bodies |= {socket.name: _socket_block(client, socket) for socket in known.sockets}
+    for obstacle in obstacles:
+        turn = Rotation.from_euler("z", obstacle.yaw)
+        for box in (obstacle.box, obstacle.stand):
+            if box is not None:
+                bodies[f"obstacle {box.name}"] = _box(client, box, turn)
+    return bodies
+
+
+def filter_collisions(
+    client: int, known: KnownCell, boxes: Mapping[str, int], arms: Mapping[int, str], cable: CableBody
+) -> dict[int, str]:
+    """Switch off the pairs that are joined by design: bases and floor, the plug and what takes it in, the clamp.
+
+    `arms` names the arms' bodies. Returns the names of the bodies that an arm must not touch: all but the cable, the
+    sockets and the clip.
+    """
+    takers = [s.name for s in known.sockets] + [b.name for b in known.clip.bracket]
+    pairs = [(arm, -1, boxes["floor"]) for arm in arms]
+    pairs += [(cable.body, cable.connector_link, boxes[name]) for name in takers]
+    clamp = (boxes[known.sockets[-1].name], boxes["right_panel"])
+    pairs += [(cable.body, link, box) for link in range(CLAMPED_LINKS) for box in clamp]
+    for body, link, box in pairs:
+        p.setCollisionFilterPair(body, box, link, -1, 0, physicsClientId=client)
+    return {body: name for name, body in boxes.items() if name not in takers} | dict(arms)
+
+
+def lay_cable(client: int, cable: CableBody, goal: RigidTransform, step: float) -> Hold:
+    """Draw the end of the straight cable to the pose `goal`, let all come to rest, and leave the end held there.
+
+    `step` is the physics step in s.
+    """
+    start, _, _ = cable.connector_state()
+    hold = Hold(client, cable.body, cable.connector_link, start)
+    turn = Slerp([0, 1], Rotation.concatenate([start.rotation, goal.rotation]))
+    steps = round(LAY_SECONDS / step)
+    for i in range(steps + round(SETTLE_SECONDS / step)):
+        s = min(1.0, (i + 1) / steps)
+        s = s * s * (3 - 2 * s)
+        hold.move(RigidTransform.from_components((1 - s) * start.translation + s * goal.translation, turn(s)))
+        cable.apply_springs()
+        p.stepSimulation(physicsClientId=client)
+    return hold
+
+
+def _box(client: int, box: Box, turn: Rotation | None = None) -> int:
+    half = [s / 2 for s in box.size]
+    collision = p.createCollisionShape(p.GEOM_BOX, halfExtents=half, physicsClientId=client)
+    visual = p.createVisualShape(p.GEOM_BOX, halfExtents=half, rgbaColor=[*box.color, 1], physicsClientId=client)
+    turn = Rotation.identity() if turn is None else turn
+    body = p.createMultiBody(0, collision, visual, box.center, turn.as_quat().tolist(), physicsClientId=client)
+    p.changeDynamics(body, -1, lateralFriction=BOX_FRICTION, physicsClientId=client)
+    return int(body)
+
+
+def _socket_block(client: int, socket: Socket) -> int:
+    # The block's y edge is the plug's axis, which may rise or fall; a block for an axis along -y is the same box.
+    axis = np.asarray(socket.axis) / np.linalg.norm(socket.axis)
+    tilt = Rotation.from_euler("x", float(np.arctan2(axis[2], abs(axis[1]))) * float(np.sign(axis[1])))
+    return _box(client, Box(name=socket.name, center=socket.center, size=socket.size, color=socket.color), tilt)
