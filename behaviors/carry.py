@@ -1,12 +1,15 @@
 """Bring the held connector before the stow clip, and into it."""
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from behaviors.hand import HAND, HandLeaf
 from behaviors.leaf import Failed, Steps
 from interfaces.cause import CauseCode
+from motion.collision import CollisionModel
 from motion.failure import PlanningError
+from motion.kinematics import ArmKinematics
 from motion.straight import straight_line
 from perception.mean_pose import mean_pose
 from perception.rgbd_pose import Estimate
@@ -17,6 +20,7 @@ INSERT_SPEED = 0.2
 LOOK_SECONDS = 0.8
 SEATED_SECONDS = 0.6  # the clip's lips take 0.2 s to close
 WAY_MARGIN = 0.0
+ROLLS = 36
 TRUSTED_SHIFT = 0.035  # m: what is seen further off its place in the hand than this is a false look
 
 
@@ -28,31 +32,34 @@ class Carry(HandLeaf):
         motion = self.services.motion
         held = self.services.belief.held
         assert held is not None
-        yield motion.move(HAND, self._goals(held), held=held, speed=CARRY_SPEED)
+        yield motion.carry(HAND, self._goals(held), held, speed=CARRY_SPEED)
 
-    def _goals(self, held: RigidTransform) -> np.ndarray:
-        """Joints (n, 6) before the clip from which a straight way in is free, for any roll about the connector's axis."""
+    def _goals(self, held: RigidTransform) -> list[RigidTransform]:
+        """Hand poses before the clip from which a straight way in is free, any roll about the connector's axis.
+
+        Those that turn the hand least come first.
+        """
         motion, clip = self.services.motion, self.services.known.clip
         model, near = motion.model(HAND, held=held), motion.model(HAND, clip=False)
         kin = motion.kinematics[HAND]
         goals = []
-        for roll in np.linspace(-np.pi, np.pi, 36, endpoint=False):
+        for roll in np.linspace(-np.pi, np.pi, ROLLS, endpoint=False):
             seated = clip.world_from_seat * RigidTransform.from_rotation(Rotation.from_euler("x", roll)) * held.inv()
             before = seated * RigidTransform.from_translation([-BEFORE, 0.0, 0.0])
-            for q in kin.ik(before):
-                if not model.free(q, WAY_MARGIN):
-                    continue
-                try:
-                    way = straight_line(kin, q, seated, 0.01)
-                except PlanningError:
-                    continue
-                if near.path_free(way, WAY_MARGIN):
-                    goals.append(q)
+            if any(_straight_in(kin, near, q, seated) for q in kin.ik(before) if model.free(q, WAY_MARGIN)):
+                goals.append(before)
         if not goals:
             raise Failed(CauseCode.OUT_OF_REACH, "no free hand pose brings the held connector into the clip")
-        now = motion.joints(HAND)
-        goals.sort(key=lambda q: float(np.abs(q - now).max()))
-        return np.array(goals[:8])
+        now = motion.tool(HAND).rotation.inv()
+        return sorted(goals, key=lambda pose: float((now * pose.rotation).magnitude()))
+
+
+def _straight_in(kin: ArmKinematics, near: CollisionModel, q: NDArray[np.float64], seated: RigidTransform) -> bool:
+    """Whether a free straight way leads from joints (6,) to the pose that seats the connector."""
+    try:
+        return near.path_free(straight_line(kin, q, seated, 0.01), WAY_MARGIN)
+    except PlanningError:
+        return False
 
 
 class Insert(HandLeaf):
@@ -79,7 +86,8 @@ class Insert(HandLeaf):
                 seen[result.stamp] = result
         whole = [e for e in seen.values() if e.whole]
         if not whole or belief.held is None:
-            self.say("the hand hides the connector", frames=len(seen))
+            longest = max((e.extent for e in seen.values()), default=0.0)
+            self.say("the hand hides the connector", frames=len(seen), longest=round(longest, 3))
             return
         found = self.services.motion.tool(HAND).inv() * mean_pose(whole)[0]
         shift = float(np.linalg.norm(found.translation - belief.held.translation))

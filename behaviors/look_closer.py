@@ -2,6 +2,7 @@
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import RigidTransform
 
 from behaviors.hand import EYE
 from behaviors.leaf import Steps
@@ -13,11 +14,12 @@ from perception.mean_pose import mean_pose
 from perception.rgbd_pose import Estimate
 
 LOOK_SECONDS = 0.8
-LOOKS = 3  # at most
+LOOKS = 2  # from two sides: what one look takes for an obstacle's inside, the other looks through
+OTHER_SIDE = 0.77  # cosine of the 40 degrees between them
 
 
 class LookCloser(LookLeaf):
-    """Brings the wrist camera to where the whole connector should show, until it does; then the arm goes to sleep.
+    """Brings the wrist camera to two places where the whole connector should show; then the arm goes to sleep.
 
     Only after a find that needs it: by the wrist camera, or of a part. SUCCESS in any case: the pose found first stands
     when no better one is to be had.
@@ -28,28 +30,37 @@ class LookCloser(LookLeaf):
         belief = self.services.belief
         if belief.found_by == "rear" and belief.sure:
             return
+        taken: list[NDArray[np.float64]] = []
+        whole: list[Estimate] = []
         for _ in range(LOOKS):
             seen: list[Estimate] = []
             try:
-                yield from self.go_and_look(self._goals(), LOOK_SECONDS, seen)
+                view, goals = self._best_view(taken)
+                taken.append(view.rotation.apply([0.0, 0.0, 1.0]))
+                yield from self.go_and_look(goals, LOOK_SECONDS, seen)
             except PlanningError as error:
                 self.say("no closer look", why=str(error))
-                break
+                continue
+            whole += [e for e in seen if e.whole]
             if seen:
-                belief.connector, belief.sure = mean_pose(seen)
+                belief.connector, belief.sure = mean_pose(whole or seen)
                 belief.found_by = "wrist"
                 self.say("looked closer", position=belief.connector.translation.round(4).tolist(), sure=belief.sure)
-                if belief.sure:
-                    break
         yield from self.go_to_sleep(EYE)
 
-    def _goals(self) -> NDArray[np.float64]:
-        """Joints (n, 6) for the best place that is free and has the whole connector in sight."""
+    def _best_view(self, taken: list[NDArray[np.float64]]) -> tuple[RigidTransform, NDArray[np.float64]]:
+        """The best free place that has the whole connector in sight, from another side than the lines of sight `taken`.
+
+        With joints (n, 6) for it.
+        """
         connector = self.services.belief.connector
         assert connector is not None
         half = 0.5 * self.services.known.connector.length
         points = connector.apply([[-half, 0.0, 0.0], [0.0, 0.0, 0.0], [half, 0.0, 0.0]])
         for view in closer_views(connector):
+            sight = view.rotation.apply([0.0, 0.0, 1.0])
+            if any(float(sight @ other) > OTHER_SIDE for other in taken):
+                continue
             if self.services.motion.sees(view, points) and len(goals := self.view_goals(view)):
-                return goals
+                return view, goals
         raise PlanningError(CauseCode.OUT_OF_REACH, "no free place from which the whole connector shows")

@@ -24,7 +24,9 @@ class Monitor(Leaf):
     def update(self) -> Status:
         """See the class."""
         perception, now = self.services.perception, self.services.clock.now()
-        perception.track.held(self.services.motion.tool(HAND).translation)
+        tool, held = self.services.motion.tool(HAND), self.services.belief.held
+        perception.track.held(tool.translation)
+        perception.hint = None if held is None else (tool * held).rotation.apply([1.0, 0.0, 0.0])
         if now >= self._due - 1e-9:
             perception.look("rear")
             self._due = now + self.get_input("period")
@@ -36,4 +38,5 @@ class Monitor(Leaf):
         """Stopped from above: the hand no longer carries under watch."""
         if new_status is Status.INVALID:
             self.services.perception.track.held(None)
+            self.services.perception.hint = None
             self._due = 0.0

@@ -9,7 +9,7 @@ from behaviors.leaf import Failed, Steps
 from motion.service import OPEN_GAP
 from perception.cable_shape import cable_course
 
-CLEAR = 0.05  # m around the connector's axis that are known to be free: it was seen there
+CLEAR = 0.05  # m around the connector's axis
 LIFT = 0.05  # m straight up from where it lay
 
 
@@ -23,11 +23,14 @@ class Regrasp(HandLeaf):
         """See the class."""
         motion, connector = self.services.motion, self.services.belief.connector
         assert connector is not None
-        perception = self.services.perception
-        # What was taken for an obstacle where the connector now is known to lie was a guess.
-        points = perception.occupancy.occupied_points()
-        free = points[_distance_to_axis(points, connector, 0.5 * self.services.known.connector.length) > CLEAR]
-        motion.set_obstacles(free, perception.occupancy.h)
+        occupancy = self.services.perception.occupancy
+        points = occupancy.occupied_points()
+        seen = {tuple(p) for p in occupancy.occupied_points(guessed=False).tolist()}
+        half = 0.5 * self.services.known.connector.length
+        # A guess near the connector, which was looked at, is no obstacle; a surface that was seen there is one.
+        far = _distance_to_axis(points, connector, half) > CLEAR
+        kept = far | np.array([tuple(p) in seen for p in points.tolist()], bool)
+        motion.set_obstacles(points[kept], occupancy.h)
         yield motion.pick(HAND, connector, cable=cable_course(self.services.known, connector))
         try:
             yield from self.grip(connector)

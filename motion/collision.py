@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from interfaces.cell import Box
 from motion.distance_grid import FAR, DistanceGrid
 from motion.kinematics import LOWER, TOOL_OFFSET, UPPER, ArmKinematics, FloatArray, link_frames_in
-from motion.spheres import CAMERA_RADIUS, JAW_OPENING, LINKS, spheres_at
+from motion.spheres import CAMERA_ACROSS, CAMERA_RADIUS, JAW_OPENING, LINKS, spheres_at
 
 IntArray = NDArray[np.int64]
 
@@ -153,13 +153,13 @@ def _self_pairs(with_camera: bool) -> tuple[tuple[int, int], ...]:
 
     Neighbouring links are left out: joint limits keep them apart.
     """
-    links = [*LINKS.tolist(), *([5] if with_camera else [])]
+    links = [*LINKS.tolist(), *([5] * len(CAMERA_ACROSS) if with_camera else [])]
     camera = len(LINKS)
     return tuple(
         (i, j)
         for i, a in enumerate(links)
         for j, b in enumerate(links)
-        if (a <= 1 and b >= 4) or (a == 2 and b >= 5) or (j == camera and a in (3, 4))
+        if (a <= 1 and b >= 4) or (a == 2 and b >= 5) or (j >= camera and a in (3, 4))
     )
 
 
@@ -186,10 +186,10 @@ class CollisionModel:
         links, local = [LINKS], [spheres_at(opening)]
         pairs = list(_self_pairs(camera_offset is not None))
         if camera_offset is not None:
-            links.append(np.array([5]))
-            local.append(np.array([[*camera_offset, CAMERA_RADIUS]]))
+            links.append(np.full(len(CAMERA_ACROSS), 5))
+            local.append(np.array([[camera_offset[0], camera_offset[1] + y, camera_offset[2], CAMERA_RADIUS] for y in CAMERA_ACROSS]))
         if carried is not None and len(carried):
-            first = len(LINKS) + (camera_offset is not None)
+            first = sum(map(len, links))
             pairs += [(i, first + n) for i in np.flatnonzero(LINKS <= 3).tolist() for n in range(len(carried))]
             links.append(np.full(len(carried), 6))
             local.append(np.asarray(carried, float) + np.append(TOOL_OFFSET, 0.0))

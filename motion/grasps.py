@@ -16,9 +16,9 @@ from motion.straight import straight_line
 
 # The palm 40 degrees off the cross direction, on the cable's side, leaves three quarters of the connector in sight.
 PREFERRED_YAW = float(np.deg2rad(40.0))
-YAWS = tuple(np.deg2rad([40.0, 25.0, 10.0, 50.0, 60.0, -10.0, -25.0, -40.0]).tolist())
+YAWS = tuple(np.deg2rad([40.0, 25.0, 10.0, 50.0, -10.0, -25.0, -40.0]).tolist())
 ROLLS = tuple(np.deg2rad(np.arange(-165, 181, 15)).tolist())
-_MOST_YAW = np.deg2rad(65.0)  # beyond, the jaws close along rather than across the connector
+_MOST_YAW = np.deg2rad(50.0)  # beyond, the cable runs into the palm
 GRIP_OFFSET = -0.02  # metres from the connector's centre: on the cable's side, the tip stays in sight
 _ROLL_COST = 0.3  # of a rad of roll, in rad of yaw
 _FAR = "out of reach"

@@ -107,7 +107,7 @@ class Motion:
         model = self.model(arm, held=held)
         distance, what = model.nearest(self.joints(arm))
         if what == "seen surface" and distance < TIGHT_MARGIN:
-            self._clear(model.spheres(self.joints(arm)), TIGHT_MARGIN + self._spacing)
+            self._clear(model.spheres(self.joints(arm)), TIGHT_MARGIN + 2 * self._spacing)
             self._rebuild_grid()
             model = self.model(arm, held=held)
         return model
@@ -162,6 +162,28 @@ class Motion:
         def steps() -> Iterator[None]:
             path = self._plan(self._start_model(arm, held), self.joints(arm), goals)
             yield from self._follow(arm, path, speed)
+
+        return self._task(arm, steps())
+
+    def carry(self, arm: str, goals: Sequence[RigidTransform], held: RigidTransform, *, speed: float) -> Task:
+        """Bring what `arm` holds (tool_from_connector) to one of the goals (world_from_tool), the first preferred.
+
+        In a straight line with an even turn where that is free: the connector then keeps about the direction that its
+        cable gives it, and the cable neither turns it in the jaw nor runs into the palm. Else by any free way.
+        """
+
+        def steps() -> Iterator[None]:
+            model, q, kin = self._start_model(arm, held), self.joints(arm), self.kinematics[arm]
+            for goal in goals:
+                try:
+                    path = straight_line(kin, q, goal, 0.01)
+                except PlanningError:
+                    continue
+                if model.path_free(path[1:], TIGHT_MARGIN):
+                    yield from self._follow(arm, path, speed)
+                    return
+            configurations = np.vstack([kin.ik(goal) for goal in goals])
+            yield from self._follow(arm, self._plan(model, q, configurations), speed)
 
         return self._task(arm, steps())
 

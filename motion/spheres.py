@@ -63,7 +63,8 @@ JAW_OPENING = 0.075  # metres between the pads, 6 mm each, of fully open fingers
 
 LINKS = np.array([row[0] for row in _ROWS], dtype=np.int64)
 SPHERES = np.array([row[1:] for row in _ROWS], dtype=np.float64)  # (n, 4): centre and radius
-CAMERA_RADIUS = 0.025  # metres; a RealSense is 0.09 x 0.025 x 0.025
+CAMERA_RADIUS = 0.022  # metres; a RealSense is 0.025 x 0.09 x 0.025 ...
+CAMERA_ACROSS = (-0.03, 0.0, 0.03)  # ... so three spheres cover it, metres along the wrist link's y axis
 
 
 def spheres_at(opening: float) -> NDArray[np.float64]:

@@ -56,9 +56,9 @@ class Occupancy:
         self._color = SegmentationParameters.for_color(connector.color)
         self._thickness = 2 * connector.radius
 
-    def occupied_points(self) -> FloatArray:
-        """Centres (n, 3) m, world frame, of the voxels seen or assumed to be full."""
-        return np.asarray(self._centers[self._state >= Voxel.BEHIND])
+    def occupied_points(self, *, guessed: bool = True) -> FloatArray:
+        """Centres (n, 3) m, world frame, of the voxels seen to be full, and with `guessed` of those assumed to be."""
+        return np.asarray(self._centers[self._state >= (Voxel.BEHIND if guessed else Voxel.SURFACE)])
 
     def integrate(
         self,

@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
 from interfaces.cell import KnownCell
@@ -38,6 +39,7 @@ class Perception:
         self._scale = dict.fromkeys(cameras, 1.0)
         self._results: dict[str, tuple[int, Estimate | NoEstimate]] = {}
         self.track = ConnectorTrack()
+        self.hint: NDArray[np.float64] | None = None  # (3,) from cable to tip, as far as it is known: no view tells
         self.occupancy = Occupancy(*REGION, known.solids(), known.connector, VOXEL)
 
     def frame(self, camera: str) -> RgbdFrame | None:
@@ -56,7 +58,7 @@ class Perception:
             return self._results[camera][1]
         frame = self.frame(camera)
         assert frame is not None
-        result = estimate(frame, self._pose_of(frame), self._known.connector)
+        result = estimate(frame, self._pose_of(frame), self._known.connector, hint=self.hint)
         self._results[camera] = (newest.number, result)
         self.track.feed(result)
         return result

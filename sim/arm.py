@@ -47,7 +47,7 @@ class SimArm:
         camera_offset: tuple[float, float, float] | None,
         rng: np.random.Generator,
     ) -> None:
-        self.name = spec.name
+        self.name: str = spec.name
         self.client = client
         self._dt = step
         self._steps = 0

@@ -13,7 +13,7 @@ NAME = "vx300s"
 FINGER_FACE = 0.0135
 PAD_AHEAD = 0.0565
 PAD_LENGTH = 0.024  # along the fingers, metres
-PAD_HEIGHT = 0.018
+PAD_HEIGHT = 0.034  # of the finger's 0.061: gripped over such a length a cylinder resists the cable's bending moment
 CAMERA_SIZE = (0.025, 0.090, 0.025)  # D435i's body
 BRACKET = (0.008, 0.030)  # m, thickness and width of what carries the camera from the wrist's axis up: seen, never felt
 # The real arms are black. Choice: grey enough that in light no part of them is as dark as the cable.

@@ -12,11 +12,11 @@ COEFFICIENTS = np.array([[0.1, -0.2, 0.5, 0.0, 1.0, -1.0], [1.0, 2.0, -1.0, 0.5,
 
 
 def cubic(t: float) -> NDArray[np.float64]:
-    return np.array([1.0, t, t**2, t**3]) @ COEFFICIENTS
+    return np.asarray([1.0, t, t**2, t**3] @ COEFFICIENTS)
 
 
 def cubic_rate(t: float) -> NDArray[np.float64]:
-    return np.array([0.0, 1.0, 2 * t, 3 * t**2]) @ COEFFICIENTS
+    return np.asarray([0.0, 1.0, 2 * t, 3 * t**2] @ COEFFICIENTS)
 
 
 @pytest.fixture(scope="module")

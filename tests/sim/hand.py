@@ -10,6 +10,7 @@ from motion.kinematics import ArmKinematics, wrap
 from sim.world import World
 
 STANDOFF = 0.06  # m before the grasp
+SHALLOW = 0.006  # m nearer to the finger tips: keeps the pads' corners off the panel behind the plug
 GRIP_FORCE = 20.0  # N a finger
 GENTLE = 0.0005  # m: the jaw closes by so much at speed; from farther the blow alone throws the plug out of its socket
 FloatArray = NDArray[np.float64]
@@ -38,7 +39,7 @@ def take_hold(world: World) -> None:
     robot, arm = kinematics(world, "right"), world.arms["right"]
     connector = world.cell.known.connector
     arm.gripper.open(0.06)
-    for grasp in grasp_candidates(world.connector_pose(), connector.length, connector.radius):
+    for grasp in grasp_candidates(world.connector_pose(), connector.length, connector.radius, shallow=SHALLOW):
         back = grasp.world_from_tool * RigidTransform.from_translation([-STANDOFF, 0.0, 0.0])
         before, at = robot.ik(back), robot.ik(grasp.world_from_tool)
         if len(before) and len(at):
@@ -52,17 +53,20 @@ def take_hold(world: World) -> None:
     world.advance(0.6)
 
 
-def draw(world: World, way: FloatArray, seconds: float, steps: int = 5) -> None:
+def draw(world: World, way: FloatArray, seconds: float) -> None:
     """Move the right hand by `way` (3,) m along a line without turning it, and wait a little."""
+    start_to_draw(world, way, seconds)
+    world.advance(seconds + 0.1)
+
+
+def start_to_draw(world: World, way: FloatArray, seconds: float, steps: int = 5) -> None:
+    """Let the right hand begin to move by `way` (3,) m along a line."""
     robot, arm = kinematics(world, "right"), world.arms["right"]
-    q = arm.reading().positions
-    tool = robot.tool(q)
-    path = [q]
+    path = [arm.reading().positions]
+    tool = robot.tool(path[0])
     for share in np.linspace(0.0, 1.0, steps + 1)[1:]:
-        moved = RigidTransform.from_translation(share * way) * tool
-        path.append(nearest(robot.ik(moved), path[-1]))
+        path.append(nearest(robot.ik(RigidTransform.from_translation(share * way) * tool), path[-1]))
     times = np.linspace(0.0, seconds, len(path))
     rates = np.gradient(np.array(path), times, axis=0)
     rates[[0, -1]] = 0.0
     arm.follow(Trajectory(times, np.array(path), rates))
-    world.advance(seconds + 0.1)

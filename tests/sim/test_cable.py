@@ -63,7 +63,6 @@ def test_a_cantilever_droops_like_the_heavy_elastica(cell: Cell, client: int, st
         pass
     droop = spec.anchor[2] - tip(cable, connector.length)[2]
     expected = elastica(stiffness, spec.mass_per_length * EARTH_GRAVITY, spec.length)
-    print("DROOP", stiffness, droop, expected, droop / expected - 1)
     assert spec.links == 20
     assert droop == pytest.approx(expected, rel=DROOP)
 
@@ -88,12 +87,14 @@ def _released(cell: Cell, client: int, step: float) -> CableBody:
 
 def test_a_released_cable_never_gains_energy_and_comes_to_rest(cell: Cell, client: int, step: float) -> None:
     cable = _released(cell, client, step)
-    energies = [cable.energy()]
-    energies += [cable.energy() for i in run(cable, step, SETTLE) if i % 8 == 0]
+    energies, speeds = [cable.energy()], []
+    for _ in run(cable, step, SETTLE):
+        energies.append(cable.energy())
+        speeds.append(float(np.linalg.norm(cable.connector_state()[1])))
     lowest = np.minimum.accumulate(energies)
     assert energies[0] > 0.05  # J: it was bent
     assert float(np.max(energies - lowest)) < ENERGY_RISE * energies[0]
-    assert float(np.linalg.norm(cable.connector_state()[1])) < STILL
+    assert max(speeds[-round(0.5 / step) :]) < STILL
 
 
 def test_it_swings_at_the_beams_first_frequency(cell: Cell, client: int, step: float) -> None:

@@ -1,0 +1,60 @@
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from interfaces.cell import Box, Cell, FixedMount
+from interfaces.scene import Obstacle
+from sim.ground_truth import GroundTruth
+from sim.world import World
+
+
+@pytest.fixture(scope="module")
+def world(cell: Cell) -> Iterator[World]:
+    world = World(cell, "zero", seed=1, renderer="tiny")
+    world.advance(0.2)
+    yield world
+    world.close()
+
+
+def test_a_plugged_connector_at_rest(world: World) -> None:
+    truth = GroundTruth(world)
+    assert truth.plugged()
+    assert not truth.stowed()
+    assert not truth.held()
+    assert not truth.touched()
+    assert truth.connector_speed() < 1e-3
+    np.testing.assert_array_equal(truth.connector_pose().as_matrix(), world.connector_pose().as_matrix())
+
+
+def test_the_rear_camera_sees_the_red(world: World) -> None:
+    frame = world.cameras["rear"].latest()
+    assert frame is not None
+    red = (frame.rgb[..., 0] > 60) & (frame.rgb[..., 1] < 40) & (frame.rgb[..., 2] < 40)
+    pixels = GroundTruth(world).connector_pixels("rear")
+    assert pixels > 20
+    assert pixels == pytest.approx(int(red.sum()), rel=0.1)
+
+
+def test_before_the_first_frame_no_pixels(cell: Cell) -> None:
+    world = World(cell, "zero", seed=1, renderer="tiny")
+    assert world.cameras["rear"].latest() is None
+    assert GroundTruth(world).connector_pixels("rear") == 0
+    world.close()
+
+
+def test_behind_an_obstacle_no_pixels(cell: Cell, world: World) -> None:
+    camera, connector = cell.known.camera("rear").mount, world.connector_pose().translation
+    assert isinstance(camera, FixedMount)
+    middle = connector + 0.3 * (np.asarray(camera.position) - connector)
+    box = Box(name="wall", center=(middle[0], middle[1], middle[2]), size=(0.01, 0.2, 0.2))
+    hidden = World(cell, "zero", seed=1, obstacles=(Obstacle(box, 0.0, None),), renderer="tiny")
+    hidden.advance(0.2)
+    assert GroundTruth(hidden).connector_pixels("rear") == 0
+    hidden.close()
+
+
+def test_contact_peaks_are_a_copy(world: World) -> None:
+    truth = GroundTruth(world)
+    truth.contact_peaks()["left arm - floor"] = 9.0
+    assert "left arm - floor" not in truth.contact_peaks()

@@ -1,0 +1,54 @@
+"""Print what a seeded run of two seconds comes to; with an argument, a second reader looks at every picture besides."""
+
+import hashlib
+import sys
+from importlib.resources import files
+
+import numpy as np
+import yaml
+
+from interfaces.cell import Cell
+from interfaces.trajectory import Trajectory
+from sim.world import World
+
+LOOKS = range(4, 21, 4)  # tenths of a second at which the second reader looks
+
+
+def small_cell() -> Cell:
+    data = yaml.safe_load((files("scenarios") / "cells/thesis.yaml").read_text(encoding="utf-8"))
+    for camera in data["known"]["cameras"]:
+        camera |= {"width": 212, "height": 120}
+    return Cell.model_validate(data)
+
+
+def main(second_reader: bool) -> None:
+    world = World(small_cell(), "earth", seed=11, renderer="tiny")
+    for name, arm in world.arms.items():
+        start = arm.reading().positions
+        goal = start + np.array([0.3, 0.4, -0.3, 0.5, 0.2, 0.6])
+        arm.follow(Trajectory(np.array([0.0, 1.5]), np.array([start, goal]), np.zeros((2, 6))))
+        arm.gripper.open(0.05 if name == "left" else 0.03)
+    digest = hashlib.sha256()
+    for tenth in range(1, 21):
+        world.advance(0.1)
+        if tenth == 10:
+            world.arms["right"].gripper.close(15.0)
+        digest.update(world.connector_pose().as_matrix().tobytes())
+        for arm in world.arms.values():
+            reading = arm.reading()
+            digest.update(np.concatenate([reading.positions, reading.velocities, reading.efforts]).tobytes())
+            digest.update(np.float64(arm.gripper.reading().gap).tobytes())
+            if second_reader:
+                arm.reading(), arm.gripper.reading()
+        if second_reader and tenth in LOOKS:
+            for camera in world.cameras.values():
+                camera.latest(), camera.true_ids(), camera.latest()
+    for camera in world.cameras.values():
+        frame = camera.latest()
+        assert frame is not None
+        digest.update(frame.rgb.tobytes() + frame.depth.tobytes() + np.float64(frame.stamp).tobytes())
+    print(digest.hexdigest())
+
+
+if __name__ == "__main__":
+    main(second_reader=len(sys.argv) > 1)
