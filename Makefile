@@ -24,7 +24,7 @@ test: setup
 lint: setup
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/mypy app behaviors interfaces motion perception sim trees tests
+	$(BIN)/mypy conftest.py app behaviors interfaces motion perception sim trees tests
 	$(BIN)/lint-imports
 
 bench: setup

@@ -52,8 +52,9 @@ def run_episode(
 ) -> Result:
     """Run a scenario to its end and leave its record in the folder `out` (None: nowhere).
 
-    `progress` is called at every tick with the simulated second and the active leaf; a KeyboardInterrupt from it ends the
-    run cleanly. An exception inside a leaf ends it with the cause `internal_error` and its traceback in events.jsonl.
+    `progress` is called at every tick with the simulated second and the active leaf; a KeyboardInterrupt from it ends
+    the run cleanly. An exception inside a leaf ends it with the cause `internal_error` and its traceback in
+    events.jsonl.
     """
     began = time.perf_counter()
     with Record(out, scenario.name, seed) as record:

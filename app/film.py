@@ -6,6 +6,7 @@ from types import TracebackType
 from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
 from app.video import OVERVIEW_SIZE, VideoWriter, compose
@@ -53,7 +54,7 @@ class Film:
         self._writer.write(compose(overview(world), rear.rgb if rear else None, wrist.rgb if wrist else None, lines))
 
 
-def overview(world: World) -> np.ndarray:  # type: ignore[type-arg]
+def overview(world: World) -> NDArray[np.uint8]:
     """The whole cell from behind and above the right arm: (480, 856, 3) uint8 RGB."""
     pose: RigidTransform = OVERVIEW.world_from_camera
     intrinsics = Intrinsics.from_fov(*OVERVIEW_SIZE, OVERVIEW_FOV)

@@ -14,13 +14,14 @@ from motion.straight import straight_line
 from perception.mean_pose import mean_pose
 from perception.rgbd_pose import Estimate
 
-BEFORE = 0.06  # m before the clip along the hand's own axis, from where it goes straight in
+BEFORE = 0.03  # m before the clip along the hand's own axis, from where it goes straight in; more would press the cable
 CARRY_SPEED = 0.5
 INSERT_SPEED = 0.2
 LOOK_SECONDS = 0.8
 SEATED_SECONDS = 0.6  # the clip's lips take 0.2 s to close
 WAY_MARGIN = 0.0
 ROLLS = 36
+LONG_ENOUGH = 0.04  # m: a shorter visible part says too little of the axis
 TRUSTED_SHIFT = 0.035  # m: what is seen further off its place in the hand than this is a false look
 
 
@@ -84,15 +85,19 @@ class Insert(HandLeaf):
             result = perception.look("rear")
             if isinstance(result, Estimate) and result.stamp > end - LOOK_SECONDS:
                 seen[result.stamp] = result
-        whole = [e for e in seen.values() if e.whole]
-        if not whole or belief.held is None:
-            longest = max((e.extent for e in seen.values()), default=0.0)
-            self.say("the hand hides the connector", frames=len(seen), longest=round(longest, 3))
+        long = [e for e in seen.values() if e.extent >= LONG_ENOUGH]
+        if not long or belief.held is None:
+            self.say("the hand hides the connector", frames=len(seen))
             return
-        found = self.services.motion.tool(HAND).inv() * mean_pose(whole)[0]
+        pose, whole = mean_pose(long)
+        found = self.services.motion.tool(HAND).inv() * pose
+        if not whole:
+            found = _turned_in_the_jaw(belief.held, found)
         shift = float(np.linalg.norm(found.translation - belief.held.translation))
-        self.say("connector in the hand", shift=round(shift, 4), trusted=shift < TRUSTED_SHIFT)
-        if shift < TRUSTED_SHIFT:
+        turn = float(np.rad2deg(np.arccos(np.clip(_axis(found) @ _axis(belief.held), -1.0, 1.0))))
+        trusted = shift < TRUSTED_SHIFT
+        self.say("connector in the hand", whole=whole, shift=round(shift, 4), turn_deg=round(turn, 1), trusted=trusted)
+        if trusted:
             belief.held = found
 
     def _seated(self, held: RigidTransform) -> RigidTransform:
@@ -101,3 +106,19 @@ class Insert(HandLeaf):
         rolls = [RigidTransform.from_rotation(Rotation.from_euler("x", r)) for r in np.linspace(-np.pi, np.pi, 361)]
         poses = [seat * roll * held.inv() for roll in rolls]
         return min(poses, key=lambda pose: float((tool.rotation.inv() * pose.rotation).magnitude()))
+
+
+def _turned_in_the_jaw(held: RigidTransform, seen: RigidTransform) -> RigidTransform:
+    """tool_from_connector when only a part is `seen`, so that its axis is known but not where its centre lies on it.
+
+    A cable turns the connector between the pads and does not draw it through: the pads stay at the place along it where
+    they were believed to be, `held`.
+    """
+    axis = _axis(seen)
+    nearest = seen.translation - (seen.translation @ axis) * axis
+    pads_at = -float(held.translation @ _axis(held))
+    return RigidTransform.from_components(nearest - pads_at * axis, seen.rotation)
+
+
+def _axis(pose: RigidTransform) -> NDArray[np.float64]:
+    return np.asarray(pose.rotation.apply([1.0, 0.0, 0.0]))

@@ -13,7 +13,8 @@ from perception.rgbd_pose import Estimate
 class CheckCameras(StepsLeaf):
     """Looks for `seconds` through the rear camera, then asks the track the thesis's three questions.
 
-    SUCCESS with the connector's mean pose when its frame exists, is fresh and is live; else FAILURE: it must be searched.
+    SUCCESS with the connector's mean pose when its frame exists, is fresh and is live; else FAILURE: it must be
+    searched.
     """
 
     INPUT_PORTS: ClassVar[dict[str, Any]] = {

@@ -1,6 +1,6 @@
 """The common ground of all leaves."""
 
-from collections.abc import Iterator
+from collections.abc import Generator
 from typing import Any, ClassVar
 
 from py_trees.common import Status
@@ -11,7 +11,7 @@ from interfaces.cause import Cause, CauseCode
 from motion.failure import PlanningError
 from motion.service import Task
 
-Steps = Iterator[Task | None]
+Steps = Generator[Task | None, None, None]
 
 
 class Failed(Exception):  # noqa: N818 - said inside `steps`: the leaf fails with this cause
@@ -22,7 +22,7 @@ class Failed(Exception):  # noqa: N818 - said inside `steps`: the leaf fails wit
         self.code = code
 
 
-class Leaf(BehaviourWithPorts):  # type: ignore[misc]
+class Leaf(BehaviourWithPorts):
     """A leaf with services; it says why it fails."""
 
     services: Services
@@ -49,7 +49,7 @@ class Leaf(BehaviourWithPorts):  # type: ignore[misc]
 
 
 class StepsLeaf(Leaf):
-    """A leaf whose work is a sequence of steps: `steps()` yields a `Task` to be done, or None to wait for the next tick.
+    """A leaf whose work is a sequence of steps: `steps()` yields a `Task` to be done, or None to wait for a tick.
 
     It ends in SUCCESS when the steps end. `Failed` raised in them, or a motion that cannot be, ends it in FAILURE.
     """

@@ -1,5 +1,7 @@
 """Leave the connector in the clip, and look whether it stays there."""
 
+import numpy as np
+
 from behaviors.hand import HAND, HandLeaf
 from behaviors.leaf import Failed, Steps
 from behaviors.services import Notice
@@ -29,7 +31,7 @@ class LookAtStow(HandLeaf):
 
     def steps(self) -> Steps:
         """See the class."""
-        clock, seat = self.services.clock, self.services.known.clip.seat
+        clock, seat = self.services.clock, np.array(self.services.known.clip.seat)
         begin = clock.now()
         latest: Estimate | None = None
         while clock.now() < begin + LOOK_SECONDS - 1e-9:

@@ -175,6 +175,7 @@ class KnownCell(Model):
     plugged_into: str  # the socket that holds the connector at the start
     clip: Clip
     connector: Connector
+    cable_length: Positive  # metres of the flexible part
     arms: tuple[ArmSpec, ...]
     cameras: tuple[CameraSpec, ...]
     latencies: Latencies

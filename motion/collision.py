@@ -167,8 +167,9 @@ class CollisionModel:
     """One arm, and all that it must not touch. Does not change; make a new one when the surroundings do.
 
     `camera_offset` (3,) m is where a wrist camera sits in the wrist link's frame. `other_arm` (m, 4) are another arm's
-    spheres in world (`spheres` of its model). `carried` (m, 4) are spheres fixed in the tool frame; the pads
-    stand `opening` m apart. A `margin` is metres between surfaces; the arm's own links must only not touch, whatever the margin.
+    spheres in world (`spheres` of its model). `carried` (m, 4) are spheres fixed in the tool frame; the pads stand
+    `opening` m apart. A `margin` is metres between surfaces; the arm's own links must only not touch, whatever the
+    margin.
     """
 
     def __init__(
@@ -187,7 +188,8 @@ class CollisionModel:
         pairs = list(_self_pairs(camera_offset is not None))
         if camera_offset is not None:
             links.append(np.full(len(CAMERA_ACROSS), 5))
-            local.append(np.array([[camera_offset[0], camera_offset[1] + y, camera_offset[2], CAMERA_RADIUS] for y in CAMERA_ACROSS]))
+            x, y, z = camera_offset
+            local.append(np.array([[x, y + across, z, CAMERA_RADIUS] for across in CAMERA_ACROSS]))
         if carried is not None and len(carried):
             first = sum(map(len, links))
             pairs += [(i, first + n) for i in np.flatnonzero(LINKS <= 3).tolist() for n in range(len(carried))]

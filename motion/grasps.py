@@ -14,8 +14,8 @@ from motion.kinematics import ArmKinematics, FloatArray
 from motion.spheres import JAW_OPENING
 from motion.straight import straight_line
 
-# The palm off the cross direction, on the cable's side, leaves the tip in sight; at 40 degrees, where most of it shows, the
-# cable touches the gripper's bar, 0.04 behind the pads, as soon as it bends that way.
+# The palm off the cross direction, on the cable's side, leaves the tip in sight; at 40 degrees, where most of it shows,
+# the cable touches the gripper's bar, 0.04 behind the pads, as soon as it bends that way.
 PREFERRED_YAW = float(np.deg2rad(20.0))
 YAWS = tuple(np.deg2rad([20.0, 10.0, 30.0, 0.0, 40.0, -10.0, -25.0, -40.0]).tolist())
 ROLLS = tuple(np.deg2rad(np.arange(-165, 181, 15)).tolist())

@@ -1,7 +1,7 @@
 """What the leaves ask of the arms: plan, wait for the plan's latency, follow, stop.
 
-A request returns a `Task` at once; `poll` it every tick. Nothing here reads a wall clock: a plan costs its stated latency
-on the simulated clock.
+A request returns a `Task` at once; `poll` it every tick. Nothing here reads a wall clock: a plan costs its stated
+latency on the simulated clock.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -14,6 +14,7 @@ from interfaces.cause import CauseCode
 from interfaces.cell import Connector, KnownCell, WristMount
 from interfaces.devices import Arm, Clock, Gripper
 from interfaces.frame import RgbdFrame
+from motion.cable_path import natural_way
 from motion.collision import CollisionModel
 from motion.distance_grid import DistanceGrid
 from motion.failure import PlanningError
@@ -67,8 +68,12 @@ class Motion:
         self, known: KnownCell, arms: Mapping[str, Arm], grippers: Mapping[str, Gripper], clock: Clock, seed: int
     ) -> None:
         self.known, self.arms, self.grippers, self._clock = known, arms, grippers, clock
-        self.kinematics = {spec.name: ArmKinematics(RigidTransform.from_translation(spec.base)) for spec in known.arms}
-        self._cameras = {c.mount.arm: c.mount for c in known.cameras if isinstance(c.mount, WristMount)}
+        self.kinematics: dict[str, ArmKinematics] = {
+            spec.name: ArmKinematics(RigidTransform.from_translation(spec.base)) for spec in known.arms
+        }
+        self._cameras: dict[str, WristMount] = {
+            c.mount.arm: c.mount for c in known.cameras if isinstance(c.mount, WristMount)
+        }
         self._boxes = known.solids()
         self._grid: DistanceGrid | None = None
         self._points = self._cable = _NO_POINTS
@@ -157,7 +162,10 @@ class Motion:
         )
 
     def move(self, arm: str, goals: FloatArray, *, held: RigidTransform | None = None, speed: float = 1.0) -> Task:
-        """Plan a free way to one of the goals (n, 6) rad and follow it; `held` is tool_from_connector when it carries."""
+        """Plan a free way to one of the goals (n, 6) rad and follow it.
+
+        `held` is tool_from_connector when the arm carries.
+        """
 
         def steps() -> Iterator[None]:
             path = self._plan(self._start_model(arm, held), self.joints(arm), goals)
@@ -168,20 +176,19 @@ class Motion:
     def carry(self, arm: str, goals: Sequence[RigidTransform], held: RigidTransform, *, speed: float) -> Task:
         """Bring what `arm` holds (tool_from_connector) to one of the goals (world_from_tool), the first preferred.
 
-        In a straight line with an even turn where that is free: the connector then keeps about the direction that its
-        cable gives it, and the cable neither turns it in the jaw nor runs into the palm. Else by any free way.
+        By way of the shapes that the cable takes by itself where that is free, else straight, else by any free way.
         """
 
         def steps() -> Iterator[None]:
             model, q, kin = self._start_model(arm, held), self.joints(arm), self.kinematics[arm]
-            for goal in goals:
-                try:
-                    path = straight_line(kin, q, goal, 0.01)
-                except PlanningError:
-                    continue
-                if model.path_free(path[1:], TIGHT_MARGIN):
-                    yield from self._follow(arm, path, speed)
-                    return
+            start, release = kin.tool(q) * held, held.inv()
+            for natural in (True, False):
+                for goal in goals:
+                    poses = [pose * release for pose in natural_way(self.known, start, goal * held)] if natural else [goal]
+                    path = _through(kin, q, poses)
+                    if path is not None and model.path_free(path[1:], TIGHT_MARGIN):
+                        yield from self._follow(arm, path, speed)
+                        return
             configurations = np.vstack([kin.ik(goal) for goal in goals])
             yield from self._follow(arm, self._plan(model, q, configurations), speed)
 
@@ -195,7 +202,7 @@ class Motion:
 
         return self._task(arm, steps())
 
-    def shift(self, arm: str, way: Sequence[float], *, speed: float = APPROACH_SPEED) -> Task:
+    def shift(self, arm: str, way: Sequence[float] | FloatArray, *, speed: float = APPROACH_SPEED) -> Task:
         """Move the tool straight by `way` (3,) m in the world, without turning."""
         tool = self.tool(arm)
         return self.straight(arm, RigidTransform.from_components(tool.translation + way, tool.rotation), speed=speed)
@@ -205,8 +212,9 @@ class Motion:
     ) -> Task:
         """Open the jaw, bring it around the connector near its cable side; the jaw stays open.
 
-        `shallow` metres is by how much the connector lies nearer to the finger tips than the pads' middle. The arm keeps
-        clear of the `cable`'s points (n, 3) m, except where the jaw takes hold: pushing the cable moves the connector.
+        `shallow` metres is by how much the connector lies nearer to the finger tips than the pads' middle. The arm
+        keeps clear of the `cable`'s points (n, 3) m, except where the jaw takes hold: pushing the cable moves the
+        connector.
         """
 
         def steps() -> Iterator[None]:
@@ -310,3 +318,14 @@ def _clear_of(points: FloatArray | None, place: FloatArray, radius: float) -> Fl
     if points is None:
         return _NO_POINTS
     return points[np.linalg.norm(points - place, axis=1) > radius]
+
+
+def _through(kin: ArmKinematics, q: FloatArray, poses: Sequence[RigidTransform]) -> FloatArray | None:
+    """Joint path (k, 6) from `q` (6,) that leads the tool through the poses; None where it cannot follow."""
+    path = q[None]
+    try:
+        for pose in poses:
+            path = np.vstack([path, straight_line(kin, path[-1], pose, 0.02)[1:]])
+    except PlanningError:
+        return None
+    return path

@@ -79,7 +79,8 @@ def _in_view(point: FloatArray, world_from_camera: RigidTransform, camera: Intri
 def closer_views(world_from_connector: RigidTransform) -> list[RigidTransform]:
     """Places to look closely at a connector that was seen: world_from_camera, the best first.
 
-    From the arms' side (towards -x), as square to its axis as may be: there its whole length shows, and its tilt in depth.
+    From the arms' side (towards -x), as square to its axis as may be: there its whole length shows, and its tilt in
+    depth.
     """
     center = world_from_connector.translation
     axis = world_from_connector.rotation.apply([1.0, 0.0, 0.0])

@@ -9,10 +9,11 @@ from interfaces.cell import KnownCell
 
 
 def cable_course(known: KnownCell, world_from_connector: RigidTransform, spacing: float = 0.01) -> NDArray[np.float64]:
-    """Points (n, 3) m about `spacing` apart along the cable of a connector at rest, from the plugged end to the loose one.
+    """Points (n, 3) m about `spacing` apart along the cable of a connector at rest, from the plugged end on.
 
     A cubic between the two ends with their directions: the shape of a lightly bent rod (small deflections). The plugged
-    end's socket is the one that the loose end was not plugged into and whose face the cable leaves: the last of the cell.
+    end's socket is the one that the loose end was not plugged into and whose face the cable leaves: the last of the
+    cell.
     """
     socket = known.sockets[-1]
     axis = np.asarray(socket.axis) / np.linalg.norm(socket.axis)

@@ -50,7 +50,7 @@ class Perception:
         return replace(frame, depth=frame.depth * np.float32(self._scale[camera]))
 
     def look(self, camera: str) -> Estimate | NoEstimate | None:
-        """What the newest frame shows of the connector; a new frame's result goes into the track. None before the first."""
+        """What the newest frame shows of the connector, None before the first; a new result enters the track."""
         newest = self._cameras[camera].latest()
         if newest is None:
             return None

@@ -68,10 +68,15 @@ class Hold:
 
 
 class SocketHold:
-    """A plugged end: held stiffly until the force on it exceeds `pull_out_force`."""
+    """A plugged end: held stiffly until it is drawn back along `axis` (3,), the plug's way in, with `pull_out_force` N.
 
-    def __init__(self, hold: Hold, pull_out_force: float) -> None:
+    A force across the axis, as a closing jaw makes, does not free it. Measured: `getConstraintState` gives the world
+    force that the constraint answers with, so a pull along -axis reads as a force along +axis.
+    """
+
+    def __init__(self, hold: Hold, axis: FloatArray, pull_out_force: float) -> None:
         self._hold: Hold | None = hold
+        self._axis = axis / np.linalg.norm(axis)
         self._limit = pull_out_force
 
     @property
@@ -81,7 +86,7 @@ class SocketHold:
 
     def step(self) -> None:
         """Look at the force after a physics step."""
-        if self._hold is not None and float(np.linalg.norm(self._hold.force())) > self._limit:
+        if self._hold is not None and float(self._hold.force() @ self._axis) > self._limit:
             self._hold.release()
             self._hold = None
 

@@ -167,7 +167,8 @@ class World:
         known = self.cell.known
         socket = known.socket(known.plugged_into)
         goal = socket.world_from_plug(known.connector.length)
-        return SocketHold(lay_cable(self.client, self.cable, goal, self.step_seconds), socket.pull_out_force)
+        hold = lay_cable(self.client, self.cable, goal, self.step_seconds)
+        return SocketHold(hold, np.asarray(socket.axis), socket.pull_out_force)
 
     def _build_clip(self) -> ClipHold:
         return ClipHold(

@@ -162,7 +162,7 @@ def test_what_was_pulled_out_is_taken_again_only_after_it_left(cell: Cell, plug:
 
 @pytest.mark.parametrize(("force", "stays"), [(5.0, True), (9.5, True), (10.5, False), (15.0, False)])
 def test_a_socket_lets_go_at_its_pull_out_force(plug: Plug, force: float, stays: bool) -> None:
-    socket = SocketHold(Hold(plug.client, plug.body, -1, RigidTransform.identity()), 10.0)
+    socket = SocketHold(Hold(plug.client, plug.body, -1, RigidTransform.identity()), np.array([0.0, 1.0, 0.0]), 10.0)
     for _ in range(480):
         plug.advance(plug.step, force=np.array([0.0, -force, 0.0]))
         socket.step()
@@ -172,7 +172,7 @@ def test_a_socket_lets_go_at_its_pull_out_force(plug: Plug, force: float, stays:
 
 
 def test_a_single_steps_spike_does_not_unplug(plug: Plug) -> None:
-    socket = SocketHold(Hold(plug.client, plug.body, -1, RigidTransform.identity()), 10.0)
+    socket = SocketHold(Hold(plug.client, plug.body, -1, RigidTransform.identity()), np.array([0.0, 1.0, 0.0]), 10.0)
     for i in range(100):
         plug.advance(plug.step, force=np.array([40.0 if i == 50 else 0.0, 0.0, 0.0]))
         socket.step()

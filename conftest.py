@@ -1,0 +1,65 @@
+"""Fixtures of all tests: the thesis's cell, arms, bare PyBullet clients. One file: mypy takes two for one module."""
+
+from collections.abc import Iterator
+from importlib.resources import files
+from typing import Any
+
+import pybullet as p
+import pytest
+import yaml
+from scipy.spatial.transform import RigidTransform
+
+from interfaces.cell import Box, Cell, KnownCell
+from motion.collision import CollisionModel
+from motion.kinematics import ArmKinematics
+
+
+def thesis() -> Any:
+    text = (files("scenarios") / "cells/thesis.yaml").read_text(encoding="utf-8")
+    return yaml.safe_load(text)
+
+
+@pytest.fixture(scope="session")
+def known() -> KnownCell:
+    return Cell.model_validate(thesis()).known
+
+
+@pytest.fixture(scope="session")
+def cell() -> Cell:
+    """The thesis's cell with small pictures and arms without joint offsets."""
+    data = thesis()
+    data["hidden"]["errors"]["arm_tool"] = 0.0
+    for camera in data["known"]["cameras"]:
+        camera |= {"width": 212, "height": 120}
+    return Cell.model_validate(data)
+
+
+@pytest.fixture
+def client(cell: Cell) -> Iterator[int]:
+    """An empty world without gravity at the cell's step."""
+    client = p.connect(p.DIRECT)
+    p.setTimeStep(1.0 / cell.hidden.step_rate, physicsClientId=client)
+    p.setPhysicsEngineParameter(numSolverIterations=cell.hidden.solver_iterations, physicsClientId=client)
+    yield client
+    p.disconnect(client)
+
+
+@pytest.fixture(scope="session")
+def boxes(known: KnownCell) -> list[Box]:
+    sockets = [Box(name=s.name, center=s.center, size=s.size) for s in known.sockets]
+    return [*known.boxes, *sockets, *known.clip.bracket]
+
+
+@pytest.fixture(scope="session")
+def left_arm(known: KnownCell) -> ArmKinematics:
+    return ArmKinematics(RigidTransform.from_translation(known.arm("left").base))
+
+
+@pytest.fixture(scope="session")
+def right_arm(known: KnownCell) -> ArmKinematics:
+    return ArmKinematics(RigidTransform.from_translation(known.arm("right").base))
+
+
+@pytest.fixture(scope="session")
+def right_model(right_arm: ArmKinematics, boxes: list[Box]) -> CollisionModel:
+    return CollisionModel(right_arm, boxes)

@@ -1,0 +1,64 @@
+"""Ways on which a held connector keeps to the shapes that its cable takes by itself.
+
+A cable clamped at its plugged end is stiff along itself: a hand that takes a short cut buckles it, with ten newtons and
+half a newton metre at the stiffness of the Earth tests, and the connector turns in the jaw. A hand that keeps the free
+end's distance and direction feels a tenth of that.
+"""
+
+import numpy as np
+from scipy.spatial.transform import RigidTransform, Rotation, Slerp
+
+from interfaces.cell import KnownCell, pose_along
+from motion.kinematics import FloatArray
+
+STEPS = 24
+
+
+def cable_anchor(known: KnownCell) -> tuple[FloatArray, FloatArray]:
+    """Where the cable leaves its plugged end's socket, (3,) m, and its direction there; that socket is the cell's last."""
+    socket = known.sockets[-1]
+    axis = np.asarray(socket.axis) / np.linalg.norm(socket.axis)
+    return np.asarray(socket.center) - 0.5 * socket.size[1] * axis, -axis
+
+
+def natural_pose(known: KnownCell, sideways: FloatArray) -> RigidTransform:
+    """world_from_connector at the end of a cable that a force bends `sideways` (3,) m off its straight course.
+
+    Cantilever with an end load (Euler-Bernoulli, second order in the slope): the slope at the end is 1.5 d / D, the cable
+    is D + 0.6 d^2 / D long, where d is the deflection and D the distance along the straight course.
+    """
+    anchor, course = cable_anchor(known)
+    length = known.cable_length
+    d2 = min(float(sideways @ sideways), 0.4 * length**2)
+    along = 0.5 * (length + np.sqrt(length**2 - 2.4 * d2))
+    direction = course + 1.5 * sideways / along
+    direction = direction / np.linalg.norm(direction)
+    centre = anchor + along * course + sideways + 0.5 * known.connector.length * direction
+    return pose_along(_triple(centre), _triple(direction))
+
+
+def natural_way(known: KnownCell, start: RigidTransform, goal: RigidTransform) -> list[RigidTransform]:
+    """Poses world_from_connector from `start` (left out) to `goal` by way of the cable's natural shapes.
+
+    What start and goal differ from those by fades from the one into the other.
+    """
+    begin, end = _sideways(known, start), _sideways(known, goal)
+    first = natural_pose(known, begin).inv() * start
+    last = natural_pose(known, end).inv() * goal
+    turn = Slerp([0.0, 1.0], Rotation.concatenate([first.rotation, last.rotation]))
+    poses = []
+    for s in np.linspace(0.0, 1.0, STEPS + 1)[1:]:
+        shift = (1 - s) * first.translation + s * last.translation
+        poses.append(natural_pose(known, (1 - s) * begin + s * end) * RigidTransform.from_components(shift, turn(s)))
+    return poses
+
+
+def _sideways(known: KnownCell, connector: RigidTransform) -> FloatArray:
+    """How far (3,) m the cable's end lies off the straight course."""
+    anchor, course = cable_anchor(known)
+    end = connector.apply([-0.5 * known.connector.length, 0.0, 0.0]) - anchor
+    return np.asarray(end - (end @ course) * course)
+
+
+def _triple(v: FloatArray) -> tuple[float, float, float]:
+    return float(v[0]), float(v[1]), float(v[2])

@@ -1,0 +1,134 @@
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from raycast import PURPLE, REAR_POSE, WOOD, Block, Cylinder, Sensor, render
+from scipy.spatial.transform import RigidTransform
+
+from interfaces.cell import KnownCell
+from interfaces.frame import Intrinsics, RgbdFrame
+from perception.occupancy import Spheres
+from perception.rgbd_pose import Estimate, NoEstimate
+from perception.service import Perception
+
+PLACE = np.array([0.36, 0.02, 0.30])
+END = Cylinder(PLACE, np.array([0.1, 1.0, 0.1]))
+WALL = Block(np.array([0.508, -0.4572, 0.0]), np.array([0.521, 0.4572, 0.6096]), WOOD)
+FLOOR = Block(np.array([-1.0, -1.2, -0.04]), np.array([1.4, 1.2, 0.0]), WOOD)
+FOAM = Block(np.array([0.22, 0.15, 0.10]), np.array([0.30, 0.27, 0.28]), PURPLE)
+REAR = Intrinsics.from_fov(848, 480, float(np.deg2rad(65.0)))
+Thing = Cylinder | Block
+
+
+def seen(*things: Thing, scale: float = 0.0) -> RgbdFrame:
+    return render([WALL, FLOOR, *things], REAR_POSE, REAR, Sensor(scale=scale), 5)
+
+
+@dataclass
+class Eye:
+    """A camera whose newest frame is set by hand."""
+
+    name: str = "rear"
+    frame: RgbdFrame | None = None
+
+    def latest(self) -> RgbdFrame | None:
+        return self.frame
+
+    def show(self, frame: RgbdFrame, number: int, stamp: float) -> None:
+        self.frame = replace(frame, number=number, stamp=stamp)
+
+
+class Clock:
+    def now(self) -> float:
+        return 0.0
+
+
+def believed(_frame: RgbdFrame) -> RigidTransform:
+    return REAR_POSE
+
+
+def perception(known: KnownCell, eye: Eye, arm: list[Spheres] | None = None) -> Perception:
+    return Perception(known, {"rear": eye}, Clock(), believed, lambda: arm or [])
+
+
+def test_there_is_nothing_to_say_before_the_first_frame(known: KnownCell) -> None:
+    eyes = perception(known, Eye())
+    assert eyes.frame("rear") is None
+    assert eyes.look("rear") is None
+    assert eyes.correct_depth("rear") == 1.0
+    assert eyes.map_obstacles("rear") == 0
+
+
+def test_a_frame_is_estimated_once_and_tells_the_track_once(known: KnownCell) -> None:
+    eye = Eye()
+    eyes = perception(known, eye)
+    fed = []
+    feed = eyes.track.feed
+    eyes.track.feed = lambda result: (fed.append(result), feed(result))[1]  # type: ignore[method-assign, func-returns-value]
+    eye.show(seen(END), number=1, stamp=0.0)
+    first = eyes.look("rear")
+    assert isinstance(first, Estimate)
+    assert eyes.look("rear") is first
+    eye.show(seen(END), number=2, stamp=1 / 15)
+    second = eyes.look("rear")
+    assert isinstance(second, Estimate)
+    assert second is not first
+    assert fed == [first, second]
+    assert eyes.track.last is second
+
+
+def test_a_look_finds_the_connector_in_the_world(known: KnownCell) -> None:
+    eye = Eye()
+    eye.show(seen(END), number=1, stamp=0.0)
+    found = perception(known, eye).look("rear")
+    assert isinstance(found, Estimate)
+    assert found.position == pytest.approx(PLACE, abs=0.006)
+
+
+def test_an_empty_scene_gives_a_reason_and_no_position(known: KnownCell) -> None:
+    eye = Eye()
+    eyes = perception(known, eye)
+    eye.show(seen(), number=1, stamp=0.0)
+    assert isinstance(eyes.look("rear"), NoEstimate)
+    assert eyes.track.last is None
+
+
+def test_the_hint_settles_which_end_is_the_tip(known: KnownCell) -> None:
+    eye = Eye()
+    eyes = perception(known, eye)
+    eyes.hint = np.array([0.0, -1.0, 0.0])
+    eye.show(seen(END), number=1, stamp=0.0)
+    found = eyes.look("rear")
+    assert isinstance(found, Estimate)
+    assert found.axis[1] < -0.9
+
+
+def test_a_corrected_depth_brings_the_connector_home(known: KnownCell) -> None:
+    eye = Eye()
+    eyes = perception(known, eye)
+    eye.show(seen(END, FOAM, scale=0.015), number=1, stamp=0.0)
+    assert eyes.correct_depth("rear") == pytest.approx(1 / 1.015, abs=0.003)
+    raw, corrected = eye.frame, eyes.frame("rear")
+    assert raw is not None
+    assert corrected is not None
+    assert np.median(corrected.depth[raw.depth > 0] / raw.depth[raw.depth > 0]) == pytest.approx(1 / 1.015, abs=0.003)
+    found = eyes.look("rear")
+    assert isinstance(found, Estimate)
+    assert found.position == pytest.approx(PLACE, abs=0.006)
+    uncorrected = perception(known, eye).look("rear")
+    assert isinstance(uncorrected, Estimate)
+    assert np.linalg.norm(uncorrected.position - PLACE) > np.linalg.norm(found.position - PLACE)
+
+
+def test_an_obstacle_is_mapped_and_an_arm_is_not(known: KnownCell) -> None:
+    eye = Eye()
+    eye.show(seen(FOAM), number=1, stamp=0.0)
+    eyes = perception(known, eye)
+    assert eyes.map_obstacles("rear") > 100
+    points = eyes.occupancy.occupied_points()
+    off = np.linalg.norm(np.maximum(np.maximum(FOAM.lower - points, points - FOAM.upper), 0.0), axis=1)
+    assert off.max() < 0.05  # by depth noise, pixels, voxel and the assumed depth
+    assert np.quantile(off, 0.95) < 0.03
+    middle = (FOAM.lower + FOAM.upper) / 2
+    arm = perception(known, eye, [(middle[None], np.array([0.15]))])
+    assert arm.map_obstacles("rear") < 0.05 * len(points)
