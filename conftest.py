@@ -15,12 +15,14 @@ from motion.kinematics import ArmKinematics
 
 
 def thesis() -> Any:
+    """The cell file's content."""
     text = (files("scenarios") / "cells/thesis.yaml").read_text(encoding="utf-8")
     return yaml.safe_load(text)
 
 
 @pytest.fixture(scope="session")
 def known() -> KnownCell:
+    """The cell as its robot knows it."""
     return Cell.model_validate(thesis()).known
 
 
@@ -46,20 +48,24 @@ def client(cell: Cell) -> Iterator[int]:
 
 @pytest.fixture(scope="session")
 def boxes(known: KnownCell) -> list[Box]:
+    """Floor, panels, sockets and clip."""
     sockets = [Box(name=s.name, center=s.center, size=s.size) for s in known.sockets]
     return [*known.boxes, *sockets, *known.clip.bracket]
 
 
 @pytest.fixture(scope="session")
 def left_arm(known: KnownCell) -> ArmKinematics:
+    """The left arm where it stands."""
     return ArmKinematics(RigidTransform.from_translation(known.arm("left").base))
 
 
 @pytest.fixture(scope="session")
 def right_arm(known: KnownCell) -> ArmKinematics:
+    """The right arm where it stands."""
     return ArmKinematics(RigidTransform.from_translation(known.arm("right").base))
 
 
 @pytest.fixture(scope="session")
 def right_model(right_arm: ArmKinematics, boxes: list[Box]) -> CollisionModel:
+    """The right arm among the boxes."""
     return CollisionModel(right_arm, boxes)

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from behaviors.hand import HAND, HandLeaf
+from behaviors.hand import BACK, HAND, HandLeaf
 from behaviors.leaf import Failed, Steps
 from interfaces.cause import CauseCode
 from motion.collision import CollisionModel
@@ -22,7 +22,7 @@ SEATED_SECONDS = 0.6  # the clip's lips take 0.2 s to close
 WAY_MARGIN = 0.0
 ROLLS = 36
 LONG_ENOUGH = 0.04  # m: a shorter visible part says too little of the axis
-TRUSTED_SHIFT = 0.035  # m: what is seen further off its place in the hand than this is a false look
+TRUSTED_SHIFT = 0.06  # m: what is seen further off its place in the hand than this is a false look
 
 
 class Carry(HandLeaf):
@@ -33,7 +33,8 @@ class Carry(HandLeaf):
         motion = self.services.motion
         held = self.services.belief.held
         assert held is not None
-        yield motion.carry(HAND, self._goals(held), held, speed=CARRY_SPEED)
+        onward = [RigidTransform.from_translation([x, 0.0, 0.0]) for x in (BEFORE, BEFORE - BACK[0])]  # in, and out again
+        yield motion.carry(HAND, self._goals(held), held, onward=onward, speed=CARRY_SPEED)
 
     def _goals(self, held: RigidTransform) -> list[RigidTransform]:
         """Hand poses before the clip from which a straight way in is free, any roll about the connector's axis.

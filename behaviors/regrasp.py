@@ -10,11 +10,10 @@ from motion.service import OPEN_GAP
 from perception.cable_shape import cable_course
 
 CLEAR = 0.05  # m around the connector's axis
-LIFT = 0.05  # m straight up from where it lay
 
 
 class Regrasp(HandLeaf):
-    """Brings the hand to where the connector was found, closes, feels, lifts.
+    """Brings the hand to where the connector was found, closes, feels.
 
     A hand that closes on nothing opens and goes back to sleep, and the leaf fails.
     """
@@ -39,7 +38,6 @@ class Regrasp(HandLeaf):
             yield from self.wait(0.6)
             yield from self.back_off()
             raise
-        yield from self.attempt(motion.shift(HAND, [0.0, 0.0, LIFT]))
 
 
 def _distance_to_axis(points: NDArray[np.float64], connector: RigidTransform, half: float) -> NDArray[np.float64]:

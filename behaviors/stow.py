@@ -2,11 +2,14 @@
 
 import numpy as np
 
+import numpy as np
+
 from behaviors.hand import HAND, HandLeaf
 from behaviors.leaf import Failed, Steps
 from behaviors.services import Notice
 from interfaces.cause import CauseCode
-from motion.service import OPEN_GAP
+from motion.service import NO_POINTS, OPEN_GAP
+from perception.cable_shape import cable_course
 from perception.rgbd_pose import Estimate
 from perception.slip import seen_at
 
@@ -23,7 +26,12 @@ class LetGo(HandLeaf):
         self.services.motion.grippers[HAND].open(OPEN_GAP)
         self.services.belief.held = None
         yield from self.wait(OPEN_SECONDS)
+        known, motion = self.services.known, self.services.motion
+        seat = known.clip.world_from_seat
+        along = np.linspace(-0.5, 0.5, 10)[:, None] * known.connector.length
+        motion.keep_clear(np.vstack([seat.apply(along * [1.0, 0.0, 0.0]), cable_course(known, seat)]))
         yield from self.back_off()
+        motion.keep_clear(NO_POINTS)
 
 
 class LookAtStow(HandLeaf):

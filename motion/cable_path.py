@@ -15,7 +15,7 @@ STEPS = 24
 
 
 def cable_anchor(known: KnownCell) -> tuple[FloatArray, FloatArray]:
-    """Where the cable leaves its plugged end's socket, (3,) m, and its direction there; that socket is the cell's last."""
+    """Where the cable leaves its plugged end's socket, (3,) m, and its direction there: the cell's last socket."""
     socket = known.sockets[-1]
     axis = np.asarray(socket.axis) / np.linalg.norm(socket.axis)
     return np.asarray(socket.center) - 0.5 * socket.size[1] * axis, -axis
@@ -24,8 +24,8 @@ def cable_anchor(known: KnownCell) -> tuple[FloatArray, FloatArray]:
 def natural_pose(known: KnownCell, sideways: FloatArray) -> RigidTransform:
     """world_from_connector at the end of a cable that a force bends `sideways` (3,) m off its straight course.
 
-    Cantilever with an end load (Euler-Bernoulli, second order in the slope): the slope at the end is 1.5 d / D, the cable
-    is D + 0.6 d^2 / D long, where d is the deflection and D the distance along the straight course.
+    Cantilever with an end load (Euler-Bernoulli, second order in the slope): the slope at the end is 1.5 d / D, the
+    cable is D + 0.6 d^2 / D long, where d is the deflection and D the distance along the straight course.
     """
     anchor, course = cable_anchor(known)
     length = known.cable_length

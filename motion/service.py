@@ -28,7 +28,7 @@ FloatArray = NDArray[np.float64]
 
 MARGIN = 0.015  # m between the arm's spheres and anything while it moves freely
 JAW_REACH = 0.13  # m round a connector's centre where the jaw may be: half its length, a finger's width, 5 cm of palm
-_NO_POINTS = np.empty((0, 3))
+NO_POINTS = np.empty((0, 3))
 TIGHT_MARGIN = 0.005  # m where nothing is found with that
 WAYS = 12  # ways to grasp that the planner may choose from
 NEAR_MARGIN = 0.0  # m on the last straight centimetres
@@ -76,7 +76,7 @@ class Motion:
         }
         self._boxes = known.solids()
         self._grid: DistanceGrid | None = None
-        self._points = self._cable = _NO_POINTS
+        self._points = self._cable = NO_POINTS
         self._spacing = 0.01
         self._seed = seed
 
@@ -88,13 +88,13 @@ class Motion:
         self._points, self._spacing = points, spacing
         for spec in self.known.arms:
             for q in (self.joints(spec.name), np.array(spec.sleep)):
-                self._clear(self.model(spec.name, others=False).spheres(q), ARM_MARGIN)
+                self._points = _away_from(self._points, self.model(spec.name, others=False).spheres(q), ARM_MARGIN)
         self._rebuild_grid()
 
-    def _clear(self, spheres: FloatArray, margin: float) -> None:
-        """Forget the points within `margin` m of spheres (m, 4)."""
-        distance = np.linalg.norm(self._points[:, None] - spheres[None, :, :3], axis=2)
-        self._points = self._points[np.all(distance > spheres[:, 3] + margin, axis=1)]
+    def keep_clear(self, points: FloatArray) -> None:
+        """Keep clear of these points (n, 3) m too, in place of those of an earlier call: a cable, a stowed connector."""
+        self._cable = points
+        self._rebuild_grid()
 
     def _rebuild_grid(self) -> None:
         points = np.vstack([self._points, self._cable])
@@ -112,7 +112,9 @@ class Motion:
         model = self.model(arm, held=held)
         distance, what = model.nearest(self.joints(arm))
         if what == "seen surface" and distance < TIGHT_MARGIN:
-            self._clear(model.spheres(self.joints(arm)), TIGHT_MARGIN + 2 * self._spacing)
+            spheres = model.spheres(self.joints(arm))
+            self._points = _away_from(self._points, spheres, TIGHT_MARGIN + 2 * self._spacing)
+            self._cable = _away_from(self._cable, spheres, TIGHT_MARGIN + 2 * self._spacing)
             self._rebuild_grid()
             model = self.model(arm, held=held)
         return model
@@ -173,10 +175,19 @@ class Motion:
 
         return self._task(arm, steps())
 
-    def carry(self, arm: str, goals: Sequence[RigidTransform], held: RigidTransform, *, speed: float) -> Task:
+    def carry(
+        self,
+        arm: str,
+        goals: Sequence[RigidTransform],
+        held: RigidTransform,
+        *,
+        onward: Sequence[RigidTransform] = (),
+        speed: float,
+    ) -> Task:
         """Bring what `arm` holds (tool_from_connector) to one of the goals (world_from_tool), the first preferred.
 
-        By way of the shapes that the cable takes by itself where that is free, else straight, else by any free way.
+        By way of the shapes that the cable takes by itself where that is free, else straight, else by any free way. From
+        the goal the tool must also reach the poses `onward` (goal_from_tool) in straight lines.
         """
 
         def steps() -> Iterator[None]:
@@ -186,10 +197,19 @@ class Motion:
                 for goal in goals:
                     poses = [pose * release for pose in natural_way(self.known, start, goal * held)] if natural else [goal]
                     path = _through(kin, q, poses)
-                    if path is not None and model.path_free(path[1:], TIGHT_MARGIN):
+                    if path is None or _through(kin, path[-1], [goal * then for then in onward]) is None:
+                        continue
+                    if model.path_free(path[1:], TIGHT_MARGIN):
                         yield from self._follow(arm, path, speed)
                         return
-            configurations = np.vstack([kin.ik(goal) for goal in goals])
+            configurations = np.array(
+                [
+                    end
+                    for goal in goals
+                    for end in kin.ik(goal)
+                    if _through(kin, end, [goal * then for then in onward]) is not None
+                ]
+            ).reshape(-1, 6)
             yield from self._follow(arm, self._plan(model, q, configurations), speed)
 
         return self._task(arm, steps())
@@ -219,8 +239,7 @@ class Motion:
 
         def steps() -> Iterator[None]:
             q = self.joints(arm)
-            self._cable = _clear_of(cable, world_from_connector.translation, JAW_REACH)
-            self._rebuild_grid()
+            self.keep_clear(_clear_of(cable, world_from_connector.translation, JAW_REACH))
             model = self._start_model(arm)
             ways = self._ways_to_grasp(arm, model, world_from_connector, shallow)
             self.grippers[arm].open(OPEN_GAP)
@@ -228,8 +247,7 @@ class Motion:
             way = min(ways, key=lambda way: float(np.abs(way[0] - path[-1]).max()))
             yield from self._follow(arm, path, 1.0)
             yield from self._follow(arm, np.vstack([self.joints(arm), way[1:]]), APPROACH_SPEED)
-            self._cable = _NO_POINTS
-            self._rebuild_grid()
+            self.keep_clear(NO_POINTS)
 
         return self._task(arm, steps())
 
@@ -316,7 +334,7 @@ def _connector_spheres(held: RigidTransform, connector: Connector) -> FloatArray
 def _clear_of(points: FloatArray | None, place: FloatArray, radius: float) -> FloatArray:
     """The points (n, 3) further than `radius` m from a place (3,)."""
     if points is None:
-        return _NO_POINTS
+        return NO_POINTS
     return points[np.linalg.norm(points - place, axis=1) > radius]
 
 
@@ -329,3 +347,9 @@ def _through(kin: ArmKinematics, q: FloatArray, poses: Sequence[RigidTransform])
     except PlanningError:
         return None
     return path
+
+
+def _away_from(points: FloatArray, spheres: FloatArray, margin: float) -> FloatArray:
+    """The points (n, 3) further than `margin` m from the spheres (m, 4)."""
+    distance = np.linalg.norm(points[:, None] - spheres[None, :, :3], axis=2)
+    return points[np.all(distance > spheres[:, 3] + margin, axis=1)]

@@ -42,11 +42,16 @@ def seen_at(connector: NDArray[np.float64], point: NDArray[np.float64], radius: 
 
 
 class GapTest:
-    """Whether the pads are closer than what they should hold is thick: the median gap of the last readings."""
+    """Whether the pads stand as what they should hold allows: the median gap of the last readings.
+
+    Closer than it is thick, and they closed on nothing; twice as far, and the jaw stands open. In between a stiff cable may
+    pry them by its tilt.
+    """
 
     def __init__(self, thickness: float, tolerance: float = GAP_TOLERANCE, readings: int = GAP_READINGS) -> None:
         """`thickness` of the held thing and `tolerance` below it, metres; one noisy reading moves no median."""
         self._limit = thickness - tolerance
+        self._open = 2 * thickness
         self._gaps: deque[GripperReading] = deque(maxlen=readings)
 
     def feed(self, reading: GripperReading) -> None:
@@ -64,5 +69,6 @@ class GapTest:
             sentence = f"{len(self._gaps)} of {self._gaps.maxlen} finger readings so far"
             return SlipEvidence(False, "gap", float("nan"), self._limit, sentence)
         value = float(np.median([reading.gap for reading in self._gaps]))
-        sentence = f"pads {1e3 * value:.1f} mm apart, limit {1e3 * self._limit:.1f} mm"
-        return SlipEvidence(value < self._limit, "gap", value, self._limit, sentence)
+        limit = self._open if value > self._open else self._limit
+        sentence = f"pads {1e3 * value:.1f} mm apart, limit {1e3 * limit:.1f} mm"
+        return SlipEvidence(not self._limit <= value <= self._open, "gap", value, limit, sentence)

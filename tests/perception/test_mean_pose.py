@@ -18,21 +18,21 @@ def estimate(
 
 
 def test_one_false_look_moves_nothing() -> None:
-    looks = [estimate(PLACE + [0, 0, 1e-3 * i]) for i in (-1, 0, 1)]
-    pose, whole = mean_pose([*looks, estimate(PLACE + [0.3, 0, 0]), estimate(PLACE)])
+    looks = [estimate(np.add(PLACE, [0, 0, 1e-3 * i])) for i in (-1, 0, 1)]
+    pose, whole = mean_pose([*looks, estimate(np.add(PLACE, [0.3, 0, 0])), estimate(PLACE)])
     assert whole
     assert pose.translation == pytest.approx(PLACE, abs=1e-3)
 
 
 def test_parts_do_not_count_beside_a_look_at_the_whole() -> None:
-    part = estimate(PLACE + [0.0, 0.03, 0.0], extent=0.03, whole=False)
+    part = estimate(np.add(PLACE, [0.0, 0.03, 0.0]), extent=0.03, whole=False)
     pose, whole = mean_pose([part, part, part, estimate()])
     assert whole
     assert pose.translation == pytest.approx(PLACE)
 
 
 def test_of_parts_alone_the_longest_count_and_are_not_the_whole() -> None:
-    stub = estimate(PLACE + [0.0, 0.04, 0.0], axis=np.array([1.0, 0.0, 0.0]), extent=0.02, whole=False)
+    stub = estimate(np.add(PLACE, [0.0, 0.04, 0.0]), axis=np.array([1.0, 0.0, 0.0]), extent=0.02, whole=False)
     pose, whole = mean_pose([stub, stub, stub, estimate(extent=0.06, whole=False)])
     assert not whole
     assert pose.translation == pytest.approx(PLACE)

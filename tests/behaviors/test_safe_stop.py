@@ -1,0 +1,33 @@
+from pathlib import Path
+
+import pytest
+from fake_services import Stage
+from py_trees.common import Status
+
+from interfaces.cause import Cause, CauseCode
+from interfaces.cell import KnownCell
+
+STOP = '<SafeStop name="safe_stop"/>'
+
+
+def test_it_stops_the_arms_at_once_and_fails_with_the_last_cause(known: KnownCell, tmp_path: Path) -> None:
+    stage = Stage(known, tmp_path)
+    stage.belief.causes += [
+        Cause(CauseCode.SLIPPED, "an old slip", "root/a"),
+        Cause(CauseCode.OUT_OF_REACH, "connector 0.82 m from the right arm", "root/b"),
+    ]
+    tree = stage.tree(STOP)
+    assert stage.run(tree, 0.0) is Status.RUNNING
+    assert stage.motion.stopped == 1
+    assert stage.run(tree, 2.0) is Status.FAILURE
+    assert stage.clock.t == pytest.approx(0.3, abs=0.051)
+    assert stage.motion.stopped == 1
+    assert stage.belief.causes[-1].code is CauseCode.OUT_OF_REACH
+    assert "0.82 m" in stage.belief.causes[-1].message
+    assert not stage.motion.grippers["right"].told  # the jaw keeps its force
+
+
+def test_a_stop_without_a_cause_is_an_error_of_the_tree(known: KnownCell, tmp_path: Path) -> None:
+    stage = Stage(known, tmp_path)
+    assert stage.run(stage.tree(STOP), 2.0) is Status.FAILURE
+    assert stage.belief.causes[-1].code is CauseCode.INTERNAL_ERROR

@@ -1,0 +1,66 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fake_services import Seen, Stage, seen, unseen
+from py_trees.common import Status
+from scipy.spatial.transform import RigidTransform
+
+from interfaces.cause import CauseCode
+from interfaces.cell import KnownCell
+
+LOOK = '<LookAtStow name="look_at_stow"/>'
+HOLDING = '<Holding name="holding"/>'
+
+
+@pytest.fixture
+def stage(known: KnownCell, tmp_path: Path) -> Stage:
+    return Stage(known, tmp_path)
+
+
+def test_an_end_in_the_clip_is_stowed(stage: Stage) -> None:
+    seat = np.array(stage.known.clip.seat)
+    stage.perception.shows = lambda _, t: seen(t, np.add(seat, [0.0, 0.02, 0.01]))
+    assert stage.run(stage.tree(LOOK), 3.0) is Status.SUCCESS
+    assert not stage.belief.notices
+
+
+def beside(stage: Stage, stamp: float) -> Seen:
+    return seen(stamp, np.add(stage.known.clip.seat, [0.0, 0.0, -0.10]))
+
+
+def nowhere(_stage: Stage, stamp: float) -> Seen:
+    return unseen(stamp)
+
+
+def stale(stage: Stage, _stamp: float) -> Seen:
+    return seen(0.0, np.array(stage.known.clip.seat))
+
+
+@pytest.mark.parametrize("shows", [beside, nowhere, stale])
+def test_an_end_that_is_not_there_is_noticed_once(stage: Stage, shows: object) -> None:
+    stage.clock.t = 1.0
+    stage.perception.shows = lambda _, t: shows(stage, t)  # type: ignore[operator]
+    assert stage.run(stage.tree(LOOK), 3.0) is Status.FAILURE
+    [notice] = stage.belief.notices
+    assert notice.by == "place"
+    assert notice.at == pytest.approx(stage.clock.t)
+    assert [cause.code for cause in stage.belief.causes] == [CauseCode.NOT_STOWED]
+
+
+def test_letting_go_opens_the_jaw_and_believes_nothing_held(stage: Stage) -> None:
+    stage.belief.held = RigidTransform.identity()
+    tree = stage.tree('<LetGo name="let_go"/>')
+    stage.run(tree, 0.2)
+    assert stage.motion.grippers["right"].told[0][0] == "open"
+    assert not stage.motion.moves  # the arm waits until the jaw is open
+    assert stage.services.belief.held is None
+
+
+@pytest.mark.parametrize(("held", "status"), [(RigidTransform.identity(), Status.SUCCESS), (None, Status.FAILURE)])
+def test_holding_says_what_is_believed_and_needs_no_cause(
+    stage: Stage, held: RigidTransform | None, status: Status
+) -> None:
+    stage.belief.held = held
+    assert stage.run(stage.tree(HOLDING), 0.0) is status
+    assert not stage.belief.causes

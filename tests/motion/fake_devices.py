@@ -1,0 +1,97 @@
+"""Arms and grippers that do exactly what they are told, on a clock that is turned by hand."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from interfaces.cell import KnownCell
+from interfaces.reading import GripperReading, JointReading
+from interfaces.trajectory import Trajectory
+from motion.service import Motion, Task
+
+TICK = 0.05
+
+
+@dataclass
+class Clock:
+    t: float = 0.0
+
+    def now(self) -> float:
+        return self.t
+
+
+@dataclass
+class FakeArm:
+    """`stuck` is the share of a trajectory after which the arm goes no further."""
+
+    name: str
+    clock: Clock
+    at: NDArray[np.float64]
+    stuck: float = 1.0
+    followed: list[tuple[float, Trajectory]] = field(default_factory=list)
+    stops: int = 0
+    _begun: float | None = None
+
+    def reading(self) -> JointReading:
+        return JointReading(self.clock.t, self._now(), np.zeros(6), np.zeros(6))
+
+    def follow(self, trajectory: Trajectory) -> None:
+        assert np.abs(trajectory.positions[0] - self._now()).max() < 1e-6, "a trajectory begins where the arm is"
+        self.followed.append((self.clock.t, trajectory))
+        self._begun = self.clock.t
+
+    def stop(self) -> None:
+        self.at, self._begun = self._now(), None
+        self.stops += 1
+
+    def is_moving(self) -> bool:
+        return self._begun is not None and self.clock.t < self._begun + self.followed[-1][1].duration - 1e-9
+
+    def _now(self) -> NDArray[np.float64]:
+        if self._begun is None:
+            return self.at
+        trajectory = self.followed[-1][1]
+        elapsed = min(self.clock.t - self._begun, self.stuck * trajectory.duration)
+        return trajectory.sample(elapsed)[0]
+
+
+@dataclass
+class FakeGripper:
+    """`inside` m is how thick what lies between the pads is."""
+
+    clock: Clock
+    gap: float = 0.0
+    inside: float = 0.0
+    told: list[tuple[float, str, float]] = field(default_factory=list)
+
+    def open(self, gap: float) -> None:
+        self.gap = gap
+        self.told.append((self.clock.t, "open", gap))
+
+    def close(self, force: float) -> None:
+        self.gap = self.inside
+        self.told.append((self.clock.t, "close", force))
+
+    def reading(self) -> GripperReading:
+        return GripperReading(self.clock.t, self.gap)
+
+
+@dataclass
+class Rig:
+    """A cell with both arms asleep."""
+
+    known: KnownCell
+    clock: Clock = field(default_factory=Clock)
+
+    def __post_init__(self) -> None:
+        self.arms: dict[str, FakeArm] = {s.name: FakeArm(s.name, self.clock, np.array(s.sleep)) for s in self.known.arms}
+        self.grippers: dict[str, FakeGripper] = {s.name: FakeGripper(self.clock) for s in self.known.arms}
+        self.motion = Motion(self.known, self.arms, self.grippers, self.clock, seed=0)
+
+    def run(self, task: Task, seconds: float = 60.0) -> None:
+        """Poll a task at every tick until it is done."""
+        end = self.clock.t + seconds
+        while not task.poll():
+            assert self.clock.t < end, "the task does not end"
+            self.clock.t += TICK

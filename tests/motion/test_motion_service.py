@@ -1,0 +1,235 @@
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from fake_devices import TICK, Rig
+from numpy.typing import NDArray
+from scipy.spatial.transform import RigidTransform, Rotation
+
+from interfaces.cause import CauseCode
+from interfaces.cell import KnownCell, pose_along
+from interfaces.frame import Intrinsics, RgbdFrame
+from motion.failure import PlanningError
+from motion.service import GRIP_OFFSETS, MARGIN, OPEN_GAP, TIGHT_MARGIN, Motion
+
+Points = NDArray[np.float64]
+READY = np.array([0.4, -0.6, 0.6, 0.0, 0.3, 0.0])
+ASIDE = np.array([-0.5, -0.6, 0.6, 0.0, 0.3, 0.0])
+HELD = RigidTransform.from_components([0.0, 0.0, 0.0], Rotation.from_euler("y", -90, degrees=True))
+
+
+@pytest.fixture
+def rig(known: KnownCell) -> Rig:
+    return Rig(known)
+
+
+def cube(center: Points, edge: float = 0.06, h: float = 0.01) -> Points:
+    steps = np.arange(-edge / 2, edge / 2 + 1e-9, h)
+    return np.asarray(center + np.stack(np.meshgrid(steps, steps, steps), -1).reshape(-1, 3))
+
+
+def flown(rig: Rig, arm: str) -> list[Points]:
+    """Where the arm was along its last trajectory, joints (6,)."""
+    trajectory = rig.arms[arm].followed[-1][1]
+    return [trajectory.sample(t)[0] for t in np.linspace(0.0, trajectory.duration, 60)]
+
+
+def moved(rig: Rig, *way: float) -> RigidTransform:
+    """The right tool's pose, shifted by `way` m in the world."""
+    return RigidTransform.from_translation(way) * rig.motion.tool("right")
+
+
+def test_a_plan_costs_its_latency_and_ends_where_planned(rig: Rig) -> None:
+    task = rig.motion.move("right", READY[None])
+    assert not task.poll()
+    assert not rig.arms["right"].followed  # planned, not yet begun
+    rig.clock.t = rig.known.latencies.plan
+    assert not task.poll()
+    [(begun, trajectory)] = rig.arms["right"].followed
+    assert begun == pytest.approx(rig.known.latencies.plan)
+    rig.run(task)
+    assert rig.motion.joints("right") == pytest.approx(READY)
+    assert rig.clock.t >= begun + trajectory.duration
+    assert task.poll()  # done stays done
+    assert not rig.arms["left"].followed
+
+
+def test_the_nearest_to_hand_of_several_goals_is_reached(rig: Rig) -> None:
+    rig.run(rig.motion.move("left", np.stack([ASIDE, READY])))
+    assert min(np.abs(rig.motion.joints("left") - goal).max() for goal in (ASIDE, READY)) < 1e-6
+
+
+@pytest.mark.parametrize("work", [lambda m: m.move("right", READY[None]), lambda m: m.shift("right", [0.0, 0.0, 0.05])])
+def test_an_arm_that_does_not_get_there_was_blocked(rig: Rig, work: Callable[[Motion], object]) -> None:
+    rig.arms["right"].at = ASIDE
+    rig.arms["right"].stuck = 0.3
+    with pytest.raises(PlanningError, match="right arm stopped 0") as error:
+        rig.run(work(rig.motion))  # type: ignore[arg-type]
+    assert error.value.code is CauseCode.MOTION_BLOCKED
+
+
+def test_cancel_stops_the_arm_where_it_is(rig: Rig) -> None:
+    task = rig.motion.move("right", READY[None])
+    while rig.clock.t < 0.5:
+        task.poll()
+        rig.clock.t += TICK
+    there = rig.motion.joints("right")
+    task.cancel()
+    rig.clock.t += 5.0
+    assert rig.arms["right"].stops == 1
+    assert task.poll()
+    assert rig.motion.joints("right") == pytest.approx(there)
+    assert np.abs(there - READY).max() > 0.1
+    assert np.abs(there - rig.known.arm("right").sleep).max() > 0.1
+
+
+def test_stop_stops_both_arms(rig: Rig) -> None:
+    rig.motion.stop()
+    assert [arm.stops for arm in rig.arms.values()] == [1, 1]
+
+
+def test_a_goal_in_the_panel_is_no_goal(rig: Rig) -> None:
+    kin = rig.motion.kinematics["right"]
+    inside = RigidTransform.from_translation([0.50, -0.1, 0.3])
+    goals = kin.ik(inside)
+    assert len(goals)
+    with pytest.raises(PlanningError) as error:
+        rig.motion.move("right", goals).poll()
+    assert error.value.code is CauseCode.NO_COLLISION_FREE_GOAL
+
+
+def test_a_straight_way_is_straight_and_does_not_turn(rig: Rig) -> None:
+    rig.arms["right"].at = READY
+    start, way = rig.motion.tool("right"), np.array([-0.05, 0.03, 0.04])
+    rig.run(rig.motion.shift("right", way))
+    end = rig.motion.tool("right")
+    assert end.translation == pytest.approx(start.translation + way, abs=1e-4)
+    assert (start.rotation.inv() * end.rotation).magnitude() < 1e-3
+    tools = np.array([rig.motion.kinematics["right"].tool(q).translation for q in flown(rig, "right")])
+    off = np.linalg.norm(np.cross(tools - start.translation, way), axis=1) / np.linalg.norm(way)
+    assert off.max() < 0.004
+
+
+def test_seen_obstacles_are_kept_clear_of(rig: Rig) -> None:
+    rig.arms["right"].at = ASIDE
+    kin = rig.motion.kinematics["right"]
+    middle = kin.tool(0.5 * (ASIDE + READY)).translation
+    rig.run(rig.motion.move("right", READY[None]))
+    clearance = [np.linalg.norm(kin.tool(q).translation - middle) for q in flown(rig, "right")]
+    assert min(clearance) < 0.03  # without an obstacle the hand goes through there
+    rig.run(rig.motion.move("right", ASIDE[None]))
+
+    points = cube(middle)
+    rig.motion.set_obstacles(points, 0.01)
+    rig.run(rig.motion.move("right", READY[None]))
+    body = rig.motion.model("right", others=False)
+    for q in flown(rig, "right"):
+        spheres = body.spheres(q)
+        gaps = np.linalg.norm(points[:, None] - spheres[None, :, :3], axis=2) - spheres[:, 3]
+        assert gaps.min() > TIGHT_MARGIN - 0.01  # the grid's voxels are a centimetre
+
+
+def test_points_where_an_arm_is_or_sleeps_are_no_obstacles(rig: Rig) -> None:
+    rig.arms["left"].at = READY
+    on_left = rig.motion.tool("left").translation
+    asleep = rig.motion.kinematics["left"].tool(np.array(rig.known.arm("left").sleep)).translation
+    far = np.array([0.3, 0.25, 0.15])
+    rig.motion.set_obstacles(np.vstack([cube(on_left, 0.04), cube(asleep, 0.04), cube(far, 0.04)]), 0.01)
+    assert rig.motion.model("left").free(READY, MARGIN)
+    assert rig.motion.model("left").free(np.array(rig.known.arm("left").sleep), 0.0)
+    eye = RigidTransform.from_translation([-0.3, 0.0, 0.4])
+    assert not rig.motion.sees(eye, 2 * far[None] - eye.translation)  # the other points still count
+    rig.motion.set_obstacles(np.empty((0, 3)), 0.01)
+    assert rig.motion.sees(eye, far[None])
+
+
+def test_a_motion_can_begin_with_a_hand_beside_a_seen_surface(rig: Rig) -> None:
+    rig.motion.set_obstacles(cube(rig.motion.kinematics["right"].tool(READY).translation, 0.04), 0.01)
+    rig.arms["right"].at = READY  # it came in by feel, the margin to the voxels is gone
+    assert not rig.motion.model("right").free(READY, TIGHT_MARGIN)
+    rig.run(rig.motion.move("right", ASIDE[None]))
+    assert rig.motion.joints("right") == pytest.approx(ASIDE)
+
+
+def test_nothing_is_seen_through_a_panel(rig: Rig) -> None:
+    eye = RigidTransform.from_translation([0.0, 0.0, 0.3])
+    assert rig.motion.sees(eye, np.array([[0.45, 0.3, 0.3]]))
+    assert not rig.motion.sees(eye, np.array([[0.9, 0.3, 0.3]]))
+
+
+@pytest.mark.parametrize("shallow", [0.0, 0.008])
+def test_a_pick_brings_the_open_jaw_round_the_connector(rig: Rig, shallow: float) -> None:
+    plug = rig.known.socket("back_4").world_from_plug(rig.known.connector.length)
+    rig.run(rig.motion.pick("right", plug, shallow=shallow))
+    assert rig.grippers["right"].gap == OPEN_GAP
+    opened_at = rig.grippers["right"].told[0][0]
+    assert opened_at <= rig.arms["right"].followed[0][0]
+    tool, axis = rig.motion.tool("right"), plug.rotation.apply([1.0, 0.0, 0.0])
+    pads_middle = tool.translation + tool.rotation.apply([shallow, 0.0, 0.0])
+    offset = pads_middle - plug.translation
+    assert min(abs(offset @ axis - known) for known in GRIP_OFFSETS) < 1e-3
+    assert np.linalg.norm(offset - (offset @ axis) * axis) < 1e-3
+    assert abs(tool.rotation.apply([0.0, 1.0, 0.0]) @ axis) < 1e-3  # the fingers close across it
+
+
+def test_the_way_to_a_pick_keeps_off_the_cable_and_the_cable_is_forgotten(rig: Rig) -> None:
+    connector = pose_along((0.30, 0.02, 0.25), (0.0, 1.0, 0.0))
+    cable = connector.translation + np.linspace(0.045, 0.40, 40)[:, None] * np.array([0.0, -1.0, 0.0])
+    rig.run(rig.motion.pick("right", connector, cable=cable))
+    body = rig.motion.model("right", others=False)
+    counted = cable[np.linalg.norm(cable - connector.translation, axis=1) > 0.13]
+    for q in flown(rig, "right"):
+        spheres = body.spheres(q)
+        gaps = np.linalg.norm(counted[:, None] - spheres[None, :, :3], axis=2) - spheres[:, 3]
+        assert gaps.min() > -0.01
+    assert rig.motion.sees(RigidTransform.from_translation([-0.3, 0.0, 0.4]), counted)
+
+
+def test_a_connector_out_of_reach_cannot_be_picked(rig: Rig) -> None:
+    with pytest.raises(PlanningError, match="grasp candidates") as error:
+        rig.motion.pick("right", pose_along((0.2, 1.2, 0.3), (0.0, 1.0, 0.0))).poll()
+    assert error.value.code is CauseCode.OUT_OF_REACH
+    assert not rig.grippers["right"].told
+
+
+def test_a_carry_takes_the_short_way_to_the_first_goal(rig: Rig) -> None:
+    rig.arms["right"].at = ASIDE
+    start = rig.motion.tool("right") * HELD
+    near, other = moved(rig, 0.0, 0.10, 0.05), moved(rig, 0.0, 0.20, -0.05)
+    rig.run(rig.motion.carry("right", [near, other], HELD, speed=0.5))
+    end = rig.motion.tool("right")
+    assert end.translation == pytest.approx(near.translation, abs=1e-3)
+    assert (end.rotation.inv() * near.rotation).magnitude() < 0.01
+    places = [(rig.motion.kinematics["right"].tool(q) * HELD).translation for q in flown(rig, "right")]
+    length = np.linalg.norm(np.diff(places, axis=0), axis=1).sum()
+    assert length < 1.5 * np.linalg.norm((near * HELD).translation - start.translation)
+
+
+def test_a_carry_leaves_out_a_goal_in_the_panel(rig: Rig) -> None:
+    rig.arms["right"].at = ASIDE
+    tool = rig.motion.tool("right")
+    blocked = RigidTransform.from_components([0.505, -0.15, 0.3], tool.rotation)
+    free = moved(rig, 0.0, 0.10, 0.0)
+    rig.run(rig.motion.carry("right", [blocked, free], HELD, speed=0.5))
+    assert rig.motion.tool("right").translation == pytest.approx(free.translation, abs=1e-3)
+
+
+def test_the_carried_connector_counts_as_body(rig: Rig) -> None:
+    q = READY
+    tip = (rig.motion.kinematics["right"].tool(q) * HELD).apply([0.035, 0.0, 0.0])
+    rig.motion.set_obstacles(tip[None], 0.01)
+    assert rig.motion.model("right", held=HELD).nearest(q)[0] < rig.motion.model("right").nearest(q)[0]
+    assert not rig.motion.model("right", held=HELD).free(q, TIGHT_MARGIN)
+
+
+def test_a_wrist_frame_is_placed_by_the_joints_at_its_exposure(rig: Rig) -> None:
+    k = Intrinsics(4, 4, 4.0, 4.0, 1.5, 1.5)
+    rgb, depth = np.zeros((4, 4, 3), np.uint8), np.zeros((4, 4), np.float32)
+    then = rig.motion.camera_pose(RgbdFrame("wrist", 1, 0.0, rgb, depth, k, READY))
+    rig.arms["left"].at = ASIDE
+    again = rig.motion.camera_pose(RgbdFrame("wrist", 1, 0.0, rgb, depth, k, READY))
+    assert np.array_equal(then.as_matrix(), again.as_matrix())
+    now = rig.motion.camera_pose(RgbdFrame("wrist", 2, 0.0, rgb, depth, k, ASIDE))
+    assert np.linalg.norm(now.translation - then.translation) > 0.1
+    rear = rig.motion.camera_pose(RgbdFrame("rear", 1, 0.0, rgb, depth, k))
+    assert rear.translation == pytest.approx([-0.3556, 0.0, 0.4064])
