@@ -12,9 +12,9 @@ from motion.failure import PlanningError
 from motion.kinematics import ArmKinematics
 from motion.straight import straight_line
 from perception.mean_pose import mean_pose
-from perception.rgbd_pose import Estimate
+from perception.rgbd_pose import WHOLE_SHARE, Estimate
 
-BEFORE = 0.03  # m before the clip along the hand's own axis, from where it goes straight in; more would press the cable
+BEFORE = 0.025  # m before the clip along the hand's own axis, from where it goes straight in; more would press the cable
 CARRY_SPEED = 0.5
 INSERT_SPEED = 0.2
 LOOK_SECONDS = 0.8
@@ -90,8 +90,10 @@ class Insert(HandLeaf):
         if not long or belief.held is None:
             self.say("the hand hides the connector", frames=len(seen))
             return
-        pose, whole = mean_pose(long)
+        pose, _ = mean_pose(long)
         found = self.services.motion.tool(HAND).inv() * pose
+        # The fingers hide the cable's side: unless all of the length shows, where the part lies on it is a guess.
+        whole = max(e.extent for e in long) > WHOLE_SHARE * self.services.known.connector.length
         if not whole:
             found = _turned_in_the_jaw(belief.held, found)
         shift = float(np.linalg.norm(found.translation - belief.held.translation))

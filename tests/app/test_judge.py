@@ -1,0 +1,180 @@
+from dataclasses import dataclass, field
+from typing import Any, cast
+
+import pytest
+
+from app.judge import LOST_SECONDS, STILL_SECONDS, Judge
+from app.scenario_file import Expect
+from behaviors.services import Belief, Notice
+from interfaces.cause import CauseCode
+from sim.ground_truth import GroundTruth
+
+TICK = 0.05
+
+
+@dataclass
+class Truth:
+    """A ground truth that a test writes."""
+
+    fingers: int = 0  # that touch the connector
+    in_clip: bool = False
+    speed: float = 0.0
+    pixels: int = 0
+    peaks: dict[str, float] = field(default_factory=dict)
+
+    def held(self) -> bool:
+        return self.fingers == 2
+
+    def touched(self) -> bool:
+        return self.fingers > 0
+
+    def stowed(self) -> bool:
+        return self.in_clip
+
+    def connector_speed(self) -> float:
+        return self.speed
+
+    def connector_pixels(self, camera: str) -> int:
+        return self.pixels if camera == "rear" else 10_000
+
+    def contact_peaks(self) -> dict[str, float]:
+        return self.peaks
+
+
+@dataclass
+class Run:
+    """A judge, what it sees, and what the robot believes."""
+
+    expect: Expect = Expect()
+    truth: Truth = field(default_factory=Truth)
+    belief: Belief = field(default_factory=Belief)
+    tick: int = 0
+
+    def __post_init__(self) -> None:
+        self.judge = Judge(cast(GroundTruth, self.truth), self.expect)
+
+    def go(self, seconds: float, **truth: Any) -> float:
+        """Let the truth be so for so long; the second at which that began."""
+        for name, value in truth.items():
+            setattr(self.truth, name, value)
+        begin = self.tick * TICK
+        for _ in range(round(seconds / TICK)):
+            self.judge.observe(self.tick * TICK, self.belief)
+            self.tick += 1
+        return begin
+
+    def verdict(self, name: str, outcome: str = "stowed", cause: str | None = None) -> tuple[bool, Any]:
+        [found] = [e for e in self.judge.expectations(outcome, cause, self.belief) if e.name == name]
+        return found.met, found.value
+
+
+def test_an_end_never_held_is_not_lost() -> None:
+    run = Run()
+    run.go(5.0)
+    assert run.judge.losses == []
+
+
+def test_a_loss_is_dated_from_the_moment_of_release() -> None:
+    run = Run()
+    run.go(1.0, fingers=2)
+    released = run.go(3.0, fingers=0)
+    assert run.judge.losses == [pytest.approx(released)]
+
+
+@pytest.mark.parametrize(("gap", "losses"), [(LOST_SECONDS - TICK, 0), (LOST_SECONDS + 2 * TICK, 1)])
+def test_a_hold_regained_within_a_moment_is_no_loss(gap: float, losses: int) -> None:
+    run = Run()
+    run.go(1.0, fingers=2)
+    run.go(gap, fingers=0)
+    run.go(1.0, fingers=2)
+    assert len(run.judge.losses) == losses
+
+
+def test_what_one_pad_still_touches_or_the_clip_holds_is_not_lost() -> None:
+    run = Run()
+    run.go(1.0, fingers=2)
+    run.go(2.0, fingers=1)
+    run.go(2.0, fingers=0, in_clip=True)
+    assert run.judge.losses == []
+
+
+def test_each_loss_has_the_first_notice_before_the_next() -> None:
+    run = Run()
+    run.go(1.0, fingers=2)
+    first = run.go(1.0, fingers=0)
+    run.go(1.0, fingers=2)
+    second = run.go(1.0, fingers=0)
+    run.belief.notices += [Notice(0.5, "distance"), Notice(first + 0.2, "gap"), Notice(first + 0.4, "place")]
+    one, two = run.judge.slips(run.belief)
+    assert (one.released_at, one.detected_at, one.detected_by) == (
+        pytest.approx(first),
+        pytest.approx(first + 0.2),
+        "gap",
+    )
+    assert (two.released_at, two.detected_at, two.detected_by) == (pytest.approx(second), None, None)
+
+
+def test_slips_are_met_when_every_loss_was_noticed_and_there_were_enough() -> None:
+    run = Run(Expect(slips=1))
+    assert run.verdict("slips") == (False, 0)
+    run.go(1.0, fingers=2)
+    lost = run.go(1.0, fingers=0)
+    assert run.verdict("slips") == (False, 0)
+    run.belief.notices.append(Notice(lost + 0.3, "gap"))
+    assert run.verdict("slips") == (True, 1)
+    run.go(1.0, fingers=2)
+    run.go(1.0, fingers=0)  # a second one, unnoticed
+    assert run.verdict("slips") == (False, 1)
+
+
+def lost_and_settled(run: Run, pixels: int) -> None:
+    run.go(1.0, fingers=2, pixels=500)
+    run.go(2.0, fingers=0, speed=0.3, pixels=0)  # swings past behind the obstacle: that does not count
+    run.go(STILL_SECONDS + 0.2, speed=0.001, pixels=pixels)
+
+
+def test_hidden_is_an_empty_mask_once_settled_and_a_find_by_the_wrist_camera() -> None:
+    run = Run(Expect(hidden=True))
+    lost_and_settled(run, pixels=0)
+    assert run.verdict("hidden") == (False, False)  # nobody found it yet
+    run.belief.found_by = "wrist"
+    run.go(1.0, pixels=900)  # what the arm does to it afterwards does not matter
+    run.belief.found_by = "rear"
+    run.go(1.0)
+    assert run.verdict("hidden") == (True, True)
+
+
+@pytest.mark.parametrize(("pixels", "by"), [(3, "wrist"), (0, "rear")])
+def test_an_end_in_sight_or_found_by_the_rear_camera_was_not_hidden(pixels: int, by: str) -> None:
+    run = Run(Expect(hidden=True))
+    lost_and_settled(run, pixels)
+    run.belief.found_by = by
+    run.go(0.1)
+    assert run.verdict("hidden") == (False, False)
+
+
+def test_stowed_is_by_the_truth_not_by_what_the_robot_says() -> None:
+    run = Run(Expect(outcome="stowed"))
+    run.go(0.1, in_clip=False)
+    assert run.verdict("outcome") == (False, "lost")
+    run.go(0.1, in_clip=True)
+    assert run.verdict("outcome") == (True, "stowed")
+    assert run.verdict("outcome", outcome="time_limit") == (False, "time_limit")
+
+
+def test_a_safe_stop_that_is_expected_is_met_by_its_cause() -> None:
+    run = Run(Expect(outcome="safe_stop", cause=CauseCode.OUT_OF_REACH))
+    assert run.verdict("outcome", "safe_stop") == (True, "safe_stop")
+    assert run.verdict("cause", "safe_stop", "out_of_reach") == (True, "out_of_reach")
+    assert run.verdict("cause", "safe_stop", "slipped") == (False, "slipped")
+    assert run.verdict("cause", "safe_stop", None) == (False, None)
+
+
+@pytest.mark.parametrize(("peaks", "met"), [({}, True), ({"left arm - floor": 4.9}, True), ({"a": 1, "b": 5.1}, False)])
+def test_the_largest_unintended_force_counts(peaks: dict[str, float], met: bool) -> None:
+    run = Run(Expect(unintended_force=5.0), Truth(peaks=peaks))
+    assert run.verdict("unintended_force") == (met, max(peaks.values(), default=0.0))
+
+
+def test_what_is_not_expected_is_not_judged() -> None:
+    assert [e.name for e in Run().judge.expectations("stowed", None, Belief())] == ["outcome"]
