@@ -18,7 +18,8 @@ class Judge:
     def __init__(self, truth: GroundTruth, expect: Expect) -> None:
         self._truth, self._expect = truth, expect
         self._was_held = False
-        self._let_go_at: float | None = None
+        self._unheld_at: float | None = None  # since when not both pads touch it
+        self._untouched_at: float | None = None  # since when none does
         self._still_since: float | None = None
         self.losses: list[float] = []
         self.settled_pixels: int | None = None  # of the connector in the rear image once it had settled after a loss
@@ -28,13 +29,17 @@ class Judge:
         """Look at the truth after a tick at second `now`."""
         self.found_by = self.found_by or belief.found_by
         if self._truth.held():
-            self._was_held, self._let_go_at, self._still_since = True, None, None
+            self._was_held, self._unheld_at, self._untouched_at, self._still_since = True, None, None, None
             return
-        if self._was_held and not self._truth.touched() and not self._truth.stowed():
-            self._let_go_at = now if self._let_go_at is None else self._let_go_at
-            if now - self._let_go_at >= LOST_SECONDS:
-                self.losses.append(self._let_go_at)
-                self._was_held = False
+        if self._was_held and not self._truth.stowed():
+            self._unheld_at = now if self._unheld_at is None else self._unheld_at
+            if self._truth.touched():
+                self._untouched_at = None
+            else:
+                self._untouched_at = now if self._untouched_at is None else self._untouched_at
+                if now - self._untouched_at >= LOST_SECONDS:
+                    self.losses.append(self._unheld_at)
+                    self._was_held = False
         if self.losses and not self._was_held and self.settled_pixels is None:
             self._watch_settling(now)
 

@@ -14,7 +14,8 @@ from motion.straight import straight_line
 from perception.mean_pose import mean_pose
 from perception.rgbd_pose import WHOLE_SHARE, Estimate
 
-BEFORE = 0.025  # m before the clip along the hand's own axis, from where it goes straight in; more would press the cable
+# m before the clip along the hand's own axis, from where it goes straight in; more would press the cable
+BEFORE = 0.025
 CARRY_SPEED = 0.5
 INSERT_SPEED = 0.2
 LOOK_SECONDS = 0.8
@@ -33,7 +34,8 @@ class Carry(HandLeaf):
         motion = self.services.motion
         held = self.services.belief.held
         assert held is not None
-        onward = [RigidTransform.from_translation([x, 0.0, 0.0]) for x in (BEFORE, BEFORE - BACK[0])]  # in, and out again
+        in_and_out = (BEFORE, BEFORE - BACK[0])
+        onward = [RigidTransform.from_translation([x, 0.0, 0.0]) for x in in_and_out]
         yield motion.carry(HAND, self._goals(held), held, onward=onward, speed=CARRY_SPEED)
 
     def _goals(self, held: RigidTransform) -> list[RigidTransform]:

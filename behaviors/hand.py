@@ -15,7 +15,8 @@ HAND = "right"  # the thesis's fixed roles: the right arm handles the cable ...
 EYE = "left"  # ... and the left one carries the wrist camera
 GRIP_FORCE = 40.0  # N a finger
 CLOSE_SECONDS = 1.0  # the jaw closes from 60 mm at 0.1 m/s a finger, and the readings settle
-BACK = (0.10, 0.08, 0.06, 0.05, 0.04, 0.03)  # m of straight way back from a place where something was held, the first that goes
+# m of straight way back from a place where something was held, the first that goes
+BACK = (0.10, 0.08, 0.06, 0.05, 0.04, 0.03)
 
 
 class HandLeaf(StepsLeaf):

@@ -2,8 +2,6 @@
 
 import numpy as np
 
-import numpy as np
-
 from behaviors.hand import HAND, HandLeaf
 from behaviors.leaf import Failed, Steps
 from behaviors.services import Notice

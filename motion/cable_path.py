@@ -5,6 +5,8 @@ half a newton metre at the stiffness of the Earth tests, and the connector turns
 end's distance and direction feels a tenth of that.
 """
 
+from collections.abc import Iterator
+
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation, Slerp
 
@@ -12,6 +14,8 @@ from interfaces.cell import KnownCell, pose_along
 from motion.kinematics import FloatArray
 
 STEPS = 24
+# A way round an obstacle: how far (m) in x from where it began it first rises; None is the direct way.
+VIA = (None, 0.0, 0.05, 0.10)
 
 
 def cable_anchor(known: KnownCell) -> tuple[FloatArray, FloatArray]:
@@ -37,11 +41,24 @@ def natural_pose(known: KnownCell, sideways: FloatArray) -> RigidTransform:
     return pose_along(_triple(centre), _triple(direction))
 
 
-def natural_way(known: KnownCell, start: RigidTransform, goal: RigidTransform) -> list[RigidTransform]:
-    """Poses world_from_connector from `start` (left out) to `goal` by way of the cable's natural shapes.
+def natural_ways(known: KnownCell, start: RigidTransform, goal: RigidTransform) -> Iterator[list[RigidTransform]]:
+    """Ways for a held connector, poses world_from_connector from `start` (left out) to `goal`: direct, then round things.
 
-    What the start differs from those by fades early and what the goal does comes late: pressed by the same length, a cable
-    that hangs straight buckles with far more force than a bent one.
+    Off the cable's straight course a way leads directly, or first up and then across, or up and nearer to the panel.
+    """
+    begin, end = _sideways(known, start), _sideways(known, goal)
+    for aside in VIA:
+        via = 0.5 * (begin + end) if aside is None else np.array([begin[0] + aside, begin[1], end[2]])
+        yield _natural_way(known, start, goal, via)
+
+
+def _natural_way(
+    known: KnownCell, start: RigidTransform, goal: RigidTransform, via: FloatArray
+) -> list[RigidTransform]:
+    """Poses from `start` to `goal` by way of the cable's natural shapes, bent through `via` (3,) m.
+
+    What the start differs from those by fades early and what the goal does comes late: pressed by the same length, a
+    cable that hangs straight buckles with far more force than a bent one.
     """
     begin, end = _sideways(known, start), _sideways(known, goal)
     first = natural_pose(known, begin).inv() * start
@@ -50,7 +67,8 @@ def natural_way(known: KnownCell, start: RigidTransform, goal: RigidTransform) -
     poses = []
     for s in np.linspace(0.0, 1.0, STEPS + 1)[1:]:
         shift = (1 - s) ** 3 * first.translation + s**3 * last.translation
-        poses.append(natural_pose(known, (1 - s) * begin + s * end) * RigidTransform.from_components(shift, turn(s)))
+        sideways = begin + 2 * s * (via - begin) if s < 0.5 else via + (2 * s - 1) * (end - via)
+        poses.append(natural_pose(known, sideways) * RigidTransform.from_components(shift, turn(s)))
     return poses
 
 

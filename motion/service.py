@@ -5,6 +5,8 @@ latency on the simulated clock.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +16,7 @@ from interfaces.cause import CauseCode
 from interfaces.cell import Connector, KnownCell, WristMount
 from interfaces.devices import Arm, Clock, Gripper
 from interfaces.frame import RgbdFrame
-from motion.cable_path import natural_way
+from motion.cable_path import natural_ways
 from motion.collision import CollisionModel
 from motion.distance_grid import DistanceGrid
 from motion.failure import PlanningError
@@ -29,6 +31,7 @@ FloatArray = NDArray[np.float64]
 MARGIN = 0.015  # m between the arm's spheres and anything while it moves freely
 JAW_REACH = 0.13  # m round a connector's centre where the jaw may be: half its length, a finger's width, 5 cm of palm
 NO_POINTS = np.empty((0, 3))
+CARRY_MARGIN = 0.0  # m on the way of a held connector, which starts and ends near things; voxels are a margin themselves
 TIGHT_MARGIN = 0.005  # m where nothing is found with that
 WAYS = 12  # ways to grasp that the planner may choose from
 NEAR_MARGIN = 0.0  # m on the last straight centimetres
@@ -92,7 +95,7 @@ class Motion:
         self._rebuild_grid()
 
     def keep_clear(self, points: FloatArray) -> None:
-        """Keep clear of these points (n, 3) m too, in place of those of an earlier call: a cable, a stowed connector."""
+        """Keep clear of these points (n, 3) m too, in place of an earlier call's: a cable, a stowed connector."""
         self._cable = points
         self._rebuild_grid()
 
@@ -186,33 +189,41 @@ class Motion:
     ) -> Task:
         """Bring what `arm` holds (tool_from_connector) to one of the goals (world_from_tool), the first preferred.
 
-        By way of the shapes that the cable takes by itself where that is free, else straight, else by any free way. From
-        the goal the tool must also reach the poses `onward` (goal_from_tool) in straight lines.
+        By way of the shapes that the cable takes by itself where that is free, else straight, else by any free way.
+        From the goal the tool must also reach the poses `onward` (goal_from_tool) in straight lines.
         """
 
         def steps() -> Iterator[None]:
             model, q, kin = self._start_model(arm, held), self.joints(arm), self.kinematics[arm]
             start, release = kin.tool(q) * held, held.inv()
-            for natural in (True, False):
-                for goal in goals:
-                    poses = [pose * release for pose in natural_way(self.known, start, goal * held)] if natural else [goal]
-                    path = _through(kin, q, poses)
-                    if path is None or _through(kin, path[-1], [goal * then for then in onward]) is None:
-                        continue
-                    if model.path_free(path[1:], TIGHT_MARGIN):
-                        yield from self._follow(arm, path, speed)
-                        return
+            leads_on = partial(_leads_on, kin, onward)
+            for path in chain(
+                (path for goal in goals for path in self._natural_paths(kin, q, start, goal * held, release)),
+                (path for goal in goals if (path := _through(kin, q, [goal])) is not None),
+            ):
+                if leads_on(path[-1]) and model.path_free(path[1:], CARRY_MARGIN):
+                    yield from self._follow(arm, path, speed)
+                    return
             configurations = np.array(
                 [
                     end
                     for goal in goals
                     for end in kin.ik(goal)
-                    if _through(kin, end, [goal * then for then in onward]) is not None
+                    if leads_on(end)
                 ]
             ).reshape(-1, 6)
             yield from self._follow(arm, self._plan(model, q, configurations), speed)
 
         return self._task(arm, steps())
+
+    def _natural_paths(
+        self, kin: ArmKinematics, q: FloatArray, start: RigidTransform, goal: RigidTransform, release: RigidTransform
+    ) -> Iterator[FloatArray]:
+        """Joint paths (k, 6) that bring the connector from start to goal by the cable's natural shapes."""
+        for poses in natural_ways(self.known, start, goal):
+            path = _through(kin, q, [pose * release for pose in poses])
+            if path is not None:
+                yield path
 
     def straight(self, arm: str, goal: RigidTransform, *, speed: float = APPROACH_SPEED) -> Task:
         """Move the tool in a straight line to `goal` (world_from_tool), near things as it may be."""
@@ -329,6 +340,12 @@ def _connector_spheres(held: RigidTransform, connector: Connector) -> FloatArray
     along = (0.5 * connector.length - connector.radius) * np.array([-1.0, 0.0, 1.0])
     centers = held.apply(np.column_stack([along, np.zeros(3), np.zeros(3)]))
     return np.column_stack([centers, np.full(3, 1.2 * connector.radius)])
+
+
+def _leads_on(kin: ArmKinematics, onward: Sequence[RigidTransform], q: FloatArray) -> bool:
+    """Whether the tool at joints (6,) can go on in straight lines to the poses `onward`, in its own frame."""
+    tool = kin.tool(q)
+    return _through(kin, q, [tool * then for then in onward]) is not None
 
 
 def _clear_of(points: FloatArray | None, place: FloatArray, radius: float) -> FloatArray:

@@ -44,8 +44,8 @@ def seen_at(connector: NDArray[np.float64], point: NDArray[np.float64], radius: 
 class GapTest:
     """Whether the pads stand as what they should hold allows: the median gap of the last readings.
 
-    Closer than it is thick, and they closed on nothing; twice as far, and the jaw stands open. In between a stiff cable may
-    pry them by its tilt.
+    Closer than it is thick, and they closed on nothing; twice as far, and the jaw stands open. In between a stiff cable
+    may pry them by its tilt.
     """
 
     def __init__(self, thickness: float, tolerance: float = GAP_TOLERANCE, readings: int = GAP_READINGS) -> None:

@@ -85,7 +85,9 @@ class Rig:
     clock: Clock = field(default_factory=Clock)
 
     def __post_init__(self) -> None:
-        self.arms: dict[str, FakeArm] = {s.name: FakeArm(s.name, self.clock, np.array(s.sleep)) for s in self.known.arms}
+        self.arms: dict[str, FakeArm] = {
+            s.name: FakeArm(s.name, self.clock, np.array(s.sleep)) for s in self.known.arms
+        }
         self.grippers: dict[str, FakeGripper] = {s.name: FakeGripper(self.clock) for s in self.known.arms}
         self.motion = Motion(self.known, self.arms, self.grippers, self.clock, seed=0)
 
