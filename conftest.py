@@ -7,11 +7,15 @@ from typing import Any
 import pybullet as p
 import pytest
 import yaml
+from hypothesis import settings
 from scipy.spatial.transform import RigidTransform
 
 from interfaces.cell import Box, Cell, KnownCell
 from motion.collision import CollisionModel
 from motion.kinematics import ArmKinematics
+
+settings.register_profile("without deadline", deadline=None)  # compilation and other workers take their time
+settings.load_profile("without deadline")
 
 
 def thesis() -> Any:

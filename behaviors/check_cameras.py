@@ -35,5 +35,5 @@ class CheckCameras(StepsLeaf):
         if not (health.ok and seen):
             raise Failed(CauseCode.CONNECTOR_NOT_FOUND, health.reason)
         self.services.belief.connector, self.services.belief.sure = mean_pose(list(seen.values()))
-        self.services.belief.found_by = "rear"
+        self.services.belief.found_by, self.services.belief.vain_searches = "rear", 0
         self.say("found", camera="rear", position=self.services.belief.connector.translation.round(4).tolist())

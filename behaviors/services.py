@@ -28,6 +28,7 @@ class Belief:
     connector: RigidTransform | None = None  # world_from_connector as last found for a grasp
     sure: bool = False  # whether the whole of it was seen there
     found_by: str | None = None  # the camera that found it last
+    vain_searches: int = 0  # since the connector was found last
     notices: list[Notice] = field(default_factory=list)
     causes: list[Cause] = field(default_factory=list)
 

@@ -29,7 +29,7 @@ NEARER = (0.0, 0.05, -0.05, 0.10, -0.10, 0.15)
 class SpiralSearch(LookLeaf):
     """Moves the left arm's camera from stop to stop until it sees the connector, at most `time_limit` seconds.
 
-    Starts where the connector was last seen, else at the back panel's middle. A stop that cannot be reached, not even a
+    Starts where the connector was last seen, else, and after a search from there in vain, at the back panel's middle. A stop that cannot be reached, not even a
     little nearer or further, is skipped and logged. When all is in vain the arm goes back to sleep.
     """
 
@@ -54,10 +54,11 @@ class SpiralSearch(LookLeaf):
             looked += 1
             if len(seen) >= ENOUGH:
                 belief.connector, belief.sure = mean_pose(seen)
-                belief.found_by = "wrist"
+                belief.found_by, belief.vain_searches = "wrist", 0
                 position = belief.connector.translation.round(4).tolist()
                 self.say("found", camera="wrist", stop=stop.index, looked=looked, skipped=skipped, position=position)
                 return
+        belief.vain_searches += 1
         yield from self.go_to_sleep(EYE)
         seconds = clock.now() - begin
         self.say("not found", looked=looked, skipped=skipped)
@@ -69,10 +70,11 @@ class SpiralSearch(LookLeaf):
     def _stops(self) -> Iterator[Stop]:
         known, last = self.services.known, self.services.perception.track.last
         panel = next(box for box in known.boxes if box.name == "back_panel")
-        start = np.array(panel.center) if last is None else last.position
+        from_last = last is not None and self.services.belief.vain_searches % 2 == 0
+        start = last.position if last is not None and from_last else np.array(panel.center)
         rear = known.camera("rear")
         assert isinstance(rear.mount, FixedMount)
-        self.say("search", start=start.round(3).tolist(), last_seen=last is not None)
+        self.say("search", start=start.round(3).tolist(), last_seen=from_last)
         return spiral(start, rear.mount.world_from_camera, rear.intrinsics, DISTANCE)
 
     def _goals(self, stop: Stop) -> NDArray[np.float64]:

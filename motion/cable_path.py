@@ -42,7 +42,7 @@ def natural_pose(known: KnownCell, sideways: FloatArray) -> RigidTransform:
 
 
 def natural_ways(known: KnownCell, start: RigidTransform, goal: RigidTransform) -> Iterator[list[RigidTransform]]:
-    """Ways for a held connector, poses world_from_connector from `start` (left out) to `goal`: direct, then round things.
+    """Ways of a held connector, poses world_from_connector from `start` (left out) to `goal`: direct, then round.
 
     Off the cable's straight course a way leads directly, or first up and then across, or up and nearer to the panel.
     """

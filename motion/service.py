@@ -31,7 +31,8 @@ FloatArray = NDArray[np.float64]
 MARGIN = 0.015  # m between the arm's spheres and anything while it moves freely
 JAW_REACH = 0.13  # m round a connector's centre where the jaw may be: half its length, a finger's width, 5 cm of palm
 NO_POINTS = np.empty((0, 3))
-CARRY_MARGIN = 0.0  # m on the way of a held connector, which starts and ends near things; voxels are a margin themselves
+# m on the way of a held connector, which starts and ends near things; voxels are a margin themselves
+CARRY_MARGIN = 0.0
 TIGHT_MARGIN = 0.005  # m where nothing is found with that
 WAYS = 12  # ways to grasp that the planner may choose from
 NEAR_MARGIN = 0.0  # m on the last straight centimetres
@@ -204,14 +205,7 @@ class Motion:
                 if leads_on(path[-1]) and model.path_free(path[1:], CARRY_MARGIN):
                     yield from self._follow(arm, path, speed)
                     return
-            configurations = np.array(
-                [
-                    end
-                    for goal in goals
-                    for end in kin.ik(goal)
-                    if leads_on(end)
-                ]
-            ).reshape(-1, 6)
+            configurations = np.array([end for goal in goals for end in kin.ik(goal) if leads_on(end)]).reshape(-1, 6)
             yield from self._follow(arm, self._plan(model, q, configurations), speed)
 
         return self._task(arm, steps())

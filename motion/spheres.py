@@ -2,7 +2,8 @@
 
 Computed from rtb-data's STL meshes of the ViperX 300 S by clustering surface points; base, shoulder and fingers are
 laid out by hand, small where the arm comes near itself in its sleep pose and at the finger tips. From the upper arm on
-no mesh point lies more than 3 mm outside. Fingers stand fully open, 0.057 m each, with pads 6 mm thick.
+no mesh point lies more than 3 mm outside, of the gripper's bar, which must pass between things, 5 mm. Fingers stand
+fully open, 0.057 m each, with pads 6 mm thick.
 """
 
 import numpy as np

@@ -3,7 +3,7 @@ from typing import Any, cast
 
 import pytest
 
-from app.judge import LOST_SECONDS, STILL_SECONDS, Judge
+from app.judge import STILL_SECONDS, Judge
 from app.scenario_file import Expect
 from behaviors.services import Belief, Notice
 from interfaces.cause import CauseCode
@@ -81,7 +81,15 @@ def test_a_loss_is_dated_from_the_moment_of_release() -> None:
     assert run.judge.losses == [pytest.approx(released)]
 
 
-@pytest.mark.parametrize(("gap", "losses"), [(LOST_SECONDS - TICK, 0), (LOST_SECONDS + 2 * TICK, 1)])
+def test_a_loss_is_dated_from_the_first_pad_s_letting_go() -> None:
+    run = Run()
+    run.go(1.0, fingers=2)
+    slides = run.go(0.5, fingers=1)
+    run.go(1.0, fingers=0)
+    assert run.judge.losses == [pytest.approx(slides)]
+
+
+@pytest.mark.parametrize(("gap", "losses"), [(0.15, 0), (0.30, 1)])
 def test_a_hold_regained_within_a_moment_is_no_loss(gap: float, losses: int) -> None:
     run = Run()
     run.go(1.0, fingers=2)

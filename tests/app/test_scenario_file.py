@@ -12,6 +12,7 @@ from app.resources import shipped
 from app.scenario_file import load_cell, load_scenario
 from interfaces.cause import CauseCode
 
+ARMS = 1 + shipped("cell")["thesis"].read_text().splitlines().index("  arms:")  # the line of that key
 METRES = "expected a number in metres, such as 0.3"
 SECOND = "  - {name: short, size: [1, 1, 1], position: {zero: [-2, 0, 0], earth: [-2, 0, 0]}}\n"
 
@@ -176,7 +177,7 @@ def test_a_name_without_a_file_is_a_finding(scenario: Path, name: str, expected:
         ("gravity=[", "--set:1: not YAML"),
         ("cell.hidden.errors.arm_tol=0", "--set:1: unknown key 'arm_tol'; did you mean 'arm_tool'?"),
         ("cell.known.plugged_into=back_9", "--set:1: no socket 'back_9'; did you mean 'back_"),
-        ("cell.known.arms.1.name=left", "cells/thesis.yaml:31: arms are left, left; give one each of left, right"),
+        ("cell.known.arms.1.name=left", f"cells/thesis.yaml:{ARMS}: arms are left, left; give one each of left, right"),
         ("cell.known.cameras.0.mount.position.0=x", "--set:1: known.cameras.0.mount.position.0 is 'x'; expected a"),
         ("cell.known.cameras.0.mount={arm: middle, offset: [0, 0, 0]}", "--set:1: known.cameras.0.mount.arm: no"),
     ],

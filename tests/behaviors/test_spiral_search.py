@@ -67,8 +67,7 @@ def test_an_end_never_seen_is_sought_from_the_panel_s_middle(known: KnownCell, t
 
 
 def test_a_glimpse_is_no_find(stage: Stage) -> None:
-    glimpse = iter([True, True])
-    stage.perception.shows = lambda _, t: seen(t, PLACE, "wrist") if next(glimpse, False) else unseen(t)
+    stage.perception.shows = lambda _, t: seen(t, PLACE, "wrist") if 0.6 <= t < 0.73 else unseen(t)  # two frames
     assert stage.run(stage.tree(search(10)), 60.0) is Status.FAILURE
     assert stage.belief.connector is None
 

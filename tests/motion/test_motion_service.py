@@ -9,6 +9,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from interfaces.cause import CauseCode
 from interfaces.cell import KnownCell, pose_along
 from interfaces.frame import Intrinsics, RgbdFrame
+from motion.cable_path import cable_anchor, natural_pose
 from motion.failure import PlanningError
 from motion.service import GRIP_OFFSETS, MARGIN, OPEN_GAP, TIGHT_MARGIN, Motion
 
@@ -192,17 +193,40 @@ def test_a_connector_out_of_reach_cannot_be_picked(rig: Rig) -> None:
     assert not rig.grippers["right"].told
 
 
-def test_a_carry_takes_the_short_way_to_the_first_goal(rig: Rig) -> None:
-    rig.arms["right"].at = ASIDE
-    start = rig.motion.tool("right") * HELD
-    near, other = moved(rig, 0.0, 0.10, 0.05), moved(rig, 0.0, 0.20, -0.05)
-    rig.run(rig.motion.carry("right", [near, other], HELD, speed=0.5))
+def in_hand(rig: Rig, off: list[float]) -> RigidTransform:
+    """The right hand takes a connector where its cable, bent `off` m, holds it: tool_from_connector."""
+    connector = natural_pose(rig.known, np.array(off))
+    rig.run(rig.motion.pick("right", connector))
+    return rig.motion.tool("right").inv() * connector
+
+
+def test_a_carry_takes_the_way_that_the_cable_goes_to_the_first_goal(rig: Rig) -> None:
+    held = in_hand(rig, [0.02, 0.0, 0.10])
+    start = rig.motion.tool("right")
+    goals = [natural_pose(rig.known, np.array([x, 0.0, 0.17])) * held.inv() for x in (-0.04, 0.0)]
+    rig.run(rig.motion.carry("right", goals, held, speed=0.5))
     end = rig.motion.tool("right")
-    assert end.translation == pytest.approx(near.translation, abs=1e-3)
-    assert (end.rotation.inv() * near.rotation).magnitude() < 0.01
-    places = [(rig.motion.kinematics["right"].tool(q) * HELD).translation for q in flown(rig, "right")]
-    length = np.linalg.norm(np.diff(places, axis=0), axis=1).sum()
-    assert length < 1.5 * np.linalg.norm((near * HELD).translation - start.translation)
+    assert end.translation == pytest.approx(goals[0].translation, abs=1e-3)
+    assert (end.rotation.inv() * goals[0].rotation).magnitude() < 0.01
+    carried = [rig.motion.kinematics["right"].tool(q) * held for q in flown(rig, "right")]
+    anchor, course = cable_anchor(rig.known)
+    for pose in carried:
+        place = pose.apply([-0.5 * rig.known.connector.length, 0.0, 0.0]) - anchor
+        natural = natural_pose(rig.known, place - (place @ course) * course)
+        assert np.linalg.norm(pose.translation - natural.translation) < 0.005
+    length = np.linalg.norm(np.diff([pose.translation for pose in carried], axis=0), axis=1).sum()
+    assert length < 1.2 * np.linalg.norm((goals[0] * held).translation - (start * held).translation)
+
+
+def test_a_goal_from_which_the_tool_cannot_go_on_is_no_goal(rig: Rig) -> None:
+    held = in_hand(rig, [0.02, 0.0, 0.10])
+    goals = [natural_pose(rig.known, np.array([-0.04, 0.0, 0.17])) * held.inv()]
+    near, far = (RigidTransform.from_translation([-x, 0.0, 0.0]) for x in (0.03, 2.0))
+    with pytest.raises(PlanningError) as error:
+        rig.run(rig.motion.carry("right", goals, held, onward=[near, far], speed=0.5))
+    assert error.value.code is CauseCode.OUT_OF_REACH
+    rig.run(rig.motion.carry("right", goals, held, onward=[near], speed=0.5))
+    assert rig.motion.tool("right").translation == pytest.approx(goals[0].translation, abs=1e-3)
 
 
 def test_a_carry_leaves_out_a_goal_in_the_panel(rig: Rig) -> None:
