@@ -97,7 +97,7 @@ def _assemble(scenario: Scenario, world: World, seed: int, log: Any) -> Episode:
     perception = Perception(known, world.cameras, world, motion.camera_pose, motion.spheres)
     services = Services(known, world, motion, perception, log)
     py_trees.blackboard.Blackboard.clear()
-    tree = py_trees.trees.BehaviourTree(load_tree(scenario.tree, LEAVES))
+    tree = py_trees.trees.BehaviourTree(load_tree(scenario.tree, LEAVES, {"tries": str(scenario.file.limits.tries)}))
     tree.setup(services=services)
     return Episode(world, services, tree, Judge(GroundTruth(world), scenario.file.expect))
 

@@ -61,7 +61,7 @@ class Limits(Model):
     """What ends a run that does not end by itself."""
 
     sim_seconds: Annotated[float, Field(gt=0, le=3600)] = 600.0
-    tries: Annotated[int, Field(ge=1, le=20)] = 4
+    tries: Annotated[int, Field(ge=1, le=20)] = 5  # deliveries, each after a recovery where the hand is empty
 
 
 class Expect(Model):

@@ -29,8 +29,9 @@ NEARER = (0.0, 0.05, -0.05, 0.10, -0.10, 0.15)
 class SpiralSearch(LookLeaf):
     """Moves the left arm's camera from stop to stop until it sees the connector, at most `time_limit` seconds.
 
-    Starts where the connector was last seen, else, and after a search from there in vain, at the back panel's middle. A stop that cannot be reached, not even a
-    little nearer or further, is skipped and logged. When all is in vain the arm goes back to sleep.
+    Starts where the connector was last seen, else, and after a search from there in vain, at the back panel's middle. A
+    stop that cannot be reached, not even a little nearer or further, is skipped and logged. When all is in vain the arm
+    goes back to sleep.
     """
 
     INPUT_PORTS: ClassVar[dict[str, Any]] = {

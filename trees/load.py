@@ -17,8 +17,12 @@ class TreeError(ValueError):
         self.findings = findings
 
 
-def load_tree(path: Path, leaves: Mapping[str, type]) -> py_trees.behaviour.Behaviour:
+def load_tree(
+    path: Path, leaves: Mapping[str, type], inputs: Mapping[str, str] | None = None
+) -> py_trees.behaviour.Behaviour:
     """Build the tree that the file describes; `leaves` maps a tag to its leaf class.
+
+    `inputs` take the place of the main BehaviorTree's default values of the same keys.
 
     A node's name is its dotted path, names of subtrees included: root.search.look. Nothing is set up yet: hand the
     services to `py_trees.trees.BehaviourTree(root).setup(services=...)`.
@@ -28,4 +32,4 @@ def load_tree(path: Path, leaves: Mapping[str, type]) -> py_trees.behaviour.Beha
     """
     if findings := check_tree(path, leaves):
         raise TreeError(path, findings)
-    return parse_behaviour_tree_xml(str(path), node_registry=dict(leaves))
+    return parse_behaviour_tree_xml(str(path), node_registry=dict(leaves), input_mappings=dict(inputs or {}))

@@ -55,7 +55,7 @@ def test_what_is_left_out_has_its_default(scenario: Path) -> None:
     scenario.write_text("description: bare\ncell: thesis\ntree: tree.xml\ngravity: earth\n")
     file = load_scenario("mine.yaml").file
     assert (file.obstacles, file.faults, file.expect.outcome, file.expect.slips) == ((), (), "stowed", None)
-    assert (file.limits.sim_seconds, file.limits.tries) == (600.0, 4)
+    assert (file.limits.sim_seconds, file.limits.tries) == (600.0, 5)
 
 
 def test_overrides_change_scenario_and_cell(scenario: Path) -> None:
