@@ -24,6 +24,7 @@ JOINTS = ("shoulder_link", "upper_arm_link", "upper_forearm_link", "lower_forear
 SIGN = np.array([1.0, 1.0, -1.0, 1.0, -1.0, 1.0])
 # Stall torques at 12 V of the maker's servos: XM540-W270 10.6 N m (two at shoulder and elbow), XM430-W350 4.1 N m.
 TORQUE = np.array([10.6, 21.2, 21.2, 10.6, 10.6, 4.1])
+SPEED = np.pi  # rad/s, the maker's limit of every joint
 ENCODER_STEP = 2 * np.pi / 4096
 # Where the tool error that the joint offsets make is set: out forward, and two poses of the work.
 REFERENCE_POSES = np.array([[0, 0, 0, 0, 0, 0], [0.4, -0.3, 0.4, 0.5, 0.3, 0.2], [0.8, 0.3, -0.2, -0.6, 0.6, 0.0]])
@@ -123,13 +124,16 @@ class SimArm:
         if self._trajectory is not None:
             t = self.now() + self._dt - self._started
             q, v = self._trajectory.sample(t)
-            if t >= self._trajectory.duration:
+            if t >= self._trajectory.duration and float(np.max(np.abs(q - self._target))) <= SPEED * self._dt:
                 self._trajectory, v = None, np.zeros(6)
-            self._drive(q, v)
+            # A servo turns no faster than its maker lets it: a hasty trajectory is followed late.
+            step = np.clip(q - self._target, -SPEED * self._dt, SPEED * self._dt)
+            self._drive(self._target + step, np.clip(v, -SPEED, SPEED))
         self.gripper.step()
         self._steps += 1
 
     def _drive(self, q: FloatArray, v: FloatArray) -> None:
+        self._target = q
         p.setJointMotorControlArray(
             self.body,
             self.joints,

@@ -126,3 +126,10 @@ def test_stopped_on_its_way_to_sleep_it_stops_the_arm(stage: Stage) -> None:
         stage.clock.t += 0.05
     tree.root.stop(Status.INVALID)
     assert stage.motion.cancelled == ["left"]
+
+
+def test_after_a_search_in_vain_the_next_begins_at_the_panel_s_middle(stage: Stage) -> None:
+    tree = stage.tree(search(2.0))
+    for _ in range(3):
+        assert stage.run(tree, 60.0) is Status.FAILURE
+    assert [line["last_seen"] for line in stage.log.of("search")] == [True, False, True]

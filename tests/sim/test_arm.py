@@ -11,7 +11,7 @@ from interfaces.devices import Arm
 from interfaces.scene import EARTH_GRAVITY
 from interfaces.trajectory import Trajectory
 from motion.kinematics import LOWER, UPPER, ArmKinematics
-from sim.arm import BRAKE, ENCODER_STEP, SIGN, SimArm
+from sim.arm import BRAKE, ENCODER_STEP, SIGN, SPEED, SimArm
 
 TRACKING = 0.01  # rad
 STOP_TIME = 0.3  # s
@@ -187,3 +187,14 @@ def test_offsets_hide_from_the_encoders(cell: Cell, client: int) -> None:
 
 def test_no_stated_error_no_offsets(arm: SimArm) -> None:
     np.testing.assert_array_equal(arm.offsets, 0.0)
+
+
+
+def test_a_servo_turns_no_faster_than_its_maker_lets_it(arm: SimArm) -> None:
+    start = true_joints(arm)
+    goal = start + np.array([0.5, 0.0, 0.0, 0.0, 0.0, 0.0])
+    arm.follow(Trajectory(np.array([0.0, 0.02]), np.array([start, goal]), np.zeros((2, 6))))  # 25 rad/s asked for
+    path = run(arm, 1.0)
+    assert float(np.abs(np.diff(path, axis=0)).max() * 480) < 1.1 * SPEED
+    assert float(np.abs(path[-1] - goal).max()) < TRACKING
+    assert not arm.is_moving()
