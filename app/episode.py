@@ -15,7 +15,7 @@ from app.film import Film
 from app.judge import Judge
 from app.record import Outcome, Record, Result
 from app.scenario_file import Scenario
-from app.tick_log import TickLog, active_leaf
+from app.tick_log import TickLog, active_leaf, running_leaf
 from behaviors import LEAVES
 from behaviors.services import Services
 from interfaces.cause import Cause, CauseCode
@@ -121,6 +121,10 @@ def _loop(
             if root.status is Status.FAILURE:
                 return "safe_stop", belief.causes[-1] if belief.causes else None
             world.advance(TICK)
+        limit = scenario.file.limits.sim_seconds
+        return "time_limit", Cause(
+            CauseCode.TIME_LIMIT, f"not done after {limit:.0f} simulated seconds", _running(root)
+        )
     except KeyboardInterrupt:
         return "interrupted", Cause(CauseCode.INTERRUPTED, "stopped from outside", _running(root))
     except Exception as error:
@@ -132,15 +136,12 @@ def _loop(
             root.stop(Status.INVALID)
         episode.services.motion.stop()
         world.advance(0.3)
-    limit = scenario.file.limits.sim_seconds
-    return "time_limit", Cause(CauseCode.TIME_LIMIT, f"not done after {limit:.0f} simulated seconds", _running(root))
 
 
 def _running(root: py_trees.behaviour.Behaviour) -> str:
-    """Tree path of the deepest running node, '' when none is."""
-    paths = node_paths(root)
-    running = [paths[node.id] for node in root.iterate() if node.status is Status.RUNNING]
-    return max(running, key=len, default="")
+    """Tree path of the active leaf, '' when none is."""
+    leaf = running_leaf(root)
+    return "" if leaf is None else node_paths(root)[leaf.id]
 
 
 def _raising(error: BaseException, root: py_trees.behaviour.Behaviour) -> str:

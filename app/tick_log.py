@@ -52,14 +52,19 @@ class TickLog(py_trees.visitors.VisitorBase):
             self._stream.flush()
 
 
-def active_leaf(root: py_trees.behaviour.Behaviour) -> str:
-    """The own name of the deepest RUNNING node, '' when the tree is at rest.
+def running_leaf(root: py_trees.behaviour.Behaviour) -> py_trees.behaviour.Behaviour | None:
+    """The deepest RUNNING node, None when the tree is at rest.
 
     Of a Parallel's RUNNING children the last counts: monitors come first.
     """
-    node = root if root.status is Status.RUNNING else None
-    name = ""
+    node, deepest = root if root.status is Status.RUNNING else None, None
     while node is not None:
-        name = node.name.rsplit(".", 1)[-1]
+        deepest = node
         node = next((child for child in reversed(node.children) if child.status is Status.RUNNING), None)
-    return name
+    return deepest
+
+
+def active_leaf(root: py_trees.behaviour.Behaviour) -> str:
+    """The own name of the `running_leaf`, '' when the tree is at rest."""
+    leaf = running_leaf(root)
+    return "" if leaf is None else str(leaf.name.rsplit(".", 1)[-1])

@@ -37,11 +37,10 @@ class HandLeaf(StepsLeaf):
         services.belief.held = services.motion.tool(HAND).inv() * world_from_connector
         self.say("grasped", gap=evidence.value)
 
-    def attempt(self, task: Task) -> Generator[None, None, bool]:
+    def attempt(self, task: Task) -> Generator[Task | None, None, bool]:
         """Do a motion if it can be done; False (and a line in the log) when not."""
         try:
-            while not task.poll():
-                yield None
+            yield from self.follow(task)
         except PlanningError as error:
             self.say("left out", why=str(error))
             return False

@@ -86,6 +86,15 @@ class StepsLeaf(Leaf):
                 self._task.cancel()
             self._work.close()
 
+    def follow(self, task: Task) -> Steps:
+        """Steps that do a task, for a leaf that handles its PlanningError itself; stopped with the leaf."""
+        try:
+            while not task.poll():
+                yield None
+        except GeneratorExit:
+            task.cancel()
+            raise
+
     def wait(self, seconds: float) -> Steps:
         """Steps that let so many simulated seconds pass."""
         end = self.services.clock.now() + seconds

@@ -31,9 +31,7 @@ class LookLeaf(HandLeaf):
         Unlike a yielded task, a motion that cannot be raises its PlanningError here, to the caller.
         """
         clock, perception, motion = self.services.clock, self.services.perception, self.services.motion
-        task = motion.move(EYE, goals)
-        while not task.poll():
-            yield None
+        yield from self.follow(motion.move(EYE, goals))
         begin, mapped = clock.now() + SETTLE_SECONDS, False
         stamps: set[float] = set()
         while clock.now() < begin + seconds - 1e-9:

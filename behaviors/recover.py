@@ -23,9 +23,9 @@ class MakeRoom(HandLeaf):
         motion, perception = self.services.motion, self.services.perception
         self.services.belief.connector = self.services.belief.found_by = None
         task = motion.move(HAND, np.array([self.services.known.arm(HAND).sleep]))
-        while not task.poll():
+        for step in self.follow(task):
             perception.look("rear")  # the search starts where the end was seen last
-            yield None
+            yield step
         motion.grippers[HAND].open(OPEN_GAP)
 
 

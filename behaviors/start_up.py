@@ -12,6 +12,7 @@ class StartUp(StepsLeaf):
         while perception.frame("rear") is None:
             yield None
         scale = perception.correct_depth("rear")
+        perception.look("rear")  # the plugged end, while no hand hides it
         voxels = perception.map_obstacles("rear")
         motion.set_obstacles(perception.occupancy.occupied_points(), perception.occupancy.h)
         self.say("looked around", depth_scale=round(scale, 4), occupied_voxels=voxels)

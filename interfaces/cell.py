@@ -7,6 +7,7 @@ them, x forward to the panels, y left, z up.
 from typing import Annotated, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 from scipy.spatial.transform import RigidTransform, Rotation
 
@@ -183,6 +184,13 @@ class KnownCell(Model):
     def solids(self) -> list[Box]:
         """All that stands fast and is known: floor, panels, clip bracket, and the sockets' blocks in upright boxes."""
         return [*self.boxes, *self.clip.bracket, *(socket.upright_box() for socket in self.sockets)]
+
+    @property
+    def cable_anchor(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Where the cable leaves its other end's socket, the last one's mouth, (3,) m, and its direction there."""
+        socket = self.sockets[-1]
+        axis = np.asarray(socket.axis) / np.linalg.norm(socket.axis)
+        return np.asarray(socket.center) - 0.5 * socket.size[1] * axis, -axis
 
     def socket(self, name: str) -> Socket:
         """The socket of that name; KeyError lists those that exist."""

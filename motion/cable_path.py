@@ -18,20 +18,13 @@ STEPS = 24
 VIA = (None, 0.0, 0.05, 0.10)
 
 
-def cable_anchor(known: KnownCell) -> tuple[FloatArray, FloatArray]:
-    """Where the cable leaves its plugged end's socket, (3,) m, and its direction there: the cell's last socket."""
-    socket = known.sockets[-1]
-    axis = np.asarray(socket.axis) / np.linalg.norm(socket.axis)
-    return np.asarray(socket.center) - 0.5 * socket.size[1] * axis, -axis
-
-
 def natural_pose(known: KnownCell, sideways: FloatArray) -> RigidTransform:
     """world_from_connector at the end of a cable that a force bends `sideways` (3,) m off its straight course.
 
     Cantilever with an end load (Euler-Bernoulli, second order in the slope): the slope at the end is 1.5 d / D, the
     cable is D + 0.6 d^2 / D long, where d is the deflection and D the distance along the straight course.
     """
-    anchor, course = cable_anchor(known)
+    anchor, course = known.cable_anchor
     length = known.cable_length
     d2 = min(float(sideways @ sideways), 0.4 * length**2)
     along = 0.5 * (length + np.sqrt(length**2 - 2.4 * d2))
@@ -74,7 +67,7 @@ def _natural_way(
 
 def _sideways(known: KnownCell, connector: RigidTransform) -> FloatArray:
     """How far (3,) m the cable's end lies off the straight course."""
-    anchor, course = cable_anchor(known)
+    anchor, course = known.cable_anchor
     end = connector.apply([-0.5 * known.connector.length, 0.0, 0.0]) - anchor
     return np.asarray(end - (end @ course) * course)
 

@@ -11,15 +11,11 @@ from interfaces.cell import KnownCell
 def cable_course(known: KnownCell, world_from_connector: RigidTransform, spacing: float = 0.01) -> NDArray[np.float64]:
     """Points (n, 3) m about `spacing` apart along the cable of a connector at rest, from the plugged end on.
 
-    A cubic between the two ends with their directions: the shape of a lightly bent rod (small deflections). The plugged
-    end's socket is the one that the loose end was not plugged into and whose face the cable leaves: the last of the
-    cell.
+    A cubic between the two ends with their directions: the shape of a lightly bent rod (small deflections).
     """
-    socket = known.sockets[-1]
-    axis = np.asarray(socket.axis) / np.linalg.norm(socket.axis)
-    start = np.asarray(socket.center) - 0.5 * socket.size[1] * axis
+    start, course = known.cable_anchor
     end = world_from_connector.apply([-0.5 * known.connector.length, 0.0, 0.0])
     direction = world_from_connector.rotation.apply([1.0, 0.0, 0.0])
     chord = float(np.linalg.norm(end - start))
-    curve = CubicHermiteSpline([0.0, chord], np.stack([start, end]), np.stack([-axis, direction]))
+    curve = CubicHermiteSpline([0.0, chord], np.stack([start, end]), np.stack([course, direction]))
     return np.asarray(curve(np.linspace(0.0, chord, max(2, round(chord / spacing)))))

@@ -127,8 +127,9 @@ class SimArm:
             if t >= self._trajectory.duration and float(np.max(np.abs(q - self._target))) <= SPEED * self._dt:
                 self._trajectory, v = None, np.zeros(6)
             # A servo turns no faster than its maker lets it: a hasty trajectory is followed late.
-            step = np.clip(q - self._target, -SPEED * self._dt, SPEED * self._dt)
-            self._drive(self._target + step, np.clip(v, -SPEED, SPEED))
+            wanted = q - self._target
+            step = np.clip(wanted, -SPEED * self._dt, SPEED * self._dt)
+            self._drive(self._target + step, np.where(step == wanted, v, step / self._dt))
         self.gripper.step()
         self._steps += 1
 

@@ -122,7 +122,6 @@ def test_the_time_limit_ends_a_run_with_the_arms_at_rest(tmp_path: Path, ends: l
     assert at_rest(ends)
 
 
-@pytest.mark.xfail(strict=True, reason="the loop asks which node runs after it has stopped them all")
 def test_the_time_limit_names_the_node_that_it_cut_short(tmp_path: Path) -> None:
     result = run_episode(scenario(tmp_path, '<Swing name="swing"/>'), None, seed=0)
     assert result.cause is not None

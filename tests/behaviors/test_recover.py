@@ -74,7 +74,6 @@ def test_a_way_that_cannot_be_found_is_the_leaf_s_cause(stage: Stage) -> None:
     assert "4000 draws" in stage.belief.causes[-1].message
 
 
-@pytest.mark.xfail(strict=True, reason="steps that poll a task themselves leave it running when they are stopped")
 def test_a_leaf_stopped_midway_stops_its_arm_and_one_that_ended_does_not(stage: Stage) -> None:
     tree = stage.tree(ROOM)
     assert stage.run(tree, 0.1) is Status.RUNNING

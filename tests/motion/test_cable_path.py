@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from interfaces.cell import KnownCell
-from motion.cable_path import cable_anchor, natural_pose, natural_ways
+from motion.cable_path import natural_pose, natural_ways
 
 sideways = st.tuples(st.floats(-0.15, 0.15), st.floats(-0.15, 0.2)).map(lambda xz: np.array([xz[0], 0.0, xz[1]]))
 turns = st.tuples(*[st.floats(-0.2, 0.2)] * 3)
@@ -19,7 +19,7 @@ def cable_end(known: KnownCell, connector: RigidTransform) -> np.ndarray:
 
 
 def test_an_unbent_cable_runs_straight_from_its_socket(known: KnownCell) -> None:
-    anchor, course = cable_anchor(known)
+    anchor, course = known.cable_anchor
     pose = natural_pose(known, np.zeros(3))
     assert pose.rotation.apply([1.0, 0.0, 0.0]) == pytest.approx(course)
     assert cable_end(known, pose) == pytest.approx(anchor + known.cable_length * course)
@@ -27,7 +27,7 @@ def test_an_unbent_cable_runs_straight_from_its_socket(known: KnownCell) -> None
 
 @given(sideways)
 def test_a_bent_cable_keeps_its_length_and_points_along_its_end(known: KnownCell, off: np.ndarray) -> None:
-    anchor, course = cable_anchor(known)
+    anchor, course = known.cable_anchor
     pose = natural_pose(known, off)
     end = cable_end(known, pose) - anchor
     assert end - (end @ course) * course == pytest.approx(off, abs=1e-9)
@@ -56,7 +56,7 @@ def test_every_way_ends_at_the_goal_in_small_steps(
 
 @given(sideways, sideways)
 def test_between_natural_shapes_the_direct_way_is_natural(known: KnownCell, begin: np.ndarray, end: np.ndarray) -> None:
-    anchor, course = cable_anchor(known)
+    anchor, course = known.cable_anchor
     direct = next(iter(natural_ways(known, natural_pose(known, begin), natural_pose(known, end))))
     for pose in direct:
         place = cable_end(known, pose) - anchor

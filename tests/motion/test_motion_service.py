@@ -9,7 +9,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from interfaces.cause import CauseCode
 from interfaces.cell import KnownCell, pose_along
 from interfaces.frame import Intrinsics, RgbdFrame
-from motion.cable_path import cable_anchor, natural_pose
+from motion.cable_path import natural_pose
 from motion.failure import PlanningError
 from motion.service import GRIP_OFFSETS, MARGIN, OPEN_GAP, TIGHT_MARGIN, Motion
 
@@ -209,7 +209,7 @@ def test_a_carry_takes_the_way_that_the_cable_goes_to_the_first_goal(rig: Rig) -
     assert end.translation == pytest.approx(goals[0].translation, abs=1e-3)
     assert (end.rotation.inv() * goals[0].rotation).magnitude() < 0.01
     carried = [rig.motion.kinematics["right"].tool(q) * held for q in flown(rig, "right")]
-    anchor, course = cable_anchor(rig.known)
+    anchor, course = rig.known.cable_anchor
     for pose in carried:
         place = pose.apply([-0.5 * rig.known.connector.length, 0.0, 0.0]) - anchor
         natural = natural_pose(rig.known, place - (place @ course) * course)
