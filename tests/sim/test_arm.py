@@ -194,7 +194,7 @@ def test_a_servo_turns_no_faster_than_its_maker_lets_it(arm: SimArm) -> None:
     goal = start + np.array([0.5, 0.0, 0.0, 0.0, 0.0, 0.0])
     arm.follow(Trajectory(np.array([0.0, 0.02]), np.array([start, goal]), np.zeros((2, 6))))  # 25 rad/s asked for
     path = run(arm, 1.0)
-    # over a tenth of a second: in single steps a servo catches up with its target
-    assert float(np.abs(np.array(path)[48:] - np.array(path)[:-48]).max() * 10) < 1.05 * SPEED
+    # over a tenth of a second, and a tenth more than that: a servo catches up with its target
+    assert float(np.abs(np.array(path)[48:] - np.array(path)[:-48]).max() * 10) < 1.15 * SPEED
     assert float(np.abs(path[-1] - goal).max()) < TRACKING
     assert not arm.is_moving()
