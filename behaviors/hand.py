@@ -56,4 +56,4 @@ class HandLeaf(StepsLeaf):
 
     def go_to_sleep(self, arm: str) -> Steps:
         """Bring an arm to its sleep pose, out of the cameras' and the other arm's way."""
-        yield self.services.motion.move(arm, np.array([self.services.known.arm(arm).sleep]))
+        yield from self.follow(self.services.motion.move(arm, np.array([self.services.known.arm(arm).sleep])))

@@ -1,8 +1,8 @@
 """After a slip: out of the way, and wait until the cable hangs still."""
 
+from itertools import chain
 from typing import Any, ClassVar
 
-import numpy as np
 from py_trees.ports import PortInformation
 
 from behaviors.hand import HAND, HandLeaf
@@ -11,22 +11,24 @@ from interfaces.cause import CauseCode
 from motion.service import OPEN_GAP
 from perception.stillness import Stillness
 
+LEAVE_SECONDS = 0.3  # for the end to swing out of the open jaw
 STILL = 0.25  # of the mean brightness: a cable that moves by about 1 mm; the jaw forgives 20
 FRAME_PERIOD = 0.2  # s between the frames that are compared
 
 
 class MakeRoom(HandLeaf):
-    """Brings the hand to its sleep pose: it must not hide the connector nor stop its swing."""
+    """Opens the jaw and brings the hand to its sleep pose: it must not hide the connector nor stop its swing.
+
+    First the jaw, then straight back: one that closes may pinch the cable, one that turns away may hook it.
+    """
 
     def steps(self) -> Steps:
         """See the class."""
-        motion, perception = self.services.motion, self.services.perception
         self.services.belief.connector = self.services.belief.found_by = None
-        task = motion.move(HAND, np.array([self.services.known.arm(HAND).sleep]))
-        for step in self.follow(task):
-            perception.look("rear")  # the search starts where the end was seen last
+        self.services.motion.grippers[HAND].open(OPEN_GAP)
+        for step in chain(self.wait(LEAVE_SECONDS), self.back_off()):
+            self.services.perception.look("rear")  # the search starts where the end was seen last
             yield step
-        motion.grippers[HAND].open(OPEN_GAP)
 
 
 class WaitUntilStill(HandLeaf):

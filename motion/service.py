@@ -41,7 +41,7 @@ OPEN_GAP = 0.05  # m between the pads: 15 mm to each side of the connector, abou
 GRIP_OFFSETS = (-0.02, -0.03, 0.0)  # m along the connector from its centre, tried in turn: near the cable the tip shows
 ARRIVED = 0.05  # rad: an arm that ends further from its goal was blocked
 GRID_BORDER = 0.2  # m around the voxels: no sphere of an arm is thicker
-ARM_MARGIN = 0.04  # m round an arm: 5 mm of arm error, 13 mm of depth, a voxel, and the planner's margin
+ARM_MARGIN = 0.025  # m round an arm where seen points are its own: 13 mm of depth, half a voxel's diagonal, 5 mm of arm
 SETTLE = 0.10  # s after a trajectory before its end is judged
 
 
@@ -108,19 +108,19 @@ class Motion:
         lower, upper = points.min(axis=0) - GRID_BORDER, points.max(axis=0) + GRID_BORDER
         self._grid = DistanceGrid.from_points(points, lower, upper, self._spacing)
 
-    def _start_model(self, arm: str, held: RigidTransform | None = None) -> CollisionModel:
+    def _start_model(self, arm: str, held: RigidTransform | None = None, *, clip: bool = True) -> CollisionModel:
         """`model` for a motion that begins now: seen points that the arm touches where it stands were none.
 
         Voxels are coarse and cameras err by millimetres; a hand that came in beside an obstacle must get out again.
         """
-        model = self.model(arm, held=held)
+        model = self.model(arm, held=held, clip=clip)
         distance, what = model.nearest(self.joints(arm))
         if what == "seen surface" and distance < TIGHT_MARGIN:
             spheres = model.spheres(self.joints(arm))
             self._points = _away_from(self._points, spheres, TIGHT_MARGIN + 2 * self._spacing)
             self._cable = _away_from(self._cable, spheres, TIGHT_MARGIN + 2 * self._spacing)
             self._rebuild_grid()
-            model = self.model(arm, held=held)
+            model = self.model(arm, held=held, clip=clip)
         return model
 
     def joints(self, arm: str) -> FloatArray:
@@ -220,17 +220,34 @@ class Motion:
                 yield path
 
     def straight(self, arm: str, goal: RigidTransform, *, speed: float = APPROACH_SPEED) -> Task:
-        """Move the tool in a straight line to `goal` (world_from_tool), near things as it may be."""
+        """Move the tool in a straight line to `goal` (world_from_tool), near things as it may be: nothing is checked."""
 
         def steps() -> Iterator[None]:
             yield from self._follow(arm, straight_line(self.kinematics[arm], self.joints(arm), goal), speed)
 
         return self._task(arm, steps())
 
-    def shift(self, arm: str, way: Sequence[float] | FloatArray, *, speed: float = APPROACH_SPEED) -> Task:
-        """Move the tool straight by `way` (3,) m in the world, without turning."""
-        tool = self.tool(arm)
-        return self.straight(arm, RigidTransform.from_components(tool.translation + way, tool.rotation), speed=speed)
+    def shift(self, arm: str, way: Sequence[float] | FloatArray, *, checked: bool = True) -> Task:
+        """Move the tool straight by `way` (3,) m in the world, without turning.
+
+        `checked`: only if nothing but the clip is met; not so where the way begins in a socket's box.
+        """
+
+        def steps() -> Iterator[None]:
+            kin, q = self.kinematics[arm], self.joints(arm)
+            tool = kin.tool(q)
+            goal = RigidTransform.from_components(tool.translation + way, tool.rotation)
+            path = straight_line(kin, q, goal)
+            model = self._start_model(arm, clip=False)
+            if checked and not model.path_free(path[1:], 0.0):
+                distance, what = min(model.nearest(q) for q in path[1:])
+                message = (
+                    f"{float(np.linalg.norm(way)):.2f} m straight on the arm is {-1e3 * distance:.0f} mm in {what}"
+                )
+                raise PlanningError(CauseCode.MOTION_BLOCKED, message)
+            yield from self._follow(arm, path, APPROACH_SPEED)
+
+        return self._task(arm, steps())
 
     def pick(
         self, arm: str, world_from_connector: RigidTransform, *, shallow: float = 0.0, cable: FloatArray | None = None
