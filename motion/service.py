@@ -220,7 +220,7 @@ class Motion:
                 yield path
 
     def straight(self, arm: str, goal: RigidTransform, *, speed: float = APPROACH_SPEED) -> Task:
-        """Move the tool in a straight line to `goal` (world_from_tool), near things as it may be: nothing is checked."""
+        """Move the tool in a straight line to `goal` (world_from_tool), near things as it may be; unchecked."""
 
         def steps() -> Iterator[None]:
             yield from self._follow(arm, straight_line(self.kinematics[arm], self.joints(arm), goal), speed)

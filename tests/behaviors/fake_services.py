@@ -78,6 +78,7 @@ class FakeMotion:
         self.hand = RigidTransform.from_translation([0.3, 0.0, 0.4])
         self.grippers = {"left": FakeGripper(clock), "right": FakeGripper(clock)}
         self.moves: list[tuple[str, Vector]] = []
+        self.shifts: list[tuple[str, Vector]] = []
         self.cancelled: list[str] = []
         self.stopped = 0
         self.reachable: Callable[[RigidTransform], bool] = lambda pose: True
@@ -86,6 +87,10 @@ class FakeMotion:
 
     def move(self, arm: str, goals: Vector) -> Task:
         self.moves.append((arm, goals))
+        return Task(self._steps(), lambda: self.cancelled.append(arm))
+
+    def shift(self, arm: str, way: Vector) -> Task:
+        self.shifts.append((arm, way))
         return Task(self._steps(), lambda: self.cancelled.append(arm))
 
     def tool(self, arm: str) -> RigidTransform:

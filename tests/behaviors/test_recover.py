@@ -55,9 +55,12 @@ def test_a_frame_from_before_does_not_count(stage: Stage) -> None:
     assert stage.run(stage.tree(WAIT), 3.0) is Status.RUNNING
 
 
-def test_room_is_made_with_the_eye_open_and_the_jaw_open_in_the_end(stage: Stage) -> None:
+def test_room_is_made_with_the_eye_open_the_jaw_open_first_and_straight_back(stage: Stage) -> None:
     stage.belief.connector, stage.belief.found_by = RigidTransform.identity(), "wrist"
     assert stage.run(stage.tree(ROOM), 5.0) is Status.SUCCESS
+    [(hand, way)] = stage.motion.shifts
+    assert hand == "right"
+    assert way == pytest.approx([-0.1, 0.0, 0.0])
     [(arm, goals)] = stage.motion.moves
     assert arm == "right"
     assert goals == pytest.approx(np.array([stage.known.arm("right").sleep]))
@@ -76,7 +79,7 @@ def test_a_way_that_cannot_be_found_is_the_leaf_s_cause(stage: Stage) -> None:
 
 def test_a_leaf_stopped_midway_stops_its_arm_and_one_that_ended_does_not(stage: Stage) -> None:
     tree = stage.tree(ROOM)
-    assert stage.run(tree, 0.1) is Status.RUNNING
+    assert stage.run(tree, 0.4) is Status.RUNNING  # the jaw has opened, the hand draws back
     tree.root.stop(Status.INVALID)
     assert stage.motion.cancelled == ["right"]
     assert stage.run(tree, 5.0) is Status.SUCCESS  # begins anew

@@ -136,7 +136,7 @@ def test_points_where_an_arm_is_or_sleeps_are_no_obstacles(rig: Rig) -> None:
     asleep = rig.motion.kinematics["left"].tool(np.array(rig.known.arm("left").sleep)).translation
     far = np.array([0.3, 0.25, 0.15])
     rig.motion.set_obstacles(np.vstack([cube(on_left, 0.04), cube(asleep, 0.04), cube(far, 0.04)]), 0.01)
-    assert rig.motion.model("left").free(READY, MARGIN)
+    assert rig.motion.model("left").free(READY, TIGHT_MARGIN)
     assert rig.motion.model("left").free(np.array(rig.known.arm("left").sleep), 0.0)
     eye = RigidTransform.from_translation([-0.3, 0.0, 0.4])
     assert not rig.motion.sees(eye, 2 * far[None] - eye.translation)  # the other points still count
