@@ -10,7 +10,7 @@ import typer
 from typer.core import TyperGroup
 
 from app import output
-from app.findings import Finding, Findings
+from app.findings import Finding, Findings, shown
 from app.progress import shown_progress
 from app.resources import resolve, shipped
 from app.scenario_file import check_tree_file, description, load_scenario
@@ -19,6 +19,9 @@ if TYPE_CHECKING:
     from app.record import Result
 
 EXIT_UNMET, EXIT_BAD_INPUT, EXIT_INTERRUPTED = 1, 2, 130
+
+MOST_SEED = 2**31 - 1
+MOST_SEEDS = 10_000  # of one study
 
 
 class _Group(TyperGroup):
@@ -79,7 +82,7 @@ def _root(
 @app.command()
 def run(
     scenario: Annotated[str, typer.Argument(help="A shipped scenario's name, or a path to a .yaml file.")],
-    seed: Annotated[int, typer.Option(min=0, help="Draws every error, noise and jitter.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, max=MOST_SEED, help="Draws every error, noise and jitter.")] = 0,
     out: Annotated[Path | None, typer.Option(help="The record's folder; default runs/SCENARIO-SEED-N.")] = None,
     video: Annotated[bool, typer.Option("--video", help="Film the run into the record.")] = False,
     sets: Sets = None,
@@ -221,7 +224,13 @@ def demo(
       regrasp study demo --seeds 0:20 --jobs 2 --out results/demo
     """
     chosen = parse_seeds(seeds)
-    if out and (wrong := output.findings(out)):
+    wrong = output.findings(out) if out else []
+    if out and (out / "demo.json").exists():
+        wrong.append(Finding(shown(out), 1, "already holds a study; name another folder"))
+    for number, text in enumerate(sets or [], 1):
+        if text.partition("=")[0].strip() == "gravity":
+            wrong.append(Finding("--set", number, "a study runs both gravities; leave gravity out"))
+    if wrong:
         raise Findings(wrong)
     from app.study import run_demo
 
@@ -231,11 +240,13 @@ def demo(
 def parse_seeds(text: str) -> range:
     """The seeds of "A:B", B left out. Raises `Findings` for anything else."""
     first, _, after = text.partition(":")
-    if not (first.isdecimal() and after.isdecimal() and int(first) < int(after)):
-        raise Findings(
-            [Finding("--seeds", 1, f"{text!r} is no range of seeds; write A:B with A below B, such as 0:20")]
-        )
-    return range(int(first), int(after))
+    if not (first.isdecimal() and after.isdecimal() and int(first) < int(after) <= MOST_SEED):
+        message = f"{text!r} is no range of seeds; write A:B with A below B and B at most {MOST_SEED}, such as 0:20"
+        raise Findings([Finding("--seeds", 1, message)])
+    seeds = range(int(first), int(after))
+    if len(seeds) > MOST_SEEDS:
+        raise Findings([Finding("--seeds", 1, f"{len(seeds)} seeds; ask for at most {MOST_SEEDS} in one study")])
+    return seeds
 
 
 def main() -> None:

@@ -66,6 +66,10 @@ def run_episode(
                 scenario=scenario.name,
                 seed=seed,
                 gravity=scenario.file.gravity,
+                cell=scenario.file.cell,
+                tree=scenario.file.tree,
+                limits=scenario.file.limits.model_dump(),
+                overrides=list(scenario.overrides),
                 renderer=world.renderer.name,
                 renderer_reason=world.renderer.reason,
             )
@@ -123,7 +127,7 @@ def _loop(
             world.advance(TICK)
         limit = scenario.file.limits.sim_seconds
         return "time_limit", Cause(
-            CauseCode.TIME_LIMIT, f"not done after {limit:.0f} simulated seconds", _running(root)
+            CauseCode.TIME_LIMIT, f"not done after {limit:g} simulated seconds", _running(root)
         )
     except KeyboardInterrupt:
         return "interrupted", Cause(CauseCode.INTERRUPTED, "stopped from outside", _running(root))

@@ -17,6 +17,8 @@ def findings(out: Path) -> list[Finding]:
     """Why no run can be written to `out`; nothing is left behind by the look."""
     if any(os.path.exists(out / name) for name in ("result.json", "events.jsonl", "ticks.jsonl")):
         return [Finding(shown(out), 1, "already holds a run; name another folder")]
+    if out == Path():
+        return [Finding("--out", 1, "names this very folder; name one of its own for the run")]
     spot = out.absolute()
     while not os.path.lexists(spot) and spot != spot.parent:
         spot = spot.parent

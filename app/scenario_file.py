@@ -102,6 +102,7 @@ class Scenario:
     file: ScenarioFile
     cell: Cell
     tree: Path
+    overrides: tuple[str, ...] = ()
 
 
 def load_scenario(name_or_path: str, overrides: Sequence[str] = ()) -> Scenario:
@@ -123,7 +124,7 @@ def load_scenario(name_or_path: str, overrides: Sequence[str] = ()) -> Scenario:
         found += _misplaced(document, file, cell)
     if found or not (file and cell and tree):
         raise Findings(found)
-    return Scenario(path.stem, path, file, cell, tree)
+    return Scenario(path.stem, path, file, cell, tree, tuple(overrides))
 
 
 def _attempt(found: list[Finding], make: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T | None:

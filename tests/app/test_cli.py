@@ -183,7 +183,7 @@ def test_study_demo_hands_on_seeds_jobs_and_overrides(monkeypatch: pytest.Monkey
 
 @pytest.mark.parametrize("text", ["5", "5:", ":5", "5:5", "6:5", "a:b", "-1:3", "1:2:3", ""])
 def test_a_wrong_range_of_seeds_is_a_finding(text: str) -> None:
-    with pytest.raises(Findings, match="write A:B with A below B, such as 0:20"):
+    with pytest.raises(Findings, match="write A:B with A below B and B at most"):
         parse_seeds(text)
 
 

@@ -11,7 +11,7 @@ from interfaces.cell import KnownCell, pose_along
 from interfaces.frame import Intrinsics, RgbdFrame
 from motion.cable_path import natural_pose
 from motion.failure import PlanningError
-from motion.service import GRIP_OFFSETS, MARGIN, OPEN_GAP, TIGHT_MARGIN, Motion
+from motion.service import GRIP_OFFSETS, OPEN_GAP, TIGHT_MARGIN, Motion
 
 Points = NDArray[np.float64]
 READY = np.array([0.4, -0.6, 0.6, 0.0, 0.3, 0.0])
