@@ -126,9 +126,7 @@ def _loop(
                 return "safe_stop", belief.causes[-1] if belief.causes else None
             world.advance(TICK)
         limit = scenario.file.limits.sim_seconds
-        return "time_limit", Cause(
-            CauseCode.TIME_LIMIT, f"not done after {limit:g} simulated seconds", _running(root)
-        )
+        return "time_limit", Cause(CauseCode.TIME_LIMIT, f"not done after {limit:g} simulated seconds", _running(root))
     except KeyboardInterrupt:
         return "interrupted", Cause(CauseCode.INTERRUPTED, "stopped from outside", _running(root))
     except Exception as error:

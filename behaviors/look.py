@@ -7,9 +7,9 @@ from scipy.spatial.transform import RigidTransform
 from behaviors.hand import EYE, HandLeaf
 from behaviors.leaf import Steps
 from interfaces.cell import WristMount
-from motion.service import MARGIN
 from perception.rgbd_pose import Estimate
 
+LOOK_MARGIN = 0.02  # m: the searching arm moves among things that it has seen from one side only
 SETTLE_SECONDS = 0.1  # frames exposed while the arm still swings do not count
 
 
@@ -23,7 +23,7 @@ class LookLeaf(HandLeaf):
         assert isinstance(mount, WristMount)
         model = motion.model(EYE)
         views = motion.kinematics[EYE].ik_view(world_from_camera, mount.wrist_from_camera)
-        return np.array([q for q in views if model.free(q, MARGIN)]).reshape(-1, 6)
+        return np.array([q for q in views if model.free(q, LOOK_MARGIN)]).reshape(-1, 6)
 
     def go_and_look(self, goals: NDArray[np.float64], seconds: float, seen: list[Estimate]) -> Steps:
         """Move the camera to one of the goals, look for so long, gather estimates in `seen`, map what stands there.
@@ -31,7 +31,7 @@ class LookLeaf(HandLeaf):
         Unlike a yielded task, a motion that cannot be raises its PlanningError here, to the caller.
         """
         clock, perception, motion = self.services.clock, self.services.perception, self.services.motion
-        yield from self.follow(motion.move(EYE, goals))
+        yield from self.follow(motion.move(EYE, goals, margin=LOOK_MARGIN, tight=False))
         begin, mapped = clock.now() + SETTLE_SECONDS, False
         stamps: set[float] = set()
         while clock.now() < begin + seconds - 1e-9:

@@ -32,10 +32,11 @@ MARGIN = 0.015  # m between the arm's spheres and anything while it moves freely
 JAW_REACH = 0.13  # m round a connector's centre where the jaw may be: half its length, a finger's width, 5 cm of palm
 NO_POINTS = np.empty((0, 3))
 # m on the way of a held connector, which starts and ends near things; voxels are a margin themselves
-CARRY_MARGIN = 0.0
 TIGHT_MARGIN = 0.005  # m where nothing is found with that
 WAYS = 12  # ways to grasp that the planner may choose from
-NEAR_MARGIN = 0.0  # m on the last straight centimetres
+# m on the last straight centimetres and on the way of a held connector, which start and end near things: the first that
+# leaves a way. Voxels are a margin themselves.
+NEAR_MARGINS = (0.008, 0.004, 0.0)
 APPROACH_SPEED = 0.3  # share of the joints' speed on straight ways near things
 OPEN_GAP = 0.05  # m between the pads: 15 mm to each side of the connector, about 8 mm is how far off a pose may be
 GRIP_OFFSETS = (-0.02, -0.03, 0.0)  # m along the connector from its centre, tried in turn: near the cable the tip shows
@@ -108,19 +109,21 @@ class Motion:
         lower, upper = points.min(axis=0) - GRID_BORDER, points.max(axis=0) + GRID_BORDER
         self._grid = DistanceGrid.from_points(points, lower, upper, self._spacing)
 
-    def _start_model(self, arm: str, held: RigidTransform | None = None, *, clip: bool = True) -> CollisionModel:
+    def _start_model(
+        self, arm: str, held: RigidTransform | None = None, *, clip: bool = True, opening: float | None = None
+    ) -> CollisionModel:
         """`model` for a motion that begins now: seen points that the arm touches where it stands were none.
 
         Voxels are coarse and cameras err by millimetres; a hand that came in beside an obstacle must get out again.
         """
-        model = self.model(arm, held=held, clip=clip)
+        model = self.model(arm, held=held, clip=clip, opening=opening)
         distance, what = model.nearest(self.joints(arm))
         if what == "seen surface" and distance < TIGHT_MARGIN:
             spheres = model.spheres(self.joints(arm))
             self._points = _away_from(self._points, spheres, TIGHT_MARGIN + 2 * self._spacing)
             self._cable = _away_from(self._cable, spheres, TIGHT_MARGIN + 2 * self._spacing)
             self._rebuild_grid()
-            model = self.model(arm, held=held, clip=clip)
+            model = self.model(arm, held=held, clip=clip, opening=opening)
         return model
 
     def joints(self, arm: str) -> FloatArray:
@@ -145,11 +148,18 @@ class Motion:
         return [(s[:, :3], s[:, 3]) for s in both]
 
     def model(
-        self, arm: str, *, held: RigidTransform | None = None, others: bool = True, clip: bool = True
+        self,
+        arm: str,
+        *,
+        held: RigidTransform | None = None,
+        others: bool = True,
+        clip: bool = True,
+        opening: float | None = None,
     ) -> CollisionModel:
         """What `arm` must not touch now.
 
         `held` is tool_from_connector while it carries the connector; without `clip` the clip's bracket may be touched.
+        The jaw is as the fingers read, or `opening` m wide.
         """
         other = None
         if others:
@@ -164,18 +174,18 @@ class Motion:
             other_arm=other,
             grid=self._grid if others else None,
             carried=None if held is None else _connector_spheres(held, self.known.connector),
-            opening=2 * self.known.connector.radius if held is not None else OPEN_GAP,
+            opening=self.grippers[arm].reading().gap if opening is None else opening,
         )
 
-    def move(self, arm: str, goals: FloatArray, *, held: RigidTransform | None = None, speed: float = 1.0) -> Task:
-        """Plan a free way to one of the goals (n, 6) rad and follow it.
+    def move(self, arm: str, goals: FloatArray, *, margin: float = MARGIN, tight: bool = True) -> Task:
+        """Plan a way to one of the goals (n, 6) rad, `margin` m from everything, and follow it.
 
-        `held` is tool_from_connector when the arm carries.
+        `tight`: with a smaller margin where nothing else is found.
         """
 
         def steps() -> Iterator[None]:
-            path = self._plan(self._start_model(arm, held), self.joints(arm), goals)
-            yield from self._follow(arm, path, speed)
+            path = self._plan(self._start_model(arm), self.joints(arm), goals, margin, tight)
+            yield from self._follow(arm, path, 1.0)
 
         return self._task(arm, steps())
 
@@ -198,13 +208,14 @@ class Motion:
             model, q, kin = self._start_model(arm, held), self.joints(arm), self.kinematics[arm]
             start, release = kin.tool(q) * held, held.inv()
             leads_on = partial(_leads_on, kin, onward)
-            for path in chain(
-                (path for goal in goals for path in self._natural_paths(kin, q, start, goal * held, release)),
-                (path for goal in goals if (path := _through(kin, q, [goal])) is not None),
-            ):
-                if leads_on(path[-1]) and model.path_free(path[1:], CARRY_MARGIN):
-                    yield from self._follow(arm, path, speed)
-                    return
+            natural = (path for goal in goals for path in self._natural_paths(kin, q, start, goal * held, release))
+            direct = (_through(kin, q, [goal]) for goal in goals)
+            paths = [path for path in chain(natural, direct) if path is not None and leads_on(path[-1])]
+            for margin in NEAR_MARGINS:
+                for path in paths:
+                    if model.path_free(path[1:], margin):
+                        yield from self._follow(arm, path, speed)
+                        return
             configurations = np.array([end for goal in goals for end in kin.ik(goal) if leads_on(end)]).reshape(-1, 6)
             yield from self._follow(arm, self._plan(model, q, configurations), speed)
 
@@ -239,7 +250,7 @@ class Motion:
             goal = RigidTransform.from_components(tool.translation + way, tool.rotation)
             path = straight_line(kin, q, goal)
             model = self._start_model(arm, clip=False)
-            if checked and not model.path_free(path[1:], 0.0):
+            if checked and not model.path_free(path[1:], NEAR_MARGINS[0]):
                 distance, what = min(model.nearest(q) for q in path[1:])
                 message = (
                     f"{float(np.linalg.norm(way)):.2f} m straight on the arm is {-1e3 * distance:.0f} mm in {what}"
@@ -262,7 +273,7 @@ class Motion:
         def steps() -> Iterator[None]:
             q = self.joints(arm)
             self.keep_clear(_clear_of(cable, world_from_connector.translation, JAW_REACH))
-            model = self._start_model(arm)
+            model = self._start_model(arm, opening=OPEN_GAP)
             ways = self._ways_to_grasp(arm, model, world_from_connector, shallow)
             self.grippers[arm].open(OPEN_GAP)
             path = self._plan(model, q, np.array([way[0] for way in ways]))
@@ -308,7 +319,8 @@ class Motion:
         self, arm: str, model: CollisionModel, world_from_connector: RigidTransform, shallow: float
     ) -> list[FloatArray]:
         """Ways in (k, 6) from standoff to grasp of the cheapest candidates that work, at most `WAYS`."""
-        kin, near, q = self.kinematics[arm], self.model(arm, clip=False), self.joints(arm)
+        kin, q = self.kinematics[arm], self.joints(arm)
+        near = self.model(arm, clip=False, opening=OPEN_GAP)
         connector = self.known.connector
         left = [
             grasp
@@ -318,23 +330,34 @@ class Motion:
             )
         ]
         ways: list[FloatArray] = []
-        while left and len(ways) < WAYS:
-            try:
-                choice = choose_grasp(kin, model, q, left, margin=MARGIN, near=near, near_margin=NEAR_MARGIN)
-            except PlanningError:
-                if ways:
+        for near_margin in NEAR_MARGINS:
+            rest = left
+            while rest and len(ways) < WAYS:
+                try:
+                    choice = choose_grasp(kin, model, q, rest, margin=MARGIN, near=near, near_margin=near_margin)
+                except PlanningError:
+                    if not ways and near_margin == NEAR_MARGINS[-1]:
+                        raise
                     break
-                raise
-            ways += choice.paths
-            left = left[left.index(choice.grasp) + 1 :]
+                ways += choice.paths
+                rest = rest[rest.index(choice.grasp) + 1 :]
+            if ways:
+                break
         return ways
 
-    def _plan(self, model: CollisionModel, start: FloatArray, goals: FloatArray) -> FloatArray:
-        """A path (k, 6) with the full margin, else with a smaller one."""
+    def _plan(
+        self,
+        model: CollisionModel,
+        start: FloatArray,
+        goals: FloatArray,
+        margin: float = MARGIN,
+        tight: bool = True,
+    ) -> FloatArray:
+        """A path (k, 6) with the full margin, else, if `tight`, with a smaller one."""
         try:
-            return plan(model, start, goals, self._next_seed(), margin=MARGIN)
+            return plan(model, start, goals, self._next_seed(), margin=margin)
         except PlanningError as error:
-            if error.code is CauseCode.OUT_OF_REACH:
+            if not tight or error.code is CauseCode.OUT_OF_REACH:
                 raise
             return plan(model, start, goals, self._next_seed(), margin=TIGHT_MARGIN)
 

@@ -85,7 +85,7 @@ class FakeMotion:
         view = SimpleNamespace(ik_view=self._views)
         self.kinematics = {"left": view, "right": view}
 
-    def move(self, arm: str, goals: Vector) -> Task:
+    def move(self, arm: str, goals: Vector, *, margin: float = 0.0, tight: bool = True) -> Task:
         self.moves.append((arm, goals))
         return Task(self._steps(), lambda: self.cancelled.append(arm))
 
