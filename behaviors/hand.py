@@ -46,13 +46,12 @@ class HandLeaf(StepsLeaf):
             return False
         return True
 
-    def back_off(self) -> Steps:
-        """Draw the hand straight back as far as may be, then bring the arm to its sleep pose."""
+    def draw_back(self) -> Steps:
+        """Draw the hand straight back as far as may be."""
         motion = self.services.motion
         for distance in BACK:
             if (yield from self.attempt(motion.shift(HAND, motion.tool(HAND).rotation.apply([-distance, 0.0, 0.0])))):
                 break
-        yield from self.go_to_sleep(HAND)
 
     def go_to_sleep(self, arm: str) -> Steps:
         """Bring an arm to its sleep pose, out of the cameras' and the other arm's way."""

@@ -26,7 +26,7 @@ class MakeRoom(HandLeaf):
         """See the class."""
         self.services.belief.connector = self.services.belief.found_by = None
         self.services.motion.grippers[HAND].open(OPEN_GAP)
-        for step in chain(self.wait(LEAVE_SECONDS), self.back_off()):
+        for step in chain(self.wait(LEAVE_SECONDS), self.draw_back(), self.go_to_sleep(HAND)):
             self.services.perception.look("rear")  # the search starts where the end was seen last
             yield step
 

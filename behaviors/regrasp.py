@@ -36,7 +36,8 @@ class Regrasp(HandLeaf):
         except Failed:
             motion.grippers[HAND].open(OPEN_GAP)
             yield from self.wait(0.6)
-            yield from self.back_off()
+            yield from self.draw_back()
+            yield from self.go_to_sleep(HAND)
             raise
 
 

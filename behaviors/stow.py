@@ -27,8 +27,10 @@ class LetGo(HandLeaf):
         known, motion = self.services.known, self.services.motion
         seat = known.clip.world_from_seat
         along = np.linspace(-0.5, 0.5, 10)[:, None] * known.connector.length
+        yield from self.draw_back()
+        # The way to sleep must not sweep the stowed end out of its clip.
         motion.keep_clear(np.vstack([seat.apply(along * [1.0, 0.0, 0.0]), cable_course(known, seat)]))
-        yield from self.back_off()
+        yield from self.go_to_sleep(HAND)
         motion.keep_clear(NO_POINTS)
 
 
