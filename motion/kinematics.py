@@ -28,6 +28,7 @@ UPPER = np.deg2rad([180.0, 72.0, 92.0, 180.0, 128.0, 180.0])
 VELOCITY_LIMIT = np.full(6, np.pi)  # rad/s, the maker's servos
 ACCELERATION_LIMIT = np.full(6, 5.0)  # rad/s2, the maker's MoveIt configuration for its six-joint arms
 
+_ROUNDING = 1e-9  # rad past a joint's limit that are arithmetic
 _POSITION_TOLERANCE = 1e-4  # metres, of an inverse kinematics solution
 _ANGLE_TOLERANCE = 1e-3  # rad
 _CAMERA_POSITION_TOLERANCE = 0.002  # metres
@@ -178,7 +179,8 @@ def _rolled(tool_target: FloatArray, wanted: FloatArray, roll: float) -> FloatAr
 
 
 def _within_limits(rows: FloatArray) -> FloatArray:
-    return rows[np.all((rows >= LOWER) & (rows <= UPPER), axis=1)]
+    inside = np.clip(rows, LOWER, UPPER)
+    return inside[np.all(np.abs(inside - rows) < _ROUNDING, axis=1)]
 
 
 def _distinct(rows: list[FloatArray]) -> FloatArray:

@@ -20,9 +20,7 @@ class Swing(StepsLeaf):
 
     def steps(self) -> Steps:
         motion = self.services.motion
-        tasks = [
-            motion.move(arm, motion.joints(arm)[None] + [turn, 0.4, -0.2, 0, 0, 0], speed=0.4) for arm, turn in SWINGS
-        ]
+        tasks = [motion.move(arm, motion.joints(arm)[None] + [turn, 0.4, -0.2, 0, 0, 0]) for arm, turn in SWINGS]
         while True:
             for task in tasks:
                 task.poll()
