@@ -9,19 +9,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from app import output
-from app.findings import Finding, Findings, shown
+from app import output, scenario_commands, study_commands, tree_commands
+from app.findings import Finding, Findings
+from app.options import MOST_SEED, Sets
 from app.progress import shown_progress
-from app.resources import resolve, shipped
-from app.scenario_file import check_tree_file, description, load_scenario
+from app.scenario_file import load_scenario
 
 if TYPE_CHECKING:
     from app.record import Result
 
 EXIT_UNMET, EXIT_BAD_INPUT, EXIT_INTERRUPTED = 1, 2, 130
-
-MOST_SEED = 2**31 - 1
-MOST_SEEDS = 10_000  # of one study
 
 
 class _Group(TyperGroup):
@@ -43,19 +40,9 @@ class _Group(TyperGroup):
 app = typer.Typer(
     cls=_Group, no_args_is_help=True, add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False
 )
-trees_app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Look at behaviour trees.")
-scenarios_app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Look at scenarios.")
-study_app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Run many episodes and count.")
-app.add_typer(trees_app, name="trees")
-app.add_typer(scenarios_app, name="scenarios")
-app.add_typer(study_app, name="study")
-
-Sets = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--set", metavar="KEY=VALUE", help="Change a value of the scenario, or with cell. of its cell; repeat."
-    ),
-]
+app.add_typer(tree_commands.app, name="trees")
+app.add_typer(scenario_commands.app, name="scenarios")
+app.add_typer(study_commands.app, name="study")
 
 
 def _version(wanted: bool) -> None:
@@ -167,37 +154,6 @@ def _plain(value: object) -> str:
     return f"{value:.3g}" if isinstance(value, float) else str(value)
 
 
-@trees_app.command("list")
-def list_trees() -> None:
-    """Names of the shipped trees."""
-    for name in shipped("tree"):
-        typer.echo(name)
-
-
-@trees_app.command("show")
-def show(tree: Annotated[str, typer.Argument(help="A shipped tree's name, or a path to an .xml file.")]) -> None:
-    """Draw a tree as text.
-
-    \b
-    Example:
-      regrasp trees show recovery
-    """
-    path = resolve("tree", tree, Path())
-    check_tree_file(path)
-    from trees import show_tree
-
-    typer.echo(show_tree(path))
-
-
-@scenarios_app.command("list")
-def list_scenarios() -> None:
-    """Names and descriptions of the shipped scenarios."""
-    known = shipped("scenario")
-    width = max(map(len, known), default=0)
-    for name, path in known.items():
-        typer.echo(f"{name:<{width}}  {description(path)}")
-
-
 @app.command()
 def doctor() -> None:
     """Say what a run needs from this machine, and whether it is there. Exit code 1 when something is missing."""
@@ -208,47 +164,3 @@ def doctor() -> None:
         typer.echo(f"{check.status:<6}{check.name:<24}{check.seen}")
         wrong |= check.status == "wrong"
     raise typer.Exit(1 if wrong else 0)
-
-
-@study_app.command("demo")
-def demo(
-    seeds: Annotated[str, typer.Option(metavar="A:B", help="Seeds from A up to, not including, B.")],
-    jobs: Annotated[int, typer.Option(min=1, help="Episodes side by side.")] = os.cpu_count() or 1,
-    out: Annotated[Path | None, typer.Option(help="Folder of demo.json and the runs' records.")] = None,
-    sets: Sets = None,
-) -> None:
-    """The whole demonstration: no, short and tall obstacle, each without and with gravity, over many seeds.
-
-    \b
-    Example:
-      regrasp study demo --seeds 0:20 --jobs 2 --out results/demo
-    """
-    chosen = parse_seeds(seeds)
-    wrong = output.findings(out) if out else []
-    if out and (out / "demo.json").exists():
-        wrong.append(Finding(shown(out), 1, "already holds a study; name another folder"))
-    for number, text in enumerate(sets or [], 1):
-        if text.partition("=")[0].strip() == "gravity":
-            wrong.append(Finding("--set", number, "a study runs both gravities; leave gravity out"))
-    if wrong:
-        raise Findings(wrong)
-    from app.study import run_demo
-
-    raise typer.Exit(run_demo(chosen, jobs, out, sets or []))
-
-
-def parse_seeds(text: str) -> range:
-    """The seeds of "A:B", B left out. Raises `Findings` for anything else."""
-    first, _, after = text.partition(":")
-    if not (first.isdecimal() and after.isdecimal() and int(first) < int(after) <= MOST_SEED):
-        message = f"{text!r} is no range of seeds; write A:B with A below B and B at most {MOST_SEED}, such as 0:20"
-        raise Findings([Finding("--seeds", 1, message)])
-    seeds = range(int(first), int(after))
-    if len(seeds) > MOST_SEEDS:
-        raise Findings([Finding("--seeds", 1, f"{len(seeds)} seeds; ask for at most {MOST_SEEDS} in one study")])
-    return seeds
-
-
-def main() -> None:
-    """Entry point of the `regrasp` script."""
-    app()

@@ -9,8 +9,9 @@ import pytest
 from toy_scenario import write_scenario
 from typer.testing import CliRunner
 
-from app.cli import app, parse_seeds
+from app.cli import app
 from app.findings import Findings
+from app.options import parse_seeds
 from app.output import free_folder
 from app.record import Expectation, Result, Slip
 from app.resources import shipped

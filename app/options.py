@@ -1,0 +1,29 @@
+"""Options that several commands take."""
+
+from typing import Annotated
+
+import typer
+
+from app.findings import Finding, Findings
+
+MOST_SEED = 2**31 - 1
+MOST_SEEDS = 10_000  # of one study
+
+Sets = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set", metavar="KEY=VALUE", help="Change a value of the scenario, or with cell. of its cell; repeat."
+    ),
+]
+
+
+def parse_seeds(text: str) -> range:
+    """The seeds of "A:B", B left out. Raises `Findings` for anything else."""
+    first, _, after = text.partition(":")
+    if not (first.isdecimal() and after.isdecimal() and int(first) < int(after) <= MOST_SEED):
+        message = f"{text!r} is no range of seeds; write A:B with A below B and B at most {MOST_SEED}, such as 0:20"
+        raise Findings([Finding("--seeds", 1, message)])
+    seeds = range(int(first), int(after))
+    if len(seeds) > MOST_SEEDS:
+        raise Findings([Finding("--seeds", 1, f"{len(seeds)} seeds; ask for at most {MOST_SEEDS} in one study")])
+    return seeds
