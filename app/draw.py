@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from app.scenario_file import ScenarioFile
+from app.scenario_schema import ScenarioFile
 from interfaces.cell import Box
 from interfaces.scene import JawOpens, Obstacle
 

@@ -3,7 +3,7 @@
 from itertools import pairwise
 
 from app.record import Expectation, Slip
-from app.scenario_file import Expect
+from app.scenario_schema import Expect
 from behaviors.services import Belief
 from sim.ground_truth import GroundTruth
 

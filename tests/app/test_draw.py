@@ -4,7 +4,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.draw import draw_faults, draw_obstacles
-from app.scenario_file import JawOpensSpec, ObstacleSpec, ScenarioFile
+from app.fault_schema import JawOpensSpec
+from app.scenario_schema import ObstacleSpec, ScenarioFile
 from interfaces.scene import Gravity
 
 JITTER = (0.004, 0.006, 0.002)

@@ -4,7 +4,7 @@ from typing import Any, cast
 import pytest
 
 from app.judge import STILL_SECONDS, Judge
-from app.scenario_file import Expect
+from app.scenario_schema import Expect
 from behaviors.services import Belief, Notice
 from interfaces.cause import CauseCode
 from sim.ground_truth import GroundTruth
