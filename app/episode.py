@@ -64,10 +64,12 @@ def run_episode(
             log.info(
                 "begin",
                 scenario=scenario.name,
+                case=scenario.case,
                 seed=seed,
                 gravity=scenario.file.gravity,
                 cell=scenario.file.cell,
                 tree=scenario.file.tree,
+                inputs=scenario.file.inputs,
                 limits=scenario.file.limits.model_dump(),
                 overrides=list(scenario.overrides),
                 renderer=world.renderer.name,
@@ -101,7 +103,7 @@ def _assemble(scenario: Scenario, world: World, seed: int, log: Any) -> Episode:
     perception = Perception(known, world.cameras, world, motion.camera_pose, motion.spheres)
     services = Services(known, world, motion, perception, log)
     py_trees.blackboard.Blackboard.clear()
-    tree = py_trees.trees.BehaviourTree(load_tree(scenario.tree, LEAVES, {"tries": str(scenario.file.limits.tries)}))
+    tree = py_trees.trees.BehaviourTree(load_tree(scenario.tree, LEAVES, scenario.inputs))
     tree.setup(services=services)
     return Episode(world, services, tree, Judge(GroundTruth(world), scenario.file.expect))
 
@@ -167,6 +169,7 @@ def _result(
         seed,
         outcome,
         succeeded=all(e.met for e in expectations),
+        case=scenario.case,
         cause=cause,
         expectations=expectations,
         slips=judge.slips(belief),

@@ -1,41 +1,72 @@
-"""`--set key.path=value`: values from the command line laid over a parsed file."""
+"""Values laid over a parsed file: `--set key.path=value` from the command line, and what a case of `vary` changes."""
 
 from collections.abc import Sequence
+from copy import deepcopy
+from dataclasses import dataclass
 
 from app.findings import Finding, Findings
-from app.yaml_lines import Document, Path, Value, parse
+from app.yaml_lines import Document, Path, Place, Value, parse
 
 SOURCE = "--set"  # the file name of a finding in an override; its line is the override's number, from 1
 
 
-def apply(document: Document, overrides: Sequence[tuple[int, str]]) -> None:
-    """Lay (number, "key.path=value") pairs over `document` in place; list items go by index, values are YAML.
+@dataclass(frozen=True)
+class Assignment:
+    """A value for a key of a file; `told` is how a finding names it, `place` where it was written."""
 
-    Raises `Findings` for an override that cannot be read or placed. A key that the file does not know yet is added, so
-    that the check of the whole file judges it.
-    """
-    findings: list[Finding] = []
-    for number, text in overrides:
+    key: str  # dotted; list items go by index
+    new: Document
+    told: str
+    place: Place
+
+
+def read(overrides: Sequence[str]) -> tuple[list[Assignment], list[Finding]]:
+    """The assignments of "key.path=value" texts, values in YAML, and the findings of those that are none."""
+    assignments, findings = [], []
+    for number, text in enumerate(overrides, 1):
+        key, equals, value = text.partition("=")
+        if not equals or not all(key.strip().split(".")):
+            message = f"{text!r}: no key with a value; write key.path=value, such as gravity=earth"
+            findings.append(Finding(SOURCE, number, message))
+            continue
         try:
-            _apply_one(document, number, text)
+            new = parse(value, SOURCE, number)
         except Findings as error:
             findings += error.items
+            continue
+        findings += new.findings
+        if not new.findings:
+            assignments.append(Assignment(key.strip(), new, repr(text), (SOURCE, number)))
+    return assignments, findings
+
+
+def apply(document: Document, assignments: Sequence[Assignment]) -> None:
+    """Lay values over `document` in place; a key that it does not know yet is added, for the check of the whole.
+
+    Raises `Findings` for all that cannot be placed.
+    """
+    findings = []
+    for assignment in assignments:
+        try:
+            _apply_one(document, assignment)
         except LookupError as error:
-            findings.append(Finding(SOURCE, number, f"{text!r}: {error.args[0]}"))
+            findings.append(Finding(*assignment.place, f"{assignment.told}: {error.args[0]}"))
     if findings:
         raise Findings(findings)
 
 
-def _apply_one(document: Document, number: int, text: str) -> None:
-    key, equals, value = text.partition("=")
-    keys = key.strip().split(".")
-    if not equals or not all(keys):
-        raise LookupError("expected key.path=value, such as limits.tries=2")
-    new = parse(value, SOURCE, number)
-    path = _put(document, keys, new.value)
+def _apply_one(document: Document, assignment: Assignment) -> None:
+    path = _put(document, _steps(assignment.key), deepcopy(assignment.new.value))
     for old in [p for p in document.places if p[: len(path)] == path]:
         del document.places[old]
-    document.places.update({path + below: place for below, place in new.places.items()})
+    document.unread -= {p for p in document.unread if p[: len(path)] == path}
+    document.places.update({path + below: place for below, place in assignment.new.places.items()})
+
+
+def _steps(key: str) -> list[str]:
+    """The names in a dotted key; what stands below `vary` is one name, itself dotted."""
+    first, *rest = key.split(".")
+    return [first, ".".join(rest)] if first == "vary" and rest else [first, *rest]
 
 
 def _put(document: Document, keys: list[str], value: Value) -> Path:
@@ -45,9 +76,7 @@ def _put(document: Document, keys: list[str], value: Value) -> Path:
     for i, key in enumerate(keys):
         last = i == len(keys) - 1
         if isinstance(spot, list):
-            if not key.isdecimal() or int(key) >= len(spot):
-                raise LookupError(f"{_dotted(path)} has {len(spot)} items, numbered from 0; there is no {key!r}")
-            index = int(key)
+            index = _index(spot, key, path)
             path = (*path, index)
             if last:
                 spot[index] = value
@@ -57,11 +86,25 @@ def _put(document: Document, keys: list[str], value: Value) -> Path:
             if last:
                 spot[key] = value
             elif spot.get(key) is None:
+                if keys[i + 1].isdecimal():
+                    raise LookupError(_no_items(path))
                 spot[key] = {}
             spot = spot[key]
         else:
-            raise LookupError(f"{_dotted(path)} is a single value, it has no {key!r}")
+            raise LookupError(f"{_dotted(path)} is a single value; it has no {key!r}")
     return path
+
+
+def _index(items: list[Value], key: str, path: Path) -> int:
+    if not items:
+        raise LookupError(_no_items(path))
+    if not key.isdecimal() or int(key) >= len(items):
+        raise LookupError(f"no item {key!r} in {_dotted(path)}; give a number from 0 to {len(items) - 1}")
+    return int(key)
+
+
+def _no_items(path: Path) -> str:
+    return f"{_dotted(path)} is empty, so it has no item to change; set the whole list, {_dotted(path)}=[...]"
 
 
 def _dotted(path: Path) -> str:

@@ -1,16 +1,43 @@
 """Whether an obstacle, wherever its jitter puts it, stands in something else."""
 
+from collections.abc import Iterator, Sequence
+
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
+from scipy.spatial.transform import RigidTransform, Rotation
 
-from interfaces.cell import ArmSpec, KnownCell, Size, Vector, pose_along
+from app.findings import Finding, Findings
+from app.scenario_schema import ObstacleSpec
+from app.yaml_lines import Document
+from interfaces.cell import ArmSpec, FixedMount, KnownCell, Size, Vector, pose_along
 
 FloatArray = NDArray[np.float64]
 # The ViperX 300 S's base, rtb-data's mesh VXSA-300-M-1-Base: centre from the arm's base, and full size, metres.
 _BASE_CENTER = np.array([-0.0475, 0.0, 0.0394])
 _BASE_SIZE = (0.300, 0.204, 0.0787)
 TOUCHING = 1e-6  # metres of overlap that are rounding
+
+
+def misplaced(document: Document, obstacles: Sequence[ObstacleSpec], cell: KnownCell) -> None:
+    """Raises `Findings`: obstacles that share a name, reach below the floor or stand in a piece of the cell."""
+    if found := list(_misplaced(document, obstacles, cell)):
+        raise Findings(found)
+
+
+def _misplaced(document: Document, obstacles: Sequence[ObstacleSpec], cell: KnownCell) -> Iterator[Finding]:
+    names = [o.name for o in obstacles]
+    for i, obstacle in enumerate(obstacles):
+        if names.index(obstacle.name) < i:
+            yield Finding(*document.place(("obstacles", i, "name")), f"two obstacles {obstacle.name!r}; rename one")
+        for gravity, (x, y, bottom) in (("zero", obstacle.position.zero), ("earth", obstacle.position.earth)):
+            place = document.place(("obstacles", i, "position", gravity))
+            if bottom - obstacle.jitter[2] < -TOUCHING:
+                deep = obstacle.jitter[2] - bottom
+                yield Finding(*place, f"obstacle {obstacle.name!r} reaches {deep:.3f} m below the floor; raise it to 0")
+            center = np.array([x, y, bottom + 0.5 * obstacle.size[2]])
+            for name, depth in overlaps(cell, center, obstacle.size, obstacle.yaw_deg, obstacle.jitter):
+                message = f"obstacle {obstacle.name!r} reaches {depth:.3f} m into {name}; move it, or jitter it less"
+                yield Finding(*place, message)
 
 
 def overlaps(
@@ -22,26 +49,42 @@ def overlaps(
     """
     turn = Rotation.from_euler("z", yaw_deg, degrees=True).as_matrix()
     moving = np.vstack([_halves(turn, size), np.diag(jitter)])
-    found = []
-    for name, place, halves in _pieces(cell):
-        depth = penetration(np.vstack([moving, halves]), center - place)
-        if depth > TOUCHING:
-            found.append((name, depth))
-    return found
+    found: dict[str, float] = {}
+    for name, place, halves in [*_pieces(cell), *_cameras(cell)]:
+        found[name] = penetration(np.vstack([moving, halves]), center - place)
+    for arm in cell.arms:
+        places, halves = _asleep(arm)
+        depths = _cube_depths(moving, center - places, halves)
+        found[f"the {arm.name} arm asleep"] = float(depths.max())
+    return [(name, depth) for name, depth in found.items() if depth > TOUCHING]
 
 
 def penetration(generators: FloatArray, offset: FloatArray) -> float:
     """How far (m) two boxes overlap; at most 0 when apart.
 
-    The boxes' Minkowski difference is the zonotope of all their half edges `generators` (n, 3): its facets' normals are
-    the cross products of pairs of them, and the boxes overlap if `offset` (3,) between their centres lies inside.
+    The boxes' Minkowski difference is the zonotope of all their half edges `generators` (n, 3), and the boxes overlap
+    if `offset` (3,) between their centres lies inside.
     """
+    normals = _facets(generators)
+    reach = np.abs(generators @ normals.T).sum(axis=0)
+    return float(np.min(reach - np.abs(normals @ offset)))
+
+
+def _cube_depths(generators: FloatArray, offsets: FloatArray, halves: FloatArray) -> FloatArray:
+    """As `penetration`, of a box with each of many upright cubes: `offsets` (n, 3), half edges `halves` (n,), m."""
+    normals = _facets(np.vstack([generators, np.eye(3)]))
+    reach = np.abs(generators @ normals.T).sum(axis=0) + np.outer(halves, np.abs(normals).sum(axis=1))
+    depths: FloatArray = np.min(reach - np.abs(offsets @ normals.T), axis=1)
+    return depths
+
+
+def _facets(generators: FloatArray) -> FloatArray:
+    """Unit normals (m, 3) of a zonotope's facets: the cross products of pairs of its generators (n, 3)."""
     first, second = np.triu_indices(len(generators), 1)
     normals = np.cross(generators[first], generators[second])
     lengths = np.linalg.norm(normals, axis=1)
-    normals = normals[lengths > 1e-12] / lengths[lengths > 1e-12, None]
-    reach = np.abs(generators @ normals.T).sum(axis=0)
-    return float(np.min(reach - np.abs(normals @ offset)))
+    units: FloatArray = normals[lengths > 1e-12] / lengths[lengths > 1e-12, None]
+    return units
 
 
 def _halves(turn: FloatArray, size: Size) -> FloatArray:
@@ -61,3 +104,19 @@ def _pieces(cell: KnownCell) -> list[tuple[str, FloatArray, FloatArray]]:
 
 def _base(arm: ArmSpec) -> tuple[str, FloatArray, FloatArray]:
     return f"the {arm.name} arm's base", np.array(arm.base) + _BASE_CENTER, _halves(np.eye(3), _BASE_SIZE)
+
+
+def _cameras(cell: KnownCell) -> list[tuple[str, FloatArray, FloatArray]]:
+    """As `_pieces`, the places of the cameras that stand still, without extent."""
+    mounts = [(c.name, c.mount) for c in cell.cameras if isinstance(c.mount, FixedMount)]
+    return [(f"the {name} camera", np.array(mount.position), np.zeros((3, 3))) for name, mount in mounts]
+
+
+def _asleep(arm: ArmSpec) -> tuple[FloatArray, FloatArray]:
+    """Centres (n, 3) and half edges (n,), m, of the cubes inside the spheres that fill an arm in its sleep pose."""
+    from motion.kinematics import ArmKinematics  # late: it brings the compiler
+    from motion.spheres import LINKS, SPHERES
+
+    frames = ArmKinematics(RigidTransform.from_translation(arm.base)).link_frames(np.array(arm.sleep))[LINKS]
+    centers = np.einsum("nij,nj->ni", frames[:, :3, :3], SPHERES[:, :3]) + frames[:, :3, 3]
+    return centers, SPHERES[:, 3] / np.sqrt(3)

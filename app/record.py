@@ -74,6 +74,7 @@ class Result:
     seed: int
     outcome: Outcome
     succeeded: bool
+    case: str = "default"  # of the scenario's, where some of its values vary
     cause: Cause | None = None
     expectations: tuple[Expectation, ...] = ()
     slips: tuple[Slip, ...] = ()

@@ -1,17 +1,17 @@
 """Scenario files: which cell, which tree, what goes wrong, and what must come out."""
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Hashable, Iterator, Sequence
+from copy import deepcopy
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal, ParamSpec, TypeVar
+from typing import Any, Literal, ParamSpec, TypeVar
 
-import numpy as np
-
-from app import overrides as set_
+from app import vary
 from app.findings import Finding, Findings, nearest, shown
-from app.placement import TOUCHING, overlaps
+from app.overrides import Assignment, apply, read
+from app.placement import misplaced
 from app.resources import read_text, resolve
-from app.scenario_schema import ScenarioFile
+from app.scenario_schema import LightSpec, ScenarioFile, TreeInput
 from app.schema import validated
 from app.yaml_lines import Document, Place, parse
 from interfaces.cell import Cell
@@ -22,7 +22,10 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Scenario:
-    """A scenario, checked, with the cell and the tree that it names."""
+    """One case of a scenario, checked: what the file says with the case's values, and the cell and tree that it names.
+
+    `cell` has the scenario's light.
+    """
 
     name: str
     path: Path
@@ -30,37 +33,115 @@ class Scenario:
     cell: Cell
     tree: Path
     overrides: tuple[str, ...] = ()
+    case: str = vary.DEFAULT
+
+    @property
+    def title(self) -> str:
+        """Name and case, for a person."""
+        return self.name if self.case == vary.DEFAULT else f"{self.name} {self.case}"
+
+    @property
+    def inputs(self) -> dict[str, str]:
+        """The tree's inputs as a tree file would state them."""
+        return {key: tree_text(value) for key, value in self.file.inputs.items()}
 
 
-def load_scenario(name_or_path: str, overrides: Sequence[str] = ()) -> Scenario:
-    """Read and check a scenario, its cell and its tree.
+def load_scenario(name_or_path: str, overrides: Sequence[str] = (), case: str | None = None) -> Scenario:
+    """Read and check one case of a scenario, its cell and its tree; the case of the first values if none is named.
 
     `overrides` are "key.path=value" with YAML values; those that start with "cell." change the cell. Raises `Findings`
     with all that is wrong in any of the three files.
     """
-    numbered = list(enumerate(overrides, 1))
-    of_cell = [(n, text.removeprefix("cell.")) for n, text in numbered if text.startswith("cell.")]
-    path = resolve("scenario", name_or_path, Path())
-    found: list[Finding] = []
-    document = parse(read_text(path), shown(path))
-    _attempt(found, set_.apply, document, [(n, text) for n, text in numbered if not text.startswith("cell.")])
-    file = _attempt(found, validated, document, ScenarioFile)
-    cell = _attempt(found, _cell, document, path.parent, of_cell)
-    tree = _attempt(found, _tree, document, path.parent)
-    if file and cell:
-        found += _misplaced(document, file, cell)
-    if found or not (file and cell and tree):
-        raise Findings(found)
-    return Scenario(path.stem, path, file, cell, tree, tuple(overrides))
+    source = _Source(name_or_path, overrides)
+    names = [name for name, _ in source.cases]
+    if case is not None and case not in names:
+        source.found[Finding("--case", 1, f"no case {case!r}; {nearest(case, names)}")] = ""
+    wanted = names.index(case) if case in names else 0
+    return source.checked(source.cases[wanted : wanted + 1])[0]
 
 
-def _attempt(found: list[Finding], make: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T | None:
-    """What `make` returns; None when it raises findings, which are added to `found`."""
-    try:
-        return make(*args, **kwargs)
-    except Findings as error:
-        found += error.items
-        return None
+def cases(name_or_path: str, overrides: Sequence[str] = ()) -> list[Scenario]:
+    """Every case of a scenario, read and checked as `load_scenario` does, in the order of its `vary`.
+
+    Raises `Findings` with all that is wrong in any case.
+    """
+    source = _Source(name_or_path, overrides)
+    return source.checked(source.cases)
+
+
+def case_names(name_or_path: str, overrides: Sequence[str] = ()) -> list[str]:
+    """The names of a scenario's cases, without a check of the rest. Raises `Findings`."""
+    return [name for name, _ in _Source(name_or_path, overrides).cases]
+
+
+class _Source:
+    """A scenario's file, its cases, and what was found wrong so far.
+
+    What cases share (a cell, a tree, where the obstacles stand) is read and checked once.
+    """
+
+    def __init__(self, name_or_path: str, overrides: Sequence[str]) -> None:
+        self.found: dict[Finding, str] = {}  # with the case that showed it first, '' for the file itself
+        self._done: dict[Hashable, Any] = {}
+        self.path = resolve("scenario", name_or_path, Path())
+        self.overrides = tuple(overrides)
+        self._document = parse(read_text(self.path), shown(self.path))
+        assignments, wrong = read(overrides)
+        self.found |= dict.fromkeys(wrong, "")
+        of_vary = [a for a in assignments if f"{a.key}.".startswith("vary.")]
+        self._fixed = [a for a in assignments if a not in of_vary]
+        self._attempt("", apply, self._document, of_vary)
+        axes = self._attempt("", vary.axes, self._document, self._fixed)
+        self.cases = list(vary.expand(axes or []))
+        if isinstance(self._document.value, dict):
+            self._document.value.pop("vary", None)
+
+    def checked(self, chosen: Sequence[tuple[str, list[Assignment]]]) -> list[Scenario]:
+        """The scenarios of these cases. Raises `Findings`; one that the first of them has not names its case."""
+        made = [self._scenario(*case) for case in chosen]
+        if self.found:
+            shared = ("", chosen[0][0])
+            raise Findings(f if case in shared else _of_case(f, case) for f, case in self.found.items())
+        return [scenario for scenario in made if scenario]
+
+    def _attempt(self, case: str, make: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T | None:
+        """What `make` returns; None when it raises findings, which are noted."""
+        try:
+            return make(*args, **kwargs)
+        except Findings as error:
+            for finding in error.items:
+                self.found.setdefault(finding, case)
+            return None
+
+    def _once(self, case: str, make: Callable[..., T], key: Hashable, *args: Any) -> T | None:
+        """As `_attempt`, but only for the first case with this key; the others get the same."""
+        if (make, key) not in self._done:
+            self._done[make, key] = self._attempt(case, make, *args)
+        done: T | None = self._done[make, key]
+        return done
+
+    def _scenario(self, case: str, assignments: Sequence[Assignment]) -> Scenario | None:
+        given = self._document
+        document = Document(deepcopy(given.value), dict(given.places), given.findings, set(given.unread))
+        every = [*assignments, *self._fixed]
+        of_cell = [replace(a, key=a.key[5:]) for a in every if a.key.startswith("cell.")]
+        self._attempt(case, apply, document, [a for a in every if not a.key.startswith("cell.")])
+        file = self._attempt(case, validated, document, ScenarioFile)
+        names = document.value if isinstance(document.value, dict) else {}
+        laid = repr([(a.key, a.new.value) for a in of_cell])
+        cell = self._once(case, _cell, (repr(names.get("cell")), laid), document, self.path.parent, of_cell)
+        tree = self._once(case, _tree, repr(names.get("tree")), document, self.path.parent)
+        if file and cell:
+            self._once(case, misplaced, (file.obstacles, id(cell)), document, file.obstacles, cell.known)
+        if file and tree:
+            self._once(case, _check_inputs, (tree, repr(file.inputs)), document, tree, file)
+        if not (file and cell and tree):
+            return None
+        return Scenario(self.path.stem, self.path, file, _lit(cell, file.light), tree, self.overrides, case)
+
+
+def _of_case(finding: Finding, case: str) -> Finding:
+    return replace(finding, message=f"{finding.message} (case {case})")
 
 
 def _named(document: Document, key: Literal["cell", "tree"], folder: Path) -> Path | None:
@@ -69,18 +150,50 @@ def _named(document: Document, key: Literal["cell", "tree"], folder: Path) -> Pa
     return resolve(key, name, folder, document.place((key,))) if isinstance(name, str) else None
 
 
-def _cell(document: Document, folder: Path, overrides: list[tuple[int, str]]) -> Cell | None:
+def _cell(document: Document, folder: Path, assignments: Sequence[Assignment]) -> Cell | None:
     path = _named(document, "cell", folder)
-    return load_cell(path, overrides, document.place(("cell",))) if path else None
+    return load_cell(path, assignments, document.place(("cell",))) if path else None
 
 
-def load_cell(path: Path, overrides: Sequence[tuple[int, str]] = (), where: Place | None = None) -> Cell:
-    """Read and check a cell file under (number, "key.path=value") overrides.
+def _lit(cell: Cell, light: LightSpec) -> Cell:
+    """The cell in a scenario's light."""
+    given = {key: value for key in ("direction", "ambient", "diffuse") if (value := getattr(light, key)) is not None}
+    lit = cell.hidden.light.model_copy(update=given)
+    factor = {"ambient": lit.ambient * light.brightness, "diffuse": lit.diffuse * light.brightness}
+    hidden = cell.hidden.model_copy(update={"light": lit.model_copy(update=factor)})
+    return cell.model_copy(update={"hidden": hidden})
+
+
+def _tree(document: Document, folder: Path) -> Path | None:
+    path = _named(document, "tree", folder)
+    if path is not None:
+        check_tree_file(path, document.place(("tree",)))
+    return path
+
+
+def _check_inputs(document: Document, tree: Path, file: ScenarioFile) -> None:
+    from trees import check_inputs  # late, as below
+
+    given = {key: tree_text(value) for key, value in file.inputs.items()}
+    if found := [
+        Finding(*document.place(("inputs", key)), f"inputs.{key}: {message}")
+        for key, message in check_inputs(tree, given)
+    ]:
+        raise Findings(found)
+
+
+def tree_text(value: TreeInput) -> str:
+    """An input's value as a tree file would state it."""
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def load_cell(path: Path, assignments: Sequence[Assignment] = (), where: Place | None = None) -> Cell:
+    """Read and check a cell file with values laid over it.
 
     Raises `Findings`, at `where` (the place that names the cell) when there is no such file.
     """
     document = parse(read_text(path, where), shown(path))
-    set_.apply(document, overrides)
+    apply(document, assignments)
     cell = validated(document, Cell)
     found = list(_inconsistent(document, cell))
     if found:
@@ -104,13 +217,6 @@ def _inconsistent(document: Document, cell: Cell) -> Iterator[Finding]:
             yield Finding(*document.place(("known", key)), message)
 
 
-def _tree(document: Document, folder: Path) -> Path | None:
-    path = _named(document, "tree", folder)
-    if path is not None:
-        check_tree_file(path, document.place(("tree",)))
-    return path
-
-
 def check_tree_file(path: Path, where: Place | None = None) -> None:
     """Raises `Findings` for all that is wrong in a tree file; at `where`, which names it, when there is none."""
     read_text(path, where)
@@ -125,20 +231,3 @@ def description(path: Path) -> str:
     """The sentence that a scenario file gives of itself, without a check of the rest."""
     value = parse(read_text(path), shown(path)).value
     return str(value.get("description", "")) if isinstance(value, dict) else ""
-
-
-def _misplaced(document: Document, file: ScenarioFile, cell: Cell) -> Iterator[Finding]:
-    """Obstacles that share a name, reach below the floor or stand in a piece of the cell."""
-    names = [o.name for o in file.obstacles]
-    for i, obstacle in enumerate(file.obstacles):
-        if names.index(obstacle.name) < i:
-            yield Finding(*document.place(("obstacles", i, "name")), f"two obstacles {obstacle.name!r}; rename one")
-        for gravity, (x, y, bottom) in (("zero", obstacle.position.zero), ("earth", obstacle.position.earth)):
-            place = document.place(("obstacles", i, "position", gravity))
-            if bottom - obstacle.jitter[2] < -TOUCHING:
-                deep = obstacle.jitter[2] - bottom
-                yield Finding(*place, f"obstacle {obstacle.name!r} reaches {deep:.3f} m below the floor; raise it to 0")
-            center = np.array([x, y, bottom + 0.5 * obstacle.size[2]])
-            for name, depth in overlaps(cell.known, center, obstacle.size, obstacle.yaw_deg, obstacle.jitter):
-                message = f"obstacle {obstacle.name!r} reaches {depth:.3f} m into {name}; move it, or jitter it less"
-                yield Finding(*place, message)

@@ -1,12 +1,13 @@
-"""What a scenario file may say, as pydantic models."""
+"""What a scenario file may say, as pydantic models: each field with its meaning, its unit and an example."""
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, JsonValue, model_validator
 
 from app.fault_schema import FaultSpec
+from app.options import MOST_SEED
 from interfaces.cause import CauseCode
-from interfaces.cell import Color, Model, NotNegative, Vector
+from interfaces.cell import Color, Direction, Fraction, Model, NotNegative, Vector
 from interfaces.scene import Gravity
 
 Outcome = Literal["stowed", "safe_stop"]
@@ -14,39 +15,144 @@ Edge = Annotated[float, Field(gt=0, le=3)]  # metres
 Reach = Annotated[float, Field(ge=0, le=1)]  # metres
 
 
-class ByGravity(Model):
-    """A point (m, world frame) for each gravity: the loose end settles elsewhere when it hangs."""
+def _in_order(text: str) -> str:
+    first, after = map(int, text.split(":"))
+    if first >= after:
+        raise ValueError(f"{text!r} holds no number; write A:B with A below B, such as '0:5'")
+    return text
 
-    zero: Vector
-    earth: Vector
+
+class Steps(Model):
+    """Evenly spaced numbers."""
+
+    first: Annotated[float, Field(alias="from", allow_inf_nan=False, description="The first number.", examples=[0.1])]
+    last: Annotated[float, Field(alias="to", allow_inf_nan=False, description="The last number.", examples=[0.5])]
+    steps: Annotated[int, Field(ge=2, le=10_000, description="How many numbers, both ends among them.", examples=[5])]
+
+
+Listed = Annotated[tuple[JsonValue, ...], Field(min_length=1)]
+WholeNumbers = Annotated[str, Field(pattern=r"^\d{1,10}:\d{1,10}$", examples=["0:5"]), AfterValidator(_in_order)]
+Vary = dict[str, Listed | WholeNumbers | Steps]
+
+
+class ByGravity(Model):
+    """A point for each gravity: the loose end settles elsewhere when it hangs."""
+
+    zero: Annotated[Vector, Field(description="Without gravity: x, y, z in metres.", examples=[[0.22, 0.12, 0.1]])]
+    earth: Annotated[Vector, Field(description="Under Earth's gravity, likewise.", examples=[[0.22, 0.11, 0.0]])]
 
 
 class ObstacleSpec(Model):
     """A foam block that the robot is not told about; one that does not stand on the floor is held by a thin stand."""
 
-    name: str
-    size: tuple[Edge, Edge, Edge]  # along x, y, z before it is turned
-    color: Color = (0.5, 0.2, 0.6)
-    position: ByGravity  # centre in x and y, bottom in z
-    yaw_deg: Annotated[float, Field(ge=-360, le=360)] = 0.0
-    jitter: tuple[Reach, Reach, Reach] = (0.0, 0.0, 0.0)  # uniform, to both sides, drawn from the seed
+    name: Annotated[str, Field(description="What messages and records call it.", examples=["short"])]
+    size: Annotated[
+        tuple[Edge, Edge, Edge],
+        Field(description="Edges along x, y, z before it is turned, in metres.", examples=[[0.08, 0.12, 0.18]]),
+    ]
+    color: Annotated[Color, Field(description="Red, green, blue, each 0 to 1.", examples=[[0.45, 0.2, 0.6]])] = (
+        0.5,
+        0.2,
+        0.6,
+    )
+    position: Annotated[
+        ByGravity,
+        Field(
+            description="Its centre in x and y and its bottom in z, metres in the world's frame.",
+            examples=[{"zero": [0.22, 0.12, 0.1], "earth": [0.22, 0.11, 0.0]}],
+        ),
+    ]
+    yaw_deg: Annotated[float, Field(ge=-360, le=360, description="Turned left by so many degrees.", examples=[30])] = (
+        0.0
+    )
+    jitter: Annotated[
+        tuple[Reach, Reach, Reach],
+        Field(
+            description="The seed moves it by up to so many metres along x, y, z, to both sides, uniformly.",
+            examples=[[0.004, 0.006, 0.0]],
+        ),
+    ] = (0.0, 0.0, 0.0)
+
+
+class LightSpec(Model):
+    """The light in place of the cell's; what is left out stays, and the seed's own variation comes on top."""
+
+    brightness: Annotated[
+        float, Field(ge=0, le=3, description="Factor on the ambient and the far light.", examples=[0.5])
+    ] = 1.0
+    direction: Annotated[
+        Direction | None,
+        Field(description="From the scene to the far light; the length does not matter.", examples=[[-0.5, 0.3, 1.0]]),
+    ] = None
+    ambient: Annotated[
+        Fraction | None, Field(description="Strength of the light from all sides, 0 to 1.", examples=[0.45])
+    ] = None
+    diffuse: Annotated[
+        Fraction | None, Field(description="Strength of the far light that throws shadows, 0 to 1.", examples=[0.55])
+    ] = None
 
 
 class Limits(Model):
     """What ends a run that does not end by itself."""
 
-    sim_seconds: Annotated[float, Field(gt=0, le=3600)] = 600.0
-    tries: Annotated[int, Field(ge=1, le=20)] = 5  # deliveries, each after a recovery where the hand is empty
+    sim_seconds: Annotated[
+        float, Field(gt=0, le=3600, description="Simulated seconds, then the run is cut short.", examples=[120.0])
+    ] = 600.0
+
+
+class PoseError(Model):
+    """How far the connector may end from its seat in the clip; what is left out is not looked at."""
+
+    position: Annotated[
+        NotNegative | None, Field(description="Metres at most between the centres.", examples=[0.01])
+    ] = None
+    angle_deg: Annotated[
+        NotNegative | None, Field(description="Degrees at most between the axes.", examples=[10.0])
+    ] = None
 
 
 class Expect(Model):
-    """What must come out; None is not looked at."""
+    """What must come out, by ground truth; what is left out is not looked at."""
 
-    outcome: Outcome = "stowed"
-    slips: Annotated[int, Field(ge=0, le=20)] | None = None  # real losses that were noticed
-    hidden: bool | None = None  # settled out of the rear camera's sight and found by the wrist camera
-    unintended_force: NotNegative | None = None  # newtons at most
-    cause: CauseCode | None = None
+    outcome: Annotated[
+        Outcome,
+        Field(description="The end: connector in the clip, or arms stopped after a failure.", examples=["safe_stop"]),
+    ] = "stowed"
+    cause: Annotated[
+        CauseCode | None, Field(description="Why a safe stop came.", examples=["search_exhausted"])
+    ] = None
+    sim_seconds: Annotated[
+        NotNegative | None, Field(description="Simulated seconds at most.", examples=[120.0])
+    ] = None
+    tries: Annotated[
+        int | None,
+        Field(ge=1, le=100, description="How often the hand takes hold at most; unplugging is one.", examples=[2]),
+    ] = None
+    slips: Annotated[
+        int | None,
+        Field(ge=0, le=20, description="Losses that the robot notices at least; none may go unseen.", examples=[1]),
+    ] = None
+    detection_delay: Annotated[
+        NotNegative | None, Field(description="Seconds at most from a loss to its notice.", examples=[0.5])
+    ] = None
+    hidden: Annotated[
+        bool | None,
+        Field(
+            description="Whether the lost end settles out of the rear camera's sight and the wrist camera finds it.",
+            examples=[True],
+        ),
+    ] = None
+    unintended_force: Annotated[
+        NotNegative | None,
+        Field(description="Newtons at most between an arm and what it must not touch, all along.", examples=[5.0]),
+    ] = None
+    pose_error: Annotated[
+        PoseError | None,
+        Field(
+            description="How far the connector ends from its seat in the clip.",
+            examples=[{"position": 0.01, "angle_deg": 10.0}],
+        ),
+    ] = None
 
     @model_validator(mode="after")
     def _cause_of_a_stop(self) -> Self:
@@ -55,14 +161,70 @@ class Expect(Model):
         return self
 
 
-class ScenarioFile(Model):
-    """A scenario file as written."""
+TreeInput = bool | int | float | Annotated[str, Field(pattern=r"^[^{}]*$", examples=["rear"])]
+Marker = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$", examples=["slow"])]
 
-    description: str
-    cell: str  # a shipped cell's name, or a path from this file's folder
-    tree: str  # likewise
-    gravity: Gravity
-    obstacles: tuple[ObstacleSpec, ...] = ()
-    faults: tuple[FaultSpec, ...] = ()
-    limits: Limits = Limits()
-    expect: Expect = Expect()
+
+class ScenarioFile(Model):
+    """A scenario: which cell, which tree, what goes wrong, and what must come out."""
+
+    description: Annotated[str, Field(description="A sentence for the list.", examples=["The end is lost in sight."])]
+    cell: Annotated[
+        str, Field(description="A shipped cell's name, or a path from this file's folder.", examples=["thesis"])
+    ]
+    tree: Annotated[
+        str, Field(description="A shipped tree's name, or a path from this file's folder.", examples=["recovery"])
+    ]
+    inputs: Annotated[
+        dict[str, TreeInput],
+        Field(description="Values in place of the defaults of the main tree's keys.", examples=[{"tries": 3}]),
+    ] = {}
+    gravity: Annotated[Gravity, Field(description="None, or Earth's.", examples=["zero"])]
+    seed: Annotated[
+        int, Field(ge=0, le=MOST_SEED, description="Draws every error, noise and jitter.", examples=[7])
+    ] = 0
+    obstacles: Annotated[
+        tuple[ObstacleSpec, ...],
+        Field(
+            description="Foam blocks that the robot is not told about.",
+            examples=[[{"name": "a", "size": [0.1, 0.1, 0.2], "position": {"zero": [0, 0, 0], "earth": [0, 0, 0]}}]],
+        ),
+    ] = ()
+    light: Annotated[
+        LightSpec, Field(description="The light in place of the cell's.", examples=[{"brightness": 0.5}])
+    ] = LightSpec()
+    faults: Annotated[tuple[FaultSpec, ...], Field(description="What the world does to the robot.", examples=[[]])] = ()
+    limits: Annotated[
+        Limits, Field(description="What ends a run that does not end by itself.", examples=[{"sim_seconds": 120.0}])
+    ] = Limits()
+    expect: Annotated[
+        Expect,
+        Field(
+            description="What must come out, by ground truth; alone, that the end is stowed.",
+            examples=[{"outcome": "safe_stop", "cause": "search_exhausted"}],
+        ),
+    ] = Expect()
+    markers: Annotated[
+        tuple[Marker, ...], Field(description="pytest's markers for the cases.", examples=[["slow"]])
+    ] = ()
+    vary: Annotated[
+        Vary,
+        Field(
+            description=(
+                "Dotted keys of this file, or with cell. of the cell, each with a list of values, whole numbers 'A:B' "
+                "(B left out) or evenly spaced numbers. Every combination is a case; the first values make the default."
+            ),
+            examples=[
+                {
+                    "gravity": ["zero", "earth"],
+                    "seed": "0:5",
+                    "light.brightness": {"from": 0.5, "to": 1.0, "steps": 3},
+                }
+            ],
+        ),
+    ] = {}
+
+
+def json_schema() -> dict[str, Any]:
+    """The schema of scenario files as JSON Schema, draft 2020-12."""
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **ScenarioFile.model_json_schema()}

@@ -26,6 +26,8 @@ _UNITS = dict.fromkeys(_LENGTHS.split(), _METRES) | {  # by the name of the key 
     "hold_force": "newtons, such as 15.0",
     "max_force": "newtons, such as 40.0",
     "yaw_deg": "degrees, such as 30.0",
+    "angle_deg": "degrees, such as 5.0",
+    "detection_delay": "seconds, such as 0.5",
     "sleep": "radians, such as 0.8",
     "carried": "shares of the way from socket to clip, such as 0.5",
 }
@@ -33,12 +35,21 @@ _UNITS = dict.fromkeys(_LENGTHS.split(), _METRES) | {  # by the name of the key 
 
 def validated(document: Document, model: type[M]) -> M:
     """The model's instance. Raises `Findings` with every error; strict: text is never taken for a number."""
+    found = list(document.findings)
     try:
-        return model.model_validate_json(json.dumps(document.value), strict=True)
+        made = model.model_validate_json(json.dumps(document.value), strict=True)
     except ValidationError as error:
         root = model.model_json_schema()
         errors = _best_branches(document.value, error.errors())
-        raise Findings(_finding(document, root, path, e) for path, e in errors) from None
+        found += [_finding(document, root, path, e) for path, e in errors if path not in document.unread]
+    if found:
+        raise Findings(found)
+    return made
+
+
+def unit(key: str) -> str:
+    """The unit of the numbers under a key of this name, in words; '' for none."""
+    return _UNITS.get(key, "").partition(",")[0]
 
 
 def _child(value: Value, step: str | int) -> tuple[bool, Value]:
@@ -112,7 +123,7 @@ def _at(root: Schema, path: Path) -> list[Schema]:
                 items = node.get("prefixItems", [])
                 below.append(items[step] if step < len(items) else node.get("items"))
             else:
-                below.append(node.get("properties", {}).get(step))
+                below.append(node.get("properties", {}).get(step, node.get("additionalProperties")))
         nodes = [opened for node in below if isinstance(node, dict) for opened in _open(root, node)]
     return nodes
 
@@ -139,9 +150,13 @@ def _words(node: Schema, key: str) -> str:
     if kind == "array":
         items = node.get("prefixItems", [])
         what = _words(items[0], key) if items and "$ref" not in items[0] else ""
-        return f"{len(items)} values, each {what}" if what else "a list"
+        many = f"{len(items)} values, each {what}" if what else "a list"
+        return f"{many} of at least {node['minItems']}" if not items and "minItems" in node else many
     if kind == "object":
-        return "a mapping of " + ", ".join(node.get("properties", {}))
+        keys = ", ".join(node.get("properties", {}))
+        return f"a mapping of {keys}" if keys else "a mapping"
+    if kind == "string" and "pattern" in node:
+        return f"text such as {node['examples'][0]!r}"
     if kind in ("number", "integer"):
         unit = f" in {_UNITS[key]}" if key in _UNITS else ""
         return ("a whole number" if kind == "integer" else "a number") + unit + _range(node)

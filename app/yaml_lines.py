@@ -16,16 +16,33 @@ MAX_DEPTH = 20
 MAX_VALUES = 20_000  # after aliases are expanded
 # What YAML 1.1 and 1.2 both read as a number, so not 010, 1_000, 1:30 or 1e3.
 _NUMBER = re.compile(r"[-+]?(0|[1-9]\d{0,18}|(0|[1-9]\d{0,18})?\.\d{0,30}([eE][-+]\d{1,3})?)")
-_LOOKS_LIKE_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+")
+_LOOKS_LIKE_NUMBER = re.compile(r"([-+]?)(\d+\.?\d*|\.\d+)[eE]([-+]?)(\d+)")
 _TAG = "tag:yaml.org,2002:"
+_REMEDIES = {  # by a word of PyYAML's own message
+    "'\\t'": "indent with spaces, not with tabs",
+    "another document": "keep one document in a file",
+    "undefined alias": "define it before as &name, or put text that begins with * in quotes",
+    "duplicate anchor": "give each & another name",
+    "expected ',' or": "close the bracket, or put a comma between the items",
+    "mapping values are not allowed": "put text that holds a colon and a blank in quotes, and indent keys alike",
+    "could not find expected ':'": "write key: value",
+    "expected <block end>": "indent the keys of a mapping alike",
+    "end of stream": "close the quotes",
+    "escape": "write a backslash twice, or use single quotes",
+}
 
 
 @dataclass
 class Document:
-    """Plain values and, for every path in them, the place where it stands."""
+    """Plain values and, for every path in them, the place where it stands.
+
+    `findings` tells of single values that could not be read; None stands for them, at the paths in `unread`.
+    """
 
     value: Value
     places: dict[Path, Place]
+    findings: list[Finding] = field(default_factory=list)
+    unread: set[Path] = field(default_factory=set)
 
     def place(self, path: Path) -> Place:
         """Where `path` stands, or the nearest thing around it that stands anywhere."""
@@ -37,36 +54,41 @@ class Document:
 def parse(text: str, source: str, line: int | None = None) -> Document:
     """Read one YAML document; every line is reported as `line` when that is given (a value from the command line).
 
-    Raises `Findings`: malformed text, duplicate or unreadable keys, tags, numbers that are not plain and finite, too
-    deep or too large once aliases are expanded.
+    Keys that stand twice, tags, and numbers that are not plain and finite are `findings` of the document.
+    Raises `Findings` where there is none: malformed text, too deep, or too large once aliases are expanded.
     """
     builder = _Builder(source, line)
     try:
-        _limit_nesting(text)
+        _limit_nesting(text, source, line)
         node = yaml.compose(text, Loader=yaml.SafeLoader)
     except yaml.MarkedYAMLError as error:
         at = error.problem_mark.line + 1 if error.problem_mark else 1
-        raise Findings([Finding(source, line or at, f"not YAML: {error.problem or error.context}")]) from None
+        raise _not_yaml(source, line or at, error.problem or str(error.context)) from None
     except yaml.reader.ReaderError as error:
         at = text.count("\n", 0, error.position) + 1
-        raise Findings([Finding(source, line or at, f"not YAML: {chr(error.character)!r} is not text")]) from None
+        message = f"not YAML: {chr(error.character)!r} is not text; remove it"
+        raise Findings([Finding(source, line or at, message)]) from None
     except (yaml.YAMLError, ValueError, OverflowError) as error:  # an escape beyond Unicode is a bare ValueError
-        raise Findings([Finding(source, line or 1, f"not YAML: {error}")]) from None
+        raise _not_yaml(source, line or 1, str(error)) from None
     value = None if node is None else builder.build(node, (), 0)
     builder.places.setdefault((), (source, line or 1))
-    if builder.findings:
-        raise Findings(builder.findings)
-    return Document(value, builder.places)
+    return Document(value, builder.places, builder.findings, builder.unread)
 
 
-def _limit_nesting(text: str) -> None:
+def _not_yaml(source: str, line: int, problem: str) -> Findings:
+    remedy = next((r for words, r in _REMEDIES.items() if words in problem), "write it such as key: value")
+    return Findings([Finding(source, line, f"not YAML: {problem}; {remedy}")])
+
+
+def _limit_nesting(text: str, source: str, line: int | None) -> None:
     """Refuse deep nesting before `compose`, which recurses."""
     depth = 0
     for event in yaml.parse(text, Loader=yaml.SafeLoader):
         depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
         if depth > MAX_DEPTH:
             at = event.start_mark.line + 1 if event.start_mark else 1
-            raise ValueError(f"line {at} nests deeper than {MAX_DEPTH} levels")
+            message = f"nests deeper than {MAX_DEPTH} levels; a file of ours needs fewer than 10"
+            raise Findings([Finding(source, line or at, message)])
 
 
 @dataclass
@@ -75,16 +97,20 @@ class _Builder:
     line: int | None
     places: dict[Path, Place] = field(default_factory=dict)
     findings: list[Finding] = field(default_factory=list)
+    unread: set[Path] = field(default_factory=set)
     count: int = 0
 
-    def wrong(self, node: yaml.Node, message: str) -> None:
+    def wrong(self, node: yaml.Node, message: str, path: Path | None = None) -> None:
+        """Note a finding; `path` is that of the value that cannot be read for it."""
         self.findings.append(Finding(self.source, self.line or node.start_mark.line + 1, message))
+        if path is not None:
+            self.unread.add(path)
 
     def charge(self, node: yaml.Node, values: int, depth: int) -> None:
         """Count what is built; only aliases, of themselves or of one another, go past the limits."""
         self.count += values
         if depth > MAX_DEPTH or self.count > MAX_VALUES:
-            self.wrong(node, f"aliases expand to more than {MAX_VALUES} values or {MAX_DEPTH} levels")
+            self.wrong(node, f"aliases expand to more than {MAX_VALUES} values or {MAX_DEPTH} levels; write out what is meant")
             raise Findings(self.findings)
 
     def build(self, node: yaml.Node, path: Path, depth: int, at: yaml.Node | None = None) -> Value:
@@ -97,8 +123,8 @@ class _Builder:
         if isinstance(node, yaml.SequenceNode) and node.tag == _TAG + "seq":
             return [self.build(child, (*path, i), depth + 1) for i, child in enumerate(node.value)]
         if isinstance(node, yaml.ScalarNode):
-            return self.scalar(node)
-        self.wrong(node, f"tag {node.tag!r} is not allowed; write plain values")
+            return self.scalar(node, path)
+        self.wrong(node, f"tag {node.tag!r} is not allowed; write plain values", path)
         return None
 
     def pairs(self, node: yaml.MappingNode, depth: int) -> dict[str, tuple[yaml.Node, yaml.Node]]:
@@ -110,7 +136,7 @@ class _Builder:
             if key.tag == _TAG + "merge":
                 merged = self.merged(value, depth) | merged
             elif not isinstance(key, yaml.ScalarNode):
-                self.wrong(key, "a key must be a name")
+                self.wrong(key, "a key must be a name; write text before the colon")
             elif key.value in own:
                 self.wrong(key, f"key {key.value!r} stands twice; keep one")
             else:
@@ -124,10 +150,10 @@ class _Builder:
             if isinstance(part, yaml.MappingNode):
                 result |= self.pairs(part, depth + 1)
             else:
-                self.wrong(part, "'<<' takes a mapping, such as an alias of one")
+                self.wrong(part, "'<<' takes a mapping; name the alias of one, such as *a")
         return result
 
-    def scalar(self, node: yaml.ScalarNode) -> Value:
+    def scalar(self, node: yaml.ScalarNode, path: Path) -> Value:
         kind = node.tag.removeprefix(_TAG)
         text = str(node.value)
         if kind == "null":
@@ -135,14 +161,31 @@ class _Builder:
         if kind == "bool":
             return yaml.SafeLoader.bool_values.get(text.lower())
         if kind in ("int", "float") or (node.style is None and _LOOKS_LIKE_NUMBER.fullmatch(text)):
-            return self.number(node, text)
+            if _NUMBER.fullmatch(text) and math.isfinite(float(text)):
+                return float(text) if set(text) & set(".eE") else int(text)
+            self.wrong(node, _not_a_number(text), path)
+            return None
         if kind in ("str", "timestamp", "value"):
             return text
-        self.wrong(node, f"tag {node.tag!r} is not allowed; write plain values")
+        self.wrong(node, f"tag {node.tag!r} is not allowed; write plain values", path)
         return None
 
-    def number(self, node: yaml.ScalarNode, text: str) -> Value:
-        if not _NUMBER.fullmatch(text) or not math.isfinite(float(text)):
-            self.wrong(node, f"{text[:40]!r} is no plain finite number; write it such as 1000, 0.3 or 1.0e+3")
-            return None
-        return float(text) if set(text) & set(".eE") else int(text)
+
+def _not_a_number(text: str) -> str:
+    """Why a number that YAML's readers disagree on is refused, and how to write it."""
+    if match := _LOOKS_LIKE_NUMBER.fullmatch(text):
+        sign, digits, power_sign, power = match.groups()
+        right = f"{sign}{digits if '.' in digits else digits + '.0'}e{power_sign or '+'}{power}"
+        if right != text:
+            return f"{_cut(text)} is text to YAML, not a number; write {right[:40]}"
+    try:
+        read = yaml.safe_load(text)
+    except (yaml.YAMLError, ValueError, OverflowError):  # Python refuses to read thousands of digits
+        read = None
+    if isinstance(read, int | float) and math.isfinite(read) and abs(read) < 1e15:
+        return f"{_cut(text)} is {read} to some readers of YAML and not to others; write {read}, or quotes around text"
+    return f"{_cut(text)} is no plain finite number; write it such as 1000, 0.3 or 1.0e+3"
+
+
+def _cut(text: str) -> str:
+    return repr(text if len(text) <= 40 else text[:37] + "...")

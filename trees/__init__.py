@@ -2,6 +2,7 @@
 
 from trees.check import Finding, check_tree
 from trees.element import TreeSyntaxError
+from trees.inputs import check_inputs
 from trees.load import TreeError, load_tree
 from trees.paths import in_tree_order, node_paths
 from trees.show import show_tree
@@ -10,6 +11,7 @@ __all__ = [
     "Finding",
     "TreeError",
     "TreeSyntaxError",
+    "check_inputs",
     "check_tree",
     "in_tree_order",
     "load_tree",

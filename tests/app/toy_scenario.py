@@ -12,6 +12,7 @@ description: a foam block hides the end of the cable
 cell: thesis
 tree: tree.xml
 gravity: zero
+inputs: {tries: 4}
 obstacles:
   - name: short
     size: [0.08, 0.12, 0.18]
@@ -21,7 +22,7 @@ obstacles:
     jitter: [0.01, 0.01, 0.0]
 faults:
   - {type: jaw_opens, carried: [0.3, 0.8], seconds: 1.0}
-limits: {sim_seconds: 600, tries: 4}
+limits: {sim_seconds: 600}
 expect:
   outcome: stowed
   slips: 1
@@ -29,8 +30,8 @@ expect:
   unintended_force: 5.0
 """
 TREE = """\
-<root main_tree_to_execute="Main"><BehaviorTree ID="Main">
-<Wait name="settle" seconds="0.1"/>
+<root main_tree_to_execute="Main"><BehaviorTree ID="Main" tries="2">
+<Retry name="again" num_failures="{tries}"><Wait name="settle" seconds="0.1"/></Retry>
 </BehaviorTree></root>
 """
 
