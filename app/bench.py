@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from app.scenario_file import load_scenario
-from app.study import print_table
+from app.table import print_table
 from app.tick_log import TickLog
 from perception.rgbd_pose import NoEstimate, estimate
 from perception.segmentation import SegmentationParameters

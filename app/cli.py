@@ -13,7 +13,9 @@ from app import output, scenario_commands, study_commands, tree_commands
 from app.findings import Finding, Findings
 from app.options import MOST_SEED, Sets
 from app.progress import shown_progress
+from app.run_every import run_every
 from app.scenario_file import load_scenario
+from app.vary import DEFAULT
 
 if TYPE_CHECKING:
     from app.record import Result
@@ -69,8 +71,21 @@ def _root(
 @app.command()
 def run(
     scenario: Annotated[str, typer.Argument(help="A shipped scenario's name, or a path to a .yaml file.")],
-    seed: Annotated[int, typer.Option(min=0, max=MOST_SEED, help="Draws every error, noise and jitter.")] = 0,
-    out: Annotated[Path | None, typer.Option(help="The record's folder; default runs/SCENARIO-SEED-N.")] = None,
+    case: Annotated[
+        str | None, typer.Option(metavar="NAME", help="The case to run; default that of the first values.")
+    ] = None,
+    every: Annotated[bool, typer.Option("--all", help="Run every case, each in a process of its own.")] = False,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, help="With --all: cases side by side; default one a processor.")
+    ] = None,
+    seed: Annotated[
+        int | None,
+        typer.Option(min=0, max=MOST_SEED, help="Draws every error, noise and jitter; default the scenario's."),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="The record's folder, with --all that of all records; default in runs/.")
+    ] = None,
+    junit: Annotated[Path | None, typer.Option(metavar="FILE", help="With --all: write JUnit XML, too.")] = None,
     video: Annotated[bool, typer.Option("--video", help="Film the run into the record.")] = False,
     sets: Sets = None,
     gui: Annotated[bool, typer.Option("--gui", help="Show PyBullet's window.")] = False,
@@ -81,27 +96,33 @@ def run(
     \b
     Examples:
       regrasp run short_obstacle --video
-      regrasp run tall_obstacle --seed 7 --set gravity=earth --out runs/tall-7
+      regrasp run tall_obstacle --seed 7 --case gravity=earth --out runs/tall-7
       regrasp run my/scenario.yaml --set obstacles.0.size=[0.08,0.12,0.3] --set cell.hidden.errors.arm_tool=0
+      regrasp run short_obstacle --all --set 'vary.seed="0:5"' --jobs 2 --junit short.xml
 
     \b
     Exit code: 0 all that the scenario expects came out, 1 something did not, 2 bad input, 130 Ctrl-C.
     """
+    overrides = [*(sets or []), *([] if seed is None else [f"seed={seed}"])]
     wrong: list[Finding] = [] if not gui or _display() else [_NO_DISPLAY]
+    if every:
+        wrong += [Finding(f"--{n}", 1, "is for a single case; leave --all out") for n in ("case", "gui") if locals()[n]]
+        raise typer.Exit(run_every(scenario, overrides, jobs or os.cpu_count() or 1, out, junit, video, quiet, wrong))
+    wrong += [Finding(f"--{n}", 1, "is for many cases; write --all, too") for n in ("jobs", "junit") if locals()[n]]
     if out is not None:
         wrong += output.findings(out)
     try:
-        loaded = load_scenario(scenario, sets or [])
+        loaded = load_scenario(scenario, overrides, case)
     except Findings as error:
         raise Findings([*wrong, *error.items]) from None
-    folder = out or output.free_folder(loaded.name, seed)
+    folder = out or output.free_folder(loaded.name, loaded.file.seed)
     wrong += [] if out else output.findings(folder)
     if wrong:
         raise Findings(wrong)
     from app.episode import run_episode  # brings the planner, the compiler and the physics: seconds
 
     with shown_progress(quiet) as progress:
-        result = run_episode(loaded, folder, seed=seed, video=video, gui=gui, progress=progress)
+        result = run_episode(loaded, folder, seed=loaded.file.seed, video=video, gui=gui, progress=progress)
     typer.echo(summary(result, folder))
     raise typer.Exit(exit_code(result))
 
@@ -125,9 +146,8 @@ def exit_code(result: "Result") -> int:
 def summary(result: "Result", folder: Path) -> str:
     """What came out, for a person."""
     met = sum(e.met for e in result.expectations)
-    lines = [
-        f"{result.scenario}, seed {result.seed}: {result.outcome}, {met} of {len(result.expectations)} expectations met"
-    ]
+    ran = result.scenario if result.case == DEFAULT else f"{result.scenario} {result.case}"
+    lines = [f"{ran}, seed {result.seed}: {result.outcome}, {met} of {len(result.expectations)} expectations met"]
     if result.cause:
         at = f" ({result.cause.node})" if result.cause.node else ""
         lines.append(f"  cause   {result.cause.code}: {result.cause.message}{at}")

@@ -15,9 +15,7 @@ class Finding:
     message: str
 
     def __str__(self) -> str:
-        text = f"{self.source}:{self.line}: {self.message}"
-        # What stands in a file must not steer the terminal.
-        return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
+        return printable(f"{self.source}:{self.line}: {self.message}")
 
 
 class Findings(Exception):  # noqa: N818 - it is the list of findings that travels
@@ -26,6 +24,11 @@ class Findings(Exception):  # noqa: N818 - it is the list of findings that trave
     def __init__(self, items: Iterable[Finding]) -> None:
         self.items = sorted(set(items))
         super().__init__("\n".join(str(f) for f in self.items))
+
+
+def printable(text: str) -> str:
+    """The text with all that could steer a terminal or break XML escaped: it may stem from a file."""
+    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
 
 
 def nearest(name: str, names: Iterable[str], what: str = "there are") -> str:

@@ -1,5 +1,6 @@
 """Whether a run came out as its scenario expects, by ground truth."""
 
+from collections.abc import Iterator
 from itertools import pairwise
 
 from app.record import Expectation, Slip
@@ -17,18 +18,22 @@ class Judge:
 
     def __init__(self, truth: GroundTruth, expect: Expect) -> None:
         self._truth, self._expect = truth, expect
+        self._now = 0.0
         self._was_held = False
         self._unheld_at: float | None = None  # since when not both pads touch it
         self._untouched_at: float | None = None  # since when none does
         self._still_since: float | None = None
+        self.takes = 0  # times that the hand took hold of it
         self.losses: list[float] = []
         self.settled_pixels: int | None = None  # of the connector in the rear image once it had settled after a loss
         self.found_by: str | None = None  # the camera that found the connector first after its loss
 
     def observe(self, now: float, belief: Belief) -> None:
         """Look at the truth after a tick at second `now`."""
+        self._now = now
         self.found_by = self.found_by or belief.found_by
         if self._truth.held():
+            self.takes += not self._was_held
             self._was_held, self._unheld_at, self._untouched_at, self._still_since = True, None, None, None
             return
         if self._was_held and not self._truth.stowed():
@@ -54,9 +59,10 @@ class Judge:
     def expectations(self, outcome: str, cause: str | None, belief: Belief) -> tuple[Expectation, ...]:
         """Every expectation of the scenario, met or not."""
         wanted = self._expect
-        stowed = self._truth.stowed()
-        ended = "stowed" if outcome == "stowed" and stowed else "lost" if outcome == "stowed" else outcome
+        ended = "lost" if outcome == "stowed" and not self._truth.stowed() else outcome
         found = [Expectation("outcome", ended == wanted.outcome, ended, wanted.outcome)]
+        if wanted.cause is not None:
+            found.append(Expectation("cause", cause == wanted.cause, cause, wanted.cause.value))
         if wanted.slips is not None:
             noticed = sum(slip.detected_at is not None for slip in self.slips(belief))
             met = noticed >= wanted.slips and noticed == len(self.losses)
@@ -64,16 +70,26 @@ class Judge:
         if wanted.hidden is not None:
             hidden = self.settled_pixels == 0 and self.found_by == "wrist"
             found.append(Expectation("hidden", hidden == wanted.hidden, hidden, wanted.hidden))
-        if wanted.unintended_force is not None:
-            peak = max(self._truth.contact_peaks().values(), default=0.0)
-            found.append(
-                Expectation(
-                    "unintended_force", peak <= wanted.unintended_force, round(peak, 2), wanted.unintended_force
-                )
-            )
-        if wanted.cause is not None:
-            found.append(Expectation("cause", cause == wanted.cause, cause, wanted.cause.value))
-        return tuple(found)
+        return (*found, *self._limits(belief))
+
+    def _limits(self, belief: Belief) -> Iterator[Expectation]:
+        """What must not be more than the scenario says."""
+        wanted = self._expect
+        yield from _at_most("sim_seconds", self._now, wanted.sim_seconds)
+        yield from _at_most("tries", self.takes, wanted.tries)
+        yield from _at_most("detection_delay", self._longest_delay(belief), wanted.detection_delay)
+        peak = max(self._truth.contact_peaks().values(), default=0.0)
+        yield from _at_most("unintended_force", peak, wanted.unintended_force)
+        if wanted.pose_error is not None:
+            position, angle_deg = self._truth.seat_error()
+            yield from _at_most("pose_error.position", position, wanted.pose_error.position)
+            yield from _at_most("pose_error.angle_deg", angle_deg, wanted.pose_error.angle_deg)
+
+    def _longest_delay(self, belief: Belief) -> float | None:
+        """Seconds from a loss to its notice, the longest; 0 without a loss, None when one went unseen."""
+        delays = [None if s.detected_at is None else s.detected_at - s.released_at for s in self.slips(belief)]
+        known = [delay for delay in delays if delay is not None]
+        return max(known, default=0.0) if len(known) == len(delays) else None
 
     def _watch_settling(self, now: float) -> None:
         if self._truth.connector_speed() > STILL_SPEED:
@@ -82,3 +98,8 @@ class Judge:
             self._still_since = now
         elif now - self._still_since >= STILL_SECONDS:
             self.settled_pixels = self._truth.connector_pixels("rear")
+
+
+def _at_most(name: str, value: float | None, limit: float | None) -> Iterator[Expectation]:
+    if limit is not None:
+        yield Expectation(name, value is not None and value <= limit, value and round(value, 4), limit)

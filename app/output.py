@@ -1,6 +1,8 @@
 """Where a run's record goes, and whether it can."""
 
+import hashlib
 import os
+import re
 import tempfile
 from itertools import count
 from pathlib import Path
@@ -8,9 +10,15 @@ from pathlib import Path
 from app.findings import Finding, shown
 
 
-def free_folder(scenario: str, seed: int) -> Path:
-    """The first of runs/SCENARIO-SEED-1, -2, ... that does not exist."""
-    return next(p for n in count(1) if not (p := Path("runs", f"{scenario}-{seed}-{n}")).exists())
+def free_folder(scenario: str, which: int | str) -> Path:
+    """The first of runs/SCENARIO-WHICH-1, -2, ... that does not exist; WHICH is a seed, or "all"."""
+    return next(p for n in count(1) if not (p := Path("runs", f"{scenario}-{which}-{n}")).exists())
+
+
+def folder_name(case: str) -> str:
+    """A case's name as that of a folder: what is no plain letter gives way to _ and a digest that keeps names apart."""
+    plain = re.sub(r"[^A-Za-z0-9_.,=+-]+", "_", case)[:100].strip(".") or "_"
+    return plain if plain == case else f"{plain}-{hashlib.sha256(case.encode()).hexdigest()[:8]}"
 
 
 def findings(out: Path) -> list[Finding]:
@@ -19,6 +27,11 @@ def findings(out: Path) -> list[Finding]:
         return [Finding(shown(out), 1, "already holds a run; name another folder")]
     if out == Path():
         return [Finding("--out", 1, "names this very folder; name one of its own for the run")]
+    return unwritable(out)
+
+
+def unwritable(out: Path) -> list[Finding]:
+    """Why no folder `out` can be made or written in; nothing is left behind by the look."""
     spot = out.absolute()
     while not os.path.lexists(spot) and spot != spot.parent:
         spot = spot.parent

@@ -1,17 +1,107 @@
 """`regrasp scenarios`: look at scenarios."""
 
-import typer
+import json
+from typing import Annotated
 
+import typer
+import yaml
+
+from app.findings import Finding, Findings, printable, shown
+from app.options import Sets
 from app.resources import shipped
-from app.scenario_file import description
+from app.scenario_file import case_names, cases, description, load_scenario
+from app.schema_doc import markdown
 
 app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Look at scenarios.")
+Name = Annotated[str, typer.Argument(help="A shipped scenario's name, or a path to a .yaml file.")]
 
 
 @app.command("list")
 def list_scenarios() -> None:
-    """Names and descriptions of the shipped scenarios."""
+    """Names, numbers of cases and descriptions of the shipped scenarios."""
     known = shipped("scenario")
     width = max(map(len, known), default=0)
     for name, path in known.items():
-        typer.echo(f"{name:<{width}}  {description(path)}")
+        typer.echo(f"{name:<{width}}  {_counted(len(case_names(name))):>9}  {description(path)}")
+
+
+def _counted(cases: int) -> str:
+    return f"{cases} case{'s' if cases != 1 else ''}"
+
+
+@app.command("check")
+def check(
+    files: Annotated[list[str] | None, typer.Argument(help="Names or paths; default all that are shipped.")] = None,
+    sets: Sets = None,
+) -> None:
+    """Check scenarios in every case, with their cells and trees, and tell all that is wrong.
+
+    \b
+    Examples:
+      regrasp scenarios check
+      regrasp scenarios check my/scenario.yaml --set vary.seed=[1,2,3]
+
+    \b
+    Exit code: 0 nothing is wrong, 2 findings, a line each on stderr.
+    """
+    found: list[Finding] = []
+    for name in files or shipped("scenario"):
+        try:
+            checked = cases(name, sets or [])
+            typer.echo(f"{shown(checked[0].path)}: {_counted(len(checked))}, nothing wrong")
+        except Findings as error:
+            found += error.items
+    if found:
+        raise Findings(found)
+
+
+@app.command("show")
+def show(
+    scenario: Name,
+    case: Annotated[
+        str | None, typer.Option(metavar="NAME", help="The case; default that of the first values.")
+    ] = None,
+    sets: Sets = None,
+) -> None:
+    """Print a scenario as a run takes it: one case's values, your changes and all defaults, as YAML.
+
+    Without --case the names of all cases come first, as comments.
+
+    \b
+    Examples:
+      regrasp scenarios show short_obstacle
+      regrasp scenarios show short_obstacle --case gravity=earth > my_scenario.yaml
+    """
+    loaded = load_scenario(scenario, sets or [], case)
+    names = case_names(scenario, sets or []) if case is None else [loaded.case]
+    typer.echo(f"# {printable(loaded.name)}: {'this case' if case else 'the first of these cases'}")
+    for name in names:
+        typer.echo(f"#   {printable(name)}")
+    content = loaded.file.model_dump(mode="json", exclude_none=True, exclude={"vary"})
+    typer.echo(
+        yaml.safe_dump(content, sort_keys=False, allow_unicode=True, default_flow_style=None, width=120).rstrip()
+    )
+
+
+@app.command("schema")
+def schema(
+    as_markdown: Annotated[
+        bool, typer.Option("--markdown", help="A reference to read: each field, its meaning and an example.")
+    ] = False,
+) -> None:
+    """Print what a scenario file may say: JSON Schema (draft 2020-12), for editors.
+
+    \b
+    With the YAML language server (VS Code, Neovim, Emacs) an editor completes and checks scenario files:
+      regrasp scenarios schema > scenario.schema.json
+    and as the first line of your scenario, with the path from it to that file:
+      # yaml-language-server: $schema=scenario.schema.json
+
+    \b
+    To read it yourself:
+      regrasp scenarios schema --markdown
+    """
+    from app.scenario_schema import json_schema
+
+    text = json_schema()
+    typer.echo(markdown(text) if as_markdown else json.dumps(text, indent=2, ensure_ascii=False))

@@ -118,12 +118,8 @@ class Expect(Model):
         Outcome,
         Field(description="The end: connector in the clip, or arms stopped after a failure.", examples=["safe_stop"]),
     ] = "stowed"
-    cause: Annotated[
-        CauseCode | None, Field(description="Why a safe stop came.", examples=["search_exhausted"])
-    ] = None
-    sim_seconds: Annotated[
-        NotNegative | None, Field(description="Simulated seconds at most.", examples=[120.0])
-    ] = None
+    cause: Annotated[CauseCode | None, Field(description="Why a safe stop came.", examples=["search_exhausted"])] = None
+    sim_seconds: Annotated[NotNegative | None, Field(description="Simulated seconds at most.", examples=[120.0])] = None
     tries: Annotated[
         int | None,
         Field(ge=1, le=100, description="How often the hand takes hold at most; unplugging is one.", examples=[2]),
@@ -177,8 +173,12 @@ class ScenarioFile(Model):
     ]
     inputs: Annotated[
         dict[str, TreeInput],
-        Field(description="Values in place of the defaults of the main tree's keys.", examples=[{"tries": 3}]),
-    ] = {}
+        Field(
+            default_factory=dict,
+            description="Values in place of the defaults of the main tree's keys.",
+            examples=[{"tries": 3}],
+        ),
+    ]
     gravity: Annotated[Gravity, Field(description="None, or Earth's.", examples=["zero"])]
     seed: Annotated[
         int, Field(ge=0, le=MOST_SEED, description="Draws every error, noise and jitter.", examples=[7])
@@ -194,9 +194,9 @@ class ScenarioFile(Model):
         LightSpec, Field(description="The light in place of the cell's.", examples=[{"brightness": 0.5}])
     ] = LightSpec()
     faults: Annotated[tuple[FaultSpec, ...], Field(description="What the world does to the robot.", examples=[[]])] = ()
-    limits: Annotated[
-        Limits, Field(description="What ends a run that does not end by itself.", examples=[{"sim_seconds": 120.0}])
-    ] = Limits()
+    limits: Annotated[Limits, Field(description="When a run is cut short.", examples=[{"sim_seconds": 120.0}])] = (
+        Limits()
+    )
     expect: Annotated[
         Expect,
         Field(
@@ -210,6 +210,7 @@ class ScenarioFile(Model):
     vary: Annotated[
         Vary,
         Field(
+            default_factory=dict,
             description=(
                 "Dotted keys of this file, or with cell. of the cell, each with a list of values, whole numbers 'A:B' "
                 "(B left out) or evenly spaced numbers. Every combination is a case; the first values make the default."
@@ -222,7 +223,7 @@ class ScenarioFile(Model):
                 }
             ],
         ),
-    ] = {}
+    ]
 
 
 def json_schema() -> dict[str, Any]:

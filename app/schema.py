@@ -72,7 +72,8 @@ def _split(value: Value, loc: Sequence[str | int]) -> tuple[Path, Path]:
 
 
 def _best_branches(value: Value, errors: list[ErrorDetails]) -> list[tuple[Path, ErrorDetails]]:
-    """Each error with its path in the file; of a union's branches only the one with the fewest errors."""
+    """Each error with its path in the file; of a union's branches only the one with the fewest errors, at a tie the one
+    that reads furthest."""
     unions: dict[Path, dict[str | int, list[tuple[Path, ErrorDetails]]]] = defaultdict(lambda: defaultdict(list))
     kept = []
     for error in errors:
@@ -82,7 +83,11 @@ def _best_branches(value: Value, errors: list[ErrorDetails]) -> list[tuple[Path,
             unions[spot][beside[0]].append((path, error))
         else:
             kept.append((path, error))
-    return kept + [e for branches in unions.values() for e in min(branches.values(), key=len)]
+    return kept + [e for branches in unions.values() for e in min(branches.values(), key=_badness)]
+
+
+def _badness(errors: list[tuple[Path, ErrorDetails]]) -> tuple[int, int]:
+    return len(errors), -max(len(error["loc"]) for _, error in errors)
 
 
 def _finding(document: Document, root: Schema, path: Path, error: ErrorDetails) -> Finding:
@@ -115,7 +120,7 @@ def _short(document: Document, path: Path) -> str:
 
 def _at(root: Schema, path: Path) -> list[Schema]:
     """The schema nodes that describe the value at `path`; several where the model has a union."""
-    nodes = _open(root, root)
+    nodes = alternatives(root, root)
     for step in path:
         below = []
         for node in nodes:
@@ -124,23 +129,23 @@ def _at(root: Schema, path: Path) -> list[Schema]:
                 below.append(items[step] if step < len(items) else node.get("items"))
             else:
                 below.append(node.get("properties", {}).get(step, node.get("additionalProperties")))
-        nodes = [opened for node in below if isinstance(node, dict) for opened in _open(root, node)]
+        nodes = [opened for node in below if isinstance(node, dict) for opened in alternatives(root, node)]
     return nodes
 
 
-def _open(root: Schema, node: Schema) -> list[Schema]:
+def alternatives(root: Schema, node: Schema) -> list[Schema]:
     """Follow references and unions to the nodes that say something."""
     if "$ref" in node:
-        return _open(root, root["$defs"][node["$ref"].rsplit("/", 1)[1]])
+        return alternatives(root, root["$defs"][node["$ref"].rsplit("/", 1)[1]])
     if "anyOf" in node:
-        return [opened for option in node["anyOf"] for opened in _open(root, option)]
+        return [opened for option in node["anyOf"] for opened in alternatives(root, option)]
     return [] if node.get("type") == "null" else [node]
 
 
 def _expected(root: Schema, path: Path) -> str:
     """What would be right at `path`, in words."""
     key = next((step for step in reversed(path) if isinstance(step, str)), "")
-    return " or ".join(dict.fromkeys(_words(node, key) for node in _at(root, path))) or "nothing"
+    return ", or ".join(dict.fromkeys(_words(node, key) for node in _at(root, path))) or "nothing"
 
 
 def _words(node: Schema, key: str) -> str:
@@ -151,7 +156,7 @@ def _words(node: Schema, key: str) -> str:
         items = node.get("prefixItems", [])
         what = _words(items[0], key) if items and "$ref" not in items[0] else ""
         many = f"{len(items)} values, each {what}" if what else "a list"
-        return f"{many} of at least {node['minItems']}" if not items and "minItems" in node else many
+        return f"{many} of at least {node['minItems']} value" if not items and "minItems" in node else many
     if kind == "object":
         keys = ", ".join(node.get("properties", {}))
         return f"a mapping of {keys}" if keys else "a mapping"
@@ -159,11 +164,12 @@ def _words(node: Schema, key: str) -> str:
         return f"text such as {node['examples'][0]!r}"
     if kind in ("number", "integer"):
         unit = f" in {_UNITS[key]}" if key in _UNITS else ""
-        return ("a whole number" if kind == "integer" else "a number") + unit + _range(node)
+        return ("a whole number" if kind == "integer" else "a number") + unit + range_words(node)
     return {"boolean": "true or false", "string": "text"}.get(str(kind), "another value")
 
 
-def _range(node: Schema) -> str:
+def range_words(node: Schema) -> str:
+    """A number's bounds, as " (at least 0, at most 3)"; '' where there are none."""
     bounds = {
         "above": node.get("exclusiveMinimum"),
         "at least": node.get("minimum"),
@@ -171,5 +177,5 @@ def _range(node: Schema) -> str:
         "at most": node.get("maximum"),
         "a multiple of": node.get("multipleOf"),
     }
-    words = [f"{name} {bound:g}" for name, bound in bounds.items() if bound is not None]
+    words = [f"{name} {bound:.10g}" for name, bound in bounds.items() if bound is not None]
     return f" ({', '.join(words)})" if words else ""

@@ -1,63 +1,21 @@
 """Studies: many runs, counted."""
 
-import contextlib
 import json
 import math
 import statistics
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, field
-from functools import partial
-from itertools import product
+from dataclasses import asdict
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
 
-from rich.console import Console
-from rich.table import Table
-
-from app.processes import Done, run_each
-from app.record import Result, plain, versions, write_whole
+from app.batch import Episode, Row, Run, run_all
+from app.output import folder_name
+from app.record import plain, versions, write_whole
+from app.scenario_file import Scenario, cases
+from app.table import print_table
 
 SCENARIOS = ("no_obstacle", "short_obstacle", "tall_obstacle")
-GRAVITIES: tuple[Literal["zero", "earth"], ...] = ("zero", "earth")
 _Z = 1.959964  # of the normal distribution, for 95 %
-
-
-class Case(NamedTuple):
-    """One run of a study."""
-
-    scenario: str
-    gravity: str
-    seed: int
-
-    @property
-    def group(self) -> str:
-        """Scenario and gravity."""
-        return f"{self.scenario} {self.gravity}"
-
-    def __str__(self) -> str:
-        return f"{self.group} seed {self.seed}"
-
-
-@dataclass(frozen=True)
-class Row:
-    """What a study keeps of a run. Seconds are simulated ones but for the factor, forces newtons; None: not known."""
-
-    scenario: str
-    gravity: str
-    seed: int
-    outcome: str
-    succeeded: bool
-    cause: dict[str, Any] | None
-    peak_memory_mb: float
-    slips: int = 0
-    detection_delays: list[float] = field(default_factory=list)
-    detected_by: list[str] = field(default_factory=list)
-    found_by: str | None = None
-    unintended_force: float | None = None
-    unmet: list[str] = field(default_factory=list)
-    sim_seconds: float = 0.0
-    real_time_factor: float = 0.0
 
 
 def run_demo(
@@ -65,10 +23,10 @@ def run_demo(
     jobs: int,
     out: Path | None,
     overrides: Sequence[str] = (),
-    load: Callable[[str, list[str]], Any] | None = None,
-    episode: Callable[..., Result] | None = None,
+    load: Callable[[str, Sequence[str]], list[Scenario]] = cases,
+    episode: Episode | None = None,
 ) -> int:
-    """The whole demonstration: three scenarios in two gravities, each with every seed, each run in its own process.
+    """The whole demonstration: every case of three scenarios with every seed, each run in its own process.
 
     Progress goes to stderr, a table to stdout; with `out`, runs go to out/runs/ and the figures to out/demo.json, which
     is whole after every run. Returns the exit code: 0 when all runs came to an end, however they went, 130 after
@@ -78,76 +36,23 @@ def run_demo(
         app.findings.Findings: a scenario with these overrides is wrong.
         OSError: `out` cannot be written.
     """
-    if load is None or episode is None:
-        from app.episode import run_episode  # late: they bring the physics
-        from app.scenario_file import load_scenario
-
-        load, episode = load or load_scenario, episode or run_episode
     if out is not None and (out / "demo.json").exists():
         print(f"{out} holds a study already (demo.json)", file=sys.stderr)
         return 2
-    cases = [Case(*key) for key in product(SCENARIOS, GRAVITIES, seeds)]
-    loaded = {f"{name} {g}": load(name, [*overrides, f"gravity={g}"]) for name, g in product(SCENARIOS, GRAVITIES)}
-    tasks = [partial(episode, loaded[c.group], _folder(out, c), seed=c.seed, video=False) for c in cases]
-    rows, code = _collect(cases, tasks, jobs, lambda rows: _write(out, rows, cases, overrides))
-    _write(out, rows, cases, overrides)
+    chosen = [case for name in SCENARIOS for case in load(name, overrides)]
+    runs = [Run(case, seed, _folder(out, case, seed)) for case in chosen for seed in seeds]
+    done, interrupted = run_all(runs, jobs, lambda rows: _write(out, rows, runs, overrides), episode=episode)
+    rows = list(done.values())
+    _write(out, rows, runs, overrides)
     print_table(_HEADER, table(rows))
-    return code
+    return 130 if interrupted else 0
 
 
-def _folder(out: Path | None, case: Case) -> Path | None:
-    return out and out / "runs" / f"{case.scenario}-{case.gravity}-{case.seed}"
+def _folder(out: Path | None, case: Scenario, seed: int) -> Path | None:
+    return out and out / "runs" / f"{case.name}-{folder_name(case.case)}-{seed}"
 
 
-def _collect(
-    cases: Sequence[Case], tasks: Sequence[Callable[[], Result]], jobs: int, keep: Callable[[list[Row]], None]
-) -> tuple[list[Row], int]:
-    """Run all; the rows in the order of the cases, and the exit code."""
-    rows: dict[int, Row] = {}
-    code = 0
-    try:
-        with contextlib.closing(run_each(tasks, jobs)) as ended:
-            for done in ended:
-                case = cases[done.number]
-                row = rows[done.number] = row_of(case, done)
-                keep([rows[i] for i in sorted(rows)])
-                print(f"[{len(rows)}/{len(cases)}] {case}: {_summary(row)}", file=sys.stderr, flush=True)
-    except KeyboardInterrupt:
-        print(f"interrupted; {len(rows)} of {len(cases)} runs were done", file=sys.stderr)
-        code = 130
-    return [rows[i] for i in sorted(rows)], code
-
-
-def _summary(row: Row) -> str:
-    verdict = row.outcome if row.succeeded else f"{row.outcome}, not as expected"
-    return f"{verdict}, {row.sim_seconds:.1f} s simulated, {row.real_time_factor:.2f} x real time"
-
-
-def row_of(case: Case, done: Done[Result]) -> Row:
-    """A run's row; one whose process died counts as an internal error."""
-    result = done.value
-    if result is None:
-        cause = {"code": "internal_error", "message": done.error, "node": ""}
-        return Row(*case, "internal_error", succeeded=False, cause=cause, peak_memory_mb=done.peak_memory_mb)
-    values = {e.name: e.value for e in result.expectations}
-    return Row(
-        *case,
-        outcome=result.outcome,
-        succeeded=result.succeeded,
-        cause=asdict(result.cause) if result.cause else None,
-        slips=len(result.slips),
-        detection_delays=[s.detected_at - s.released_at for s in result.slips if s.detected_at is not None],
-        detected_by=[s.detected_by for s in result.slips if s.detected_by],
-        found_by=values.get("found_by"),
-        unintended_force=values.get("unintended_force"),
-        unmet=[e.name for e in result.expectations if not e.met],
-        sim_seconds=result.sim_seconds,
-        real_time_factor=result.real_time_factor,
-        peak_memory_mb=round(done.peak_memory_mb, 1),
-    )
-
-
-def _write(out: Path | None, rows: list[Row], cases: Sequence[Case], overrides: Sequence[str]) -> None:
+def _write(out: Path | None, rows: list[Row], runs: Sequence[Run], overrides: Sequence[str]) -> None:
     if out is None:
         return
     out.mkdir(parents=True, exist_ok=True)
@@ -155,8 +60,8 @@ def _write(out: Path | None, rows: list[Row], cases: Sequence[Case], overrides: 
         "schema": 1,
         "runs": len(rows),
         "succeeded": sum(row.succeeded for row in rows),
-        "planned": len(cases),
-        "seeds": sorted({case.seed for case in cases}),
+        "planned": len(runs),
+        "seeds": sorted({run.seed for run in runs}),
         "overrides": list(overrides),
         "versions": versions(),
         "rows": [asdict(row) for row in rows],
@@ -181,7 +86,7 @@ def table(rows: Sequence[Row]) -> list[tuple[str, ...]]:
     """The lines below the header: one a case that has runs, in their order, and one over all."""
     groups: dict[str, list[Row]] = {}
     for row in rows:
-        groups.setdefault(f"{row.scenario} {row.gravity}", []).append(row)
+        groups.setdefault(f"{row.scenario} {row.case}", []).append(row)
     return [_line(name, group) for name, group in groups.items()] + [_line("all", rows)]
 
 
@@ -197,19 +102,3 @@ def _line(name: str, rows: Sequence[Row]) -> tuple[str, ...]:
         f"{statistics.median(row.real_time_factor for row in rows):.2f}" if rows else "-",
         f"{max(forces):.2f}" if forces else "-",
     )
-
-
-def print_table(header: Sequence[str], lines: Sequence[Sequence[str]]) -> None:
-    """A table on stdout: drawn on a terminal, plain aligned columns in a pipe; the first column to the left."""
-    if sys.stdout.isatty():
-        drawn = Table(*header)
-        for column in drawn.columns[1:]:
-            column.justify = "right"
-        for line in lines:
-            drawn.add_row(*line)
-        Console().print(drawn)
-        return
-    widths = [max(len(line[i]) for line in (header, *lines)) for i in range(len(header))]
-    for line in (header, *lines):
-        cells = [cell.rjust(width) for cell, width in zip(line[1:], widths[1:], strict=True)]
-        print("  ".join([line[0].ljust(widths[0]), *cells]))

@@ -30,9 +30,6 @@ def demo(
     wrong = output.findings(out) if out else []
     if out and (out / "demo.json").exists():
         wrong.append(Finding(shown(out), 1, "already holds a study; name another folder"))
-    for number, text in enumerate(sets or [], 1):
-        if text.partition("=")[0].strip() == "gravity":
-            wrong.append(Finding("--set", number, "a study runs both gravities; leave gravity out"))
     if wrong:
         raise Findings(wrong)
     from app.study import run_demo

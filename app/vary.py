@@ -74,7 +74,8 @@ def _values(written: Sequence[Value] | str | Steps) -> Sequence[Value]:
     if isinstance(written, str):
         return range(*map(int, written.split(":")))
     if isinstance(written, Steps):
-        return [float(f"{v:.12g}") for v in np.linspace(written.first, written.last, written.steps)]
+        numbers = [float(f"{v:.12g}") for v in np.linspace(written.first, written.last, written.steps)]
+        return [int(v) for v in numbers] if all(v.is_integer() for v in numbers) else numbers
     return written
 
 

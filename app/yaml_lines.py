@@ -110,7 +110,9 @@ class _Builder:
         """Count what is built; only aliases, of themselves or of one another, go past the limits."""
         self.count += values
         if depth > MAX_DEPTH or self.count > MAX_VALUES:
-            self.wrong(node, f"aliases expand to more than {MAX_VALUES} values or {MAX_DEPTH} levels; write out what is meant")
+            self.wrong(
+                node, f"aliases expand to more than {MAX_VALUES} values or {MAX_DEPTH} levels; write out what is meant"
+            )
             raise Findings(self.findings)
 
     def build(self, node: yaml.Node, path: Path, depth: int, at: yaml.Node | None = None) -> Value:

@@ -38,6 +38,12 @@ class GroundTruth:
         """Whether the connector sits in the clip."""
         return self._world.clip.holds
 
+    def seat_error(self) -> tuple[float, float]:
+        """How far the connector is from its seat in the clip: m between the centres, degrees between the axes."""
+        error = self._world.cell.known.clip.world_from_seat.inv() * self._world.connector_pose()
+        cosine = error.rotation.as_matrix()[0, 0]
+        return float(np.linalg.norm(error.translation)), float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
+
     def connector_pixels(self, camera: str) -> int:
         """Pixels of the connector in a camera's newest frame."""
         ids = self._world.cameras[camera].true_ids()

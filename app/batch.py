@@ -1,0 +1,123 @@
+"""Many runs, each in a process of its own, and the row that each leaves."""
+
+import contextlib
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from app.processes import Done, run_each
+from app.record import Result
+from app.scenario_file import Scenario
+
+Episode = Callable[..., Result]
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run to do: a scenario's case with a seed, and the folder of its record."""
+
+    scenario: Scenario
+    seed: int
+    folder: Path | None = None
+
+    def __str__(self) -> str:
+        seed = "" if "seed=" in self.scenario.case else f" seed {self.seed}"
+        return f"{self.scenario.title}{seed}"
+
+
+@dataclass(frozen=True)
+class Row:
+    """What is kept of a run. Seconds are simulated ones unless said otherwise, forces newtons; None: not known."""
+
+    scenario: str
+    case: str
+    gravity: str
+    seed: int
+    outcome: str
+    succeeded: bool
+    cause: dict[str, Any] | None
+    peak_memory_mb: float
+    slips: int = 0
+    detection_delays: list[float] = field(default_factory=list)
+    detected_by: list[str] = field(default_factory=list)
+    unintended_force: float | None = None
+    unmet: list[str] = field(default_factory=list)
+    why: str = ""  # the cause and the unmet expectations in words; '' for a run that came out as expected
+    sim_seconds: float = 0.0
+    wall_seconds: float = 0.0  # on the clock on the wall
+    real_time_factor: float = 0.0
+
+
+def run_all(
+    runs: Sequence[Run],
+    jobs: int,
+    keep: Callable[[list[Row]], None] = lambda rows: None,
+    *,
+    video: bool = False,
+    quiet: bool = False,
+    episode: Episode | None = None,
+) -> tuple[dict[int, Row], bool]:
+    """Do all, `jobs` at a time; the rows by the runs' numbers, and whether Ctrl-C cut it short.
+
+    After each run a line goes to stderr, unless `quiet`, and `keep` gets the rows so far. A run whose process died
+    counts as an internal error. `episode` stands in for `run_episode` in tests.
+    """
+    if episode is None:
+        from app.episode import run_episode  # late: it brings the physics
+
+        episode = run_episode
+    tasks = [partial(episode, run.scenario, run.folder, seed=run.seed, video=video) for run in runs]
+    rows: dict[int, Row] = {}
+    try:
+        with contextlib.closing(run_each(tasks, jobs)) as ended:
+            for done in ended:
+                row = rows[done.number] = row_of(runs[done.number], done)
+                keep([rows[i] for i in sorted(rows)])
+                if not quiet:
+                    told = f"[{len(rows)}/{len(runs)}] {runs[done.number]}: {_summary(row)}"
+                    print(told, file=sys.stderr, flush=True)
+    except KeyboardInterrupt:
+        print(f"interrupted; {len(rows)} of {len(runs)} runs were done", file=sys.stderr)
+        return dict(sorted(rows.items())), True
+    return dict(sorted(rows.items())), False
+
+
+def _summary(row: Row) -> str:
+    verdict = row.outcome if row.succeeded else f"{row.outcome}, not as expected"
+    return f"{verdict}, {row.sim_seconds:.1f} s simulated, {row.real_time_factor:.2f} x real time"
+
+
+def row_of(run: Run, done: Done[Result]) -> Row:
+    """A run's row."""
+    what = (run.scenario.name, run.scenario.case, run.scenario.file.gravity, run.seed)
+    result = done.value
+    if result is None:
+        cause = {"code": "internal_error", "message": done.error, "node": ""}
+        why = f"internal_error: {done.error}"
+        return Row(*what, "internal_error", succeeded=False, cause=cause, why=why, peak_memory_mb=done.peak_memory_mb)
+    values = {e.name: e.value for e in result.expectations}
+    return Row(
+        *what,
+        outcome=result.outcome,
+        succeeded=result.succeeded,
+        cause=asdict(result.cause) if result.cause else None,
+        slips=len(result.slips),
+        detection_delays=[s.detected_at - s.released_at for s in result.slips if s.detected_at is not None],
+        detected_by=[s.detected_by for s in result.slips if s.detected_by],
+        unintended_force=values.get("unintended_force"),
+        unmet=[e.name for e in result.expectations if not e.met],
+        why="" if result.succeeded else failure(result),
+        sim_seconds=result.sim_seconds,
+        wall_seconds=result.wall_seconds,
+        real_time_factor=result.real_time_factor,
+        peak_memory_mb=round(done.peak_memory_mb, 1),
+    )
+
+
+def failure(result: Result) -> str:
+    """Why a run did not come out as expected, in words: its cause and every unmet expectation."""
+    cause = [f"{result.cause.code}: {result.cause.message}"] if result.cause else []
+    return "; ".join([*cause, *(f"{e.name} is {e.value}, asked {e.limit}" for e in result.expectations if not e.met)])

@@ -1,0 +1,48 @@
+"""JUnit XML of the runs of a scenario's cases, as build servers read it."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+from app.batch import Row, Run
+from app.findings import printable
+from app.record import write_whole
+
+
+def write_junit(path: Path, name: str, runs: Sequence[Run], rows: Mapping[int, Row]) -> None:
+    """One testcase a run: time on the wall, the cause and the unmet expectations of a failure, the record's folder.
+
+    `rows` by the runs' numbers; a run without one was interrupted and counts as skipped.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    errors = sum(row.outcome == "internal_error" for row in rows.values())
+    counts = {
+        "tests": len(runs),
+        "failures": sum(not row.succeeded for row in rows.values()) - errors,
+        "errors": errors,
+        "skipped": len(runs) - len(rows),
+        "time": f"{sum(row.wall_seconds for row in rows.values()):.3f}",
+    }
+    told = {key: str(value) for key, value in counts.items()}
+    suites = ET.Element("testsuites", {"name": "regrasp", **told})
+    suite = ET.SubElement(suites, "testsuite", {"name": printable(name), **told})
+    for number, run in enumerate(runs):
+        _testcase(suite, run, rows.get(number))
+    ET.indent(suites)
+    text = ET.tostring(suites, encoding="unicode")
+    write_whole(path, f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n')
+
+
+def _testcase(suite: ET.Element, run: Run, row: Row | None) -> None:
+    about = {"classname": printable(run.scenario.name), "name": printable(run.scenario.case)}
+    case = ET.SubElement(suite, "testcase", {**about, "time": f"{row.wall_seconds if row else 0.0:.3f}"})
+    if row is None:
+        ET.SubElement(case, "skipped", {"message": "interrupted before its end"})
+    elif not row.succeeded:
+        tag = "error" if row.outcome == "internal_error" else "failure"
+        code = row.cause["code"] if row.cause else row.outcome
+        ET.SubElement(case, tag, {"type": str(code), "message": printable(row.why)}).text = printable(row.why)
+    if run.folder is not None:
+        ET.SubElement(case, "system-out").text = printable(str(run.folder))
