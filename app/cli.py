@@ -106,9 +106,9 @@ def run(
     overrides = [*(sets or []), *([] if seed is None else [f"seed={seed}"])]
     wrong: list[Finding] = [] if not gui or _display() else [_NO_DISPLAY]
     if every:
-        wrong += [Finding(f"--{n}", 1, "is for a single case; leave --all out") for n in ("case", "gui") if locals()[n]]
+        wrong += _given("is for a single case; leave --all out", case=case, gui=gui)
         raise typer.Exit(run_every(scenario, overrides, jobs or os.cpu_count() or 1, out, junit, video, quiet, wrong))
-    wrong += [Finding(f"--{n}", 1, "is for many cases; write --all, too") for n in ("jobs", "junit") if locals()[n]]
+    wrong += _given("is for many cases; write --all, too", jobs=jobs, junit=junit)
     if out is not None:
         wrong += output.findings(out)
     try:
@@ -125,6 +125,11 @@ def run(
         result = run_episode(loaded, folder, seed=loaded.file.seed, video=video, gui=gui, progress=progress)
     typer.echo(summary(result, folder))
     raise typer.Exit(exit_code(result))
+
+
+def _given(message: str, **options: object) -> list[Finding]:
+    """A finding for each of these options that is given."""
+    return [Finding(f"--{name}", 1, message) for name, value in options.items() if value]
 
 
 _NO_DISPLAY = Finding(

@@ -57,7 +57,7 @@ def run_episode(
     events.jsonl.
     """
     began = time.perf_counter()
-    with Record(out, scenario.name, seed) as record:
+    with Record(out, scenario.name, seed, scenario.case) as record:
         world = _world(scenario, seed, renderer, gui)
         try:
             log = record.logger(world.now)

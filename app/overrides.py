@@ -60,6 +60,8 @@ def _apply_one(document: Document, assignment: Assignment) -> None:
     for old in [p for p in document.places if p[: len(path)] == path]:
         del document.places[old]
     document.unread -= {p for p in document.unread if p[: len(path)] == path}
+    for length in range(1, len(path)):
+        document.places.setdefault(path[:length], assignment.place)  # a mapping made on the way
     document.places.update({path + below: place for below, place in assignment.new.places.items()})
 
 

@@ -123,7 +123,7 @@ class Record:
     to `finish`, or, where the run did not come so far, one that tells of the interrupt or the error.
     """
 
-    def __init__(self, folder: Path | None, scenario: str, seed: int) -> None:
+    def __init__(self, folder: Path | None, scenario: str, seed: int, case: str = "default") -> None:
         """Create the folder.
 
         Raises:
@@ -134,6 +134,7 @@ class Record:
         self.result: Result | None = None
         self._scenario = scenario
         self._seed = seed
+        self._case = case
         self.events: TextIO = io.StringIO()
         self.ticks: TextIO = io.StringIO()
         if folder is not None:
@@ -178,7 +179,7 @@ class Record:
     def _cut_short(self, error: BaseException | None) -> Result:
         if isinstance(error, KeyboardInterrupt):
             cause = Cause(CauseCode.INTERRUPTED, "stopped from outside before the run could end")
-            return Result(self._scenario, self._seed, "interrupted", succeeded=False, cause=cause)
+            return Result(self._scenario, self._seed, "interrupted", succeeded=False, case=self._case, cause=cause)
         message = f"{type(error).__name__}: {error}" if error else "the run ended without a result"
         cause = Cause(CauseCode.INTERNAL_ERROR, message)
-        return Result(self._scenario, self._seed, "internal_error", succeeded=False, cause=cause)
+        return Result(self._scenario, self._seed, "internal_error", succeeded=False, case=self._case, cause=cause)

@@ -174,11 +174,10 @@ class ScenarioFile(Model):
     inputs: Annotated[
         dict[str, TreeInput],
         Field(
-            default_factory=dict,
             description="Values in place of the defaults of the main tree's keys.",
             examples=[{"tries": 3}],
         ),
-    ]
+    ] = Field(default_factory=dict)
     gravity: Annotated[Gravity, Field(description="None, or Earth's.", examples=["zero"])]
     seed: Annotated[
         int, Field(ge=0, le=MOST_SEED, description="Draws every error, noise and jitter.", examples=[7])
@@ -210,7 +209,6 @@ class ScenarioFile(Model):
     vary: Annotated[
         Vary,
         Field(
-            default_factory=dict,
             description=(
                 "Dotted keys of this file, or with cell. of the cell, each with a list of values, whole numbers 'A:B' "
                 "(B left out) or evenly spaced numbers. Every combination is a case; the first values make the default."
@@ -223,7 +221,7 @@ class ScenarioFile(Model):
                 }
             ],
         ),
-    ]
+    ] = Field(default_factory=dict)
 
 
 def json_schema() -> dict[str, Any]:

@@ -86,8 +86,10 @@ def _best_branches(value: Value, errors: list[ErrorDetails]) -> list[tuple[Path,
     return kept + [e for branches in unions.values() for e in min(branches.values(), key=_badness)]
 
 
-def _badness(errors: list[tuple[Path, ErrorDetails]]) -> tuple[int, int]:
-    return len(errors), -max(len(error["loc"]) for _, error in errors)
+def _badness(errors: list[tuple[Path, ErrorDetails]]) -> tuple[int, int, bool]:
+    """Lower for the branch that was meant; an error of our own validators comes only after the type was right."""
+    kinds = {error["type"] for _, error in errors}
+    return len(errors), -max(len(error["loc"]) for _, error in errors), "value_error" not in kinds
 
 
 def _finding(document: Document, root: Schema, path: Path, error: ErrorDetails) -> Finding:

@@ -4,7 +4,7 @@ import json
 import math
 import statistics
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
@@ -23,14 +23,13 @@ def run_demo(
     jobs: int,
     out: Path | None,
     overrides: Sequence[str] = (),
-    load: Callable[[str, Sequence[str]], list[Scenario]] = cases,
     episode: Episode | None = None,
 ) -> int:
     """The whole demonstration: every case of three scenarios with every seed, each run in its own process.
 
     Progress goes to stderr, a table to stdout; with `out`, runs go to out/runs/ and the figures to out/demo.json, which
     is whole after every run. Returns the exit code: 0 when all runs came to an end, however they went, 130 after
-    Ctrl-C, 2 when `out` holds a study. `load` and `episode` stand in for the real ones in tests.
+    Ctrl-C, 2 when `out` holds a study. `episode` stands in for `run_episode` in tests.
 
     Raises:
         app.findings.Findings: a scenario with these overrides is wrong.
@@ -39,7 +38,7 @@ def run_demo(
     if out is not None and (out / "demo.json").exists():
         print(f"{out} holds a study already (demo.json)", file=sys.stderr)
         return 2
-    chosen = [case for name in SCENARIOS for case in load(name, overrides)]
+    chosen = [case for name in SCENARIOS for case in cases(name, overrides)]
     runs = [Run(case, seed, _folder(out, case, seed)) for case in chosen for seed in seeds]
     done, interrupted = run_all(runs, jobs, lambda rows: _write(out, rows, runs, overrides), episode=episode)
     rows = list(done.values())

@@ -66,7 +66,7 @@ def use_episode(monkeypatch: pytest.MonkeyPatch, episode: Episode) -> None:
 
 
 def test_run_ends_with_a_summary_on_stdout_and_progress_on_stderr(calls: list[SimpleNamespace]) -> None:
-    ran = invoke("run", "mine.yaml", "--seed", "7", "--video", "--set", "limits.tries=2")
+    ran = invoke("run", "mine.yaml", "--seed", "7", "--video", "--set", "inputs.tries=2")
     assert ran.exit_code == 0
     assert ran.stdout.splitlines() == [
         "mine, seed 7: stowed, 2 of 2 expectations met",
@@ -79,7 +79,7 @@ def test_run_ends_with_a_summary_on_stdout_and_progress_on_stderr(calls: list[Si
     assert ran.stderr.splitlines() == ["    0.0 s  carry", "    3.0 s  look"]
     (call,) = calls
     assert (call.out, call.seed, call.video, call.gui) == (Path("runs/mine-7-1"), 7, True, False)
-    assert call.scenario.file.limits.tries == 2
+    assert call.scenario.file.inputs == {"tries": 2}
 
 
 def test_quiet_shows_the_summary_alone(calls: list[SimpleNamespace]) -> None:
@@ -177,9 +177,9 @@ def test_study_demo_hands_on_seeds_jobs_and_overrides(monkeypatch: pytest.Monkey
         return 130
 
     monkeypatch.setattr("app.study.run_demo", run_demo)
-    ran = invoke("study", "demo", "--seeds", "2:5", "--jobs", "3", "--out", "study", "--set", "limits.tries=1")
+    ran = invoke("study", "demo", "--seeds", "2:5", "--jobs", "3", "--out", "study", "--set", "inputs.tries=1")
     assert ran.exit_code == 130
-    assert asked == [range(2, 5), 3, Path("study"), ["limits.tries=1"]]
+    assert asked == [range(2, 5), 3, Path("study"), ["inputs.tries=1"]]
 
 
 @pytest.mark.parametrize("text", ["5", "5:", ":5", "5:5", "6:5", "a:b", "-1:3", "1:2:3", ""])

@@ -4,7 +4,7 @@ from typing import Any, cast
 import pytest
 
 from app.judge import STILL_SECONDS, Judge
-from app.scenario_schema import Expect
+from app.scenario_schema import Expect, PoseError
 from behaviors.services import Belief, Notice
 from interfaces.cause import CauseCode
 from sim.ground_truth import GroundTruth
@@ -21,6 +21,7 @@ class Truth:
     speed: float = 0.0
     pixels: int = 0
     peaks: dict[str, float] = field(default_factory=dict)
+    seat: tuple[float, float] = (0.002, 1.5)  # m and degrees from the clip's
 
     def held(self) -> bool:
         return self.fingers == 2
@@ -36,6 +37,9 @@ class Truth:
 
     def connector_pixels(self, camera: str) -> int:
         return self.pixels if camera == "rear" else 10_000
+
+    def seat_error(self) -> tuple[float, float]:
+        return self.seat
 
     def contact_peaks(self) -> dict[str, float]:
         return self.peaks
@@ -185,3 +189,44 @@ def test_the_largest_unintended_force_counts(peaks: dict[str, float], met: bool)
 
 def test_what_is_not_expected_is_not_judged() -> None:
     assert [e.name for e in Run().judge.expectations("stowed", None, Belief())] == ["outcome"]
+
+
+def test_the_last_second_counts_against_a_time_limit() -> None:
+    run = Run(Expect(sim_seconds=2.0))
+    run.go(2.0)
+    assert run.verdict("sim_seconds") == (True, pytest.approx(1.95))
+    run.go(0.2)
+    assert run.verdict("sim_seconds") == (False, pytest.approx(2.15))
+
+
+def test_each_hold_after_a_real_loss_is_a_try() -> None:
+    run = Run(Expect(tries=2))
+    run.go(1.0, fingers=2)
+    run.go(0.1, fingers=0)  # regripped
+    run.go(1.0, fingers=2)
+    assert run.verdict("tries") == (True, 1)
+    for tries in (2, 3):
+        run.go(1.0, fingers=0)
+        run.go(1.0, fingers=2)
+        assert run.verdict("tries") == (tries <= 2, tries)
+
+
+def test_the_longest_delay_counts_and_an_unseen_loss_is_too_late() -> None:
+    run = Run(Expect(detection_delay=0.5))
+    assert run.verdict("detection_delay") == (True, 0.0)
+    for delay, met in ((0.3, True), (0.45, True), (0.6, False)):
+        run.go(1.0, fingers=2)
+        lost = run.go(1.0, fingers=0)
+        assert run.verdict("detection_delay") == (False, None)
+        run.belief.notices.append(Notice(lost + delay, "gap"))
+        assert run.verdict("detection_delay") == (met, pytest.approx(delay))
+
+
+def test_the_end_s_place_and_axis_in_the_clip_are_judged_apart() -> None:
+    run = Run(Expect(pose_error=PoseError(position=0.002, angle_deg=1.0)))
+    assert run.verdict("pose_error.position") == (True, 0.002)
+    assert run.verdict("pose_error.angle_deg") == (False, 1.5)
+    names = [
+        e.name for e in Run(Expect(pose_error=PoseError(angle_deg=2.0))).judge.expectations("stowed", None, Belief())
+    ]
+    assert names == ["outcome", "pose_error.angle_deg"]

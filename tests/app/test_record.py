@@ -8,7 +8,7 @@ from app.record import Expectation, Record, Result, Slip
 from interfaces.cause import Cause, CauseCode
 
 FIELDS = [
-    *("schema", "scenario", "seed", "outcome", "succeeded", "cause", "expectations", "slips"),
+    *("schema", "scenario", "seed", "outcome", "succeeded", "case", "cause", "expectations", "slips"),
     *("sim_seconds", "wall_seconds", "real_time_factor", "renderer", "versions"),
 ]
 

@@ -9,7 +9,7 @@ from toy_scenario import write_scenario
 
 from app.findings import Finding, Findings
 from app.resources import shipped
-from app.scenario_file import load_cell, load_scenario
+from app.scenario_file import load_cell, load_scenario, tree_text
 from interfaces.cause import CauseCode
 
 ARMS = 1 + shipped("cell")["thesis"].read_text().splitlines().index("  arms:")  # the line of that key
@@ -55,7 +55,7 @@ def test_what_is_left_out_has_its_default(scenario: Path) -> None:
     scenario.write_text("description: bare\ncell: thesis\ntree: tree.xml\ngravity: earth\n")
     file = load_scenario("mine.yaml").file
     assert (file.obstacles, file.faults, file.expect.outcome, file.expect.slips) == ((), (), "stowed", None)
-    assert (file.limits.sim_seconds, file.limits.tries) == (600.0, 5)
+    assert (file.limits.sim_seconds, file.inputs, file.seed) == (600.0, {}, 0)
 
 
 def test_overrides_change_scenario_and_cell(scenario: Path) -> None:
@@ -65,7 +65,7 @@ def test_overrides_change_scenario_and_cell(scenario: Path) -> None:
         [
             "gravity=earth",
             "obstacles.0.size=[0.1, 0.1, 0.1]",
-            "limits.tries=2",
+            "inputs.tries=2",
             "expect={outcome: safe_stop, cause: search_exhausted}",
             "cell.hidden.errors.arm_tool=0",
             "cell.known.sockets.0.depth=0.02",
@@ -73,7 +73,7 @@ def test_overrides_change_scenario_and_cell(scenario: Path) -> None:
     )
     assert loaded.file.gravity == "earth"
     assert loaded.file.obstacles[0].size == (0.1, 0.1, 0.1)
-    assert loaded.file.limits.tries == 2
+    assert loaded.inputs == {"tries": "2"}
     assert loaded.file.expect.cause is CauseCode.SEARCH_EXHAUSTED
     assert loaded.cell.hidden.errors.arm_tool == 0
     # Socket 0 is the anchor that the others are aliases of: an override holds for the one item that it names.
@@ -83,7 +83,7 @@ def test_overrides_change_scenario_and_cell(scenario: Path) -> None:
 
 def test_an_override_makes_the_mappings_on_its_way(scenario: Path) -> None:
     scenario.write_text("description: bare\ncell: thesis\ntree: tree.xml\ngravity: earth\n")
-    assert load_scenario("mine.yaml", ["limits.tries=2"]).file.limits.tries == 2
+    assert load_scenario("mine.yaml", ["limits.sim_seconds=2"]).file.limits.sim_seconds == 2
 
 
 @pytest.mark.parametrize("name", shipped("cell"))
@@ -98,29 +98,33 @@ def test_shipped_cells_are_right(name: str) -> None:
         ("gravity: zero", "", "mine.yaml:1: key 'gravity' is missing; expected one of zero, earth"),
         ("gravity: zero", "gravity: eart", "mine.yaml:4: gravity: no 'eart'; did you mean 'earth'?"),
         ("gravity: zero", "gravity: 0", "mine.yaml:4: gravity is 0; expected one of zero, earth"),
-        ("0.12, 0.18", "30 cm, 0.18", "mine.yaml:7: obstacles.0.size.1 is '30 cm'; " + METRES),
-        ("0.12, 0.18", "true, 0.18", "mine.yaml:7: obstacles.0.size.1 is True; expected a number in metres"),
-        ("0.12, 0.18", "'0.12', 0.18", "mine.yaml:7: obstacles.0.size.1 is '0.12'; expected a number in metres"),
-        ("0.12, 0.18", "0, 0.18", "mine.yaml:7: obstacles.0.size.1 is 0; " + METRES + " (above 0, at most 3)"),
-        ("0.12, 0.18]", "0.12]", "mine.yaml:7: obstacles.0.size is [0.08, 0.12]; expected 3 values, each"),
-        ("0.12, 0.18]", "0.12, 0.18, 1]", "mine.yaml:7: obstacles.0.size is [0.08, 0.12, 0.18, 1]; expected 3 values"),
-        ("tries: 4", "tries: 1.5", "mine.yaml:14: limits.tries is 1.5; expected a whole number (at least 1"),
-        ("tries: 4", "tries:", "mine.yaml:14: limits.tries is empty; expected a whole number"),
-        ("hidden: true", "hidden: yep", "mine.yaml:18: expect.hidden is 'yep'; expected true or false"),
-        ("slips: 1", "cause: slipped", "mine.yaml:15: expect: a run that ends stowed has no cause; write"),
-        ("[0.3, 0.8]", "[0.8, 0.3]", "mine.yaml:13: faults.0: carried runs backwards; put the smaller share first"),
-        ("jaw_opens", "jaw_open", "mine.yaml:13: faults.0.type: no 'jaw_open'; did you mean 'jaw_opens'?"),
+        ("0.12, 0.18", "30 cm, 0.18", "mine.yaml:8: obstacles.0.size.1 is '30 cm'; " + METRES),
+        ("0.12, 0.18", "true, 0.18", "mine.yaml:8: obstacles.0.size.1 is True; expected a number in metres"),
+        ("0.12, 0.18", "'0.12', 0.18", "mine.yaml:8: obstacles.0.size.1 is '0.12'; expected a number in metres"),
+        ("0.12, 0.18", "0, 0.18", "mine.yaml:8: obstacles.0.size.1 is 0; " + METRES + " (above 0, at most 3)"),
+        ("0.12, 0.18]", "0.12]", "mine.yaml:8: obstacles.0.size is [0.08, 0.12]; expected 3 values, each"),
+        ("0.12, 0.18]", "0.12, 0.18, 1]", "mine.yaml:8: obstacles.0.size is [0.08, 0.12, 0.18, 1]; expected 3 values"),
+        ("slips: 1", "slips: 1.5", "mine.yaml:18: expect.slips is 1.5; expected a whole number (at least 0"),
+        ("sim_seconds: 600", "sim_seconds:", "mine.yaml:15: limits.sim_seconds is empty; expected a number in seconds"),
+        ("tries: 4", "trys: 4", "mine.yaml:5: inputs.trys: unknown input 'trys'; did you mean tries?"),
+        ("tries: 4", "tries: many", "mine.yaml:5: inputs.tries: Retry 'again': num_failures={tries} is 'many' here"),
+        ("tries: 4", "tries: '{x}'", "mine.yaml:5: inputs.tries is '{x}'; expected"),
+        ("hidden: true", "hidden: yep", "mine.yaml:19: expect.hidden is 'yep'; expected true or false"),
+        ("slips: 1", "cause: slipped", "mine.yaml:16: expect: a run that ends stowed has no cause; write"),
+        ("[0.3, 0.8]", "[0.8, 0.3]", "mine.yaml:14: faults.0: carried runs backwards; put the smaller share first"),
+        ("jaw_opens", "jaw_open", "mine.yaml:14: faults.0.type: no 'jaw_open'; did you mean 'jaw_opens'?"),
         ("cell: thesis", "cell: thesi", "mine.yaml:2: no cell named 'thesi'; did you mean 'thesis'?"),
         ("cell: thesis", "cell: gone.yaml", "mine.yaml:2: 'gone.yaml' does not exist; name a file"),
         ("cell: thesis", "cell: 3", "mine.yaml:2: cell is 3; expected text"),
         ("tree.xml", "gone.xml", "mine.yaml:3: 'gone.xml' does not exist; name a file"),
         ("tree.xml", "nowhere", "mine.yaml:3: no tree named 'nowhere'"),
-        ("0.30, 0.14, 0.16", "0.48, 0.00, 0.00", "mine.yaml:9: obstacle 'short' reaches 0.022 m into back_panel"),
-        ("0.30, 0.14, 0.16", "0.30, 0.14, -0.05", "mine.yaml:9: obstacle 'short' reaches 0.050 m below the floor"),
-        ("0.30, 0.14, 0.16", "0.45, 0.15, 0.35", "mine.yaml:9: obstacle 'short' reaches 0.032 m into socket back_4"),
-        ("0.30, 0.12, 0.0]", "0.0, 0.2, 0.0]", "mine.yaml:9: obstacle 'short' reaches 0.079 m into the left arm"),
-        ("0.01, 0.0]", "0.01, 0.2]", "mine.yaml:9: obstacle 'short' reaches 0.040 m below the floor"),
-        ("faults:", SECOND + "faults:", "mine.yaml:12: two obstacles 'short'"),
+        ("0.30, 0.14, 0.16", "0.48, 0.00, 0.00", "mine.yaml:10: obstacle 'short' reaches 0.022 m into back_panel"),
+        ("0.30, 0.14, 0.16", "0.30, 0.14, -0.05", "mine.yaml:10: obstacle 'short' reaches 0.050 m below the floor"),
+        ("0.30, 0.14, 0.16", "-0.36, 0.0, 0.3", "mine.yaml:10: obstacle 'short' reaches 0.046 m into the rear camera;"),
+        ("0.30, 0.14, 0.16", "0.45, 0.15, 0.35", "mine.yaml:10: obstacle 'short' reaches 0.032 m into socket back_4"),
+        ("0.30, 0.12, 0.0]", "0.0, 0.2, 0.0]", "mine.yaml:10: obstacle 'short' reaches 0.079 m into the left arm"),
+        ("0.01, 0.0]", "0.01, 0.2]", "mine.yaml:10: obstacle 'short' reaches 0.040 m below the floor"),
+        ("faults:", SECOND + "faults:", "mine.yaml:13: two obstacles 'short'"),
     ],
 )  # fmt: skip
 def test_a_mistake_is_a_finding_at_its_line(scenario: Path, old: str, new: str, expected: str) -> None:
@@ -166,13 +170,16 @@ def test_a_name_without_a_file_is_a_finding(scenario: Path, name: str, expected:
 @pytest.mark.parametrize(
     ("override", "expected"),
     [
-        ("limits.tris=3", "--set:1: unknown key 'tris'; did you mean 'tries'?"),
-        ("limits.tries=many", "--set:1: limits.tries is 'many'; expected a whole number"),
-        ("limits.tries", "--set:1: 'limits.tries': expected key.path=value"),
-        ("limits..tries=1", "--set:1: 'limits..tries=1': expected key.path=value"),
-        ("=1", "--set:1: '=1': expected key.path=value"),
-        ("obstacles.1.name=x", "--set:1: 'obstacles.1.name=x': obstacles has 1 items, numbered from 0"),
-        ("obstacles.x=1", "--set:1: 'obstacles.x=1': obstacles has 1 items"),
+        ("limits.sim_second=3", "--set:1: unknown key 'sim_second'; did you mean 'sim_seconds'?"),
+        ("expect.tries=many", "--set:1: expect.tries is 'many'; expected a whole number"),
+        ("inputs.tries", "--set:1: 'inputs.tries': no key with a value; write key.path=value, such as gravity=earth"),
+        ("inputs..tries=1", "--set:1: 'inputs..tries=1': no key with a value; write key.path=value"),
+        ("=1", "--set:1: '=1': no key with a value; write key.path=value"),
+        ("obstacles.1.name=x", "--set:1: 'obstacles.1.name=x': no item '1' in obstacles; give a number from 0 to 0"),
+        ("obstacles.x=1", "--set:1: 'obstacles.x=1': no item 'x' in obstacles; give"),
+        ("markers.0=slow", "--set:1: 'markers.0=slow': markers is empty, so it has no item to change; set the whole"),
+        ("light.direction=[0, 0, 0]", "--set:1: light.direction: a direction must not be zero"),
+        ("gravity=1e9", "--set:1: '1e9' is text to YAML, not a number; write 1.0e+9"),
         ("gravity.x=1", "--set:1: 'gravity.x=1': gravity is a single value"),
         ("gravity=[", "--set:1: not YAML"),
         ("cell.hidden.errors.arm_tol=0", "--set:1: unknown key 'arm_tol'; did you mean 'arm_tool'?"),
@@ -190,12 +197,12 @@ def test_a_wrong_override_is_a_finding(scenario: Path, override: str, expected: 
 def test_findings_of_all_files_come_at_once(scenario: Path) -> None:
     changed(scenario, "slips: 1", "slips: -1")
     (scenario.parent / "tree.xml").write_text((scenario.parent / "tree.xml").read_text().replace("Wait", "Wiat"))
-    lines = findings("limits.tries=x", "cell.hidden.step_rate=100", "nonsense")
+    lines = findings("expect.tries=x", "cell.hidden.step_rate=100", "nonsense")
     assert [line.split(" ")[0] for line in lines] == [
         "--set:1:",
         "--set:2:",
         "--set:3:",
-        "mine.yaml:17:",
+        "mine.yaml:18:",
         "tree.xml:2:",
     ]
 
@@ -247,3 +254,38 @@ tree cell.known cell.known.clip cell.known.cameras.0.mount cell.known.sockets.0.
 def test_any_value_anywhere_gives_findings_or_loads(scenario: Path, path: str, value: object) -> None:
     for text in (json.dumps(value), yaml.safe_dump(value)):
         assert all(f.line >= 1 and str(f).isprintable() for f in findings_if_any(f"{path}={text}"))
+
+
+def test_a_number_that_cannot_be_read_hides_nothing_else(scenario: Path) -> None:
+    changed(scenario, "0.12, 0.18", ".nan, 0.18")
+    changed(scenario, "slips: 1", "slips: 1e9")
+    changed(scenario, "hidden: true", "hiden: true")
+    assert findings() == [
+        "mine.yaml:8: '.nan' is no plain finite number; write it such as 1000, 0.3 or 1.0e+3",
+        "mine.yaml:18: '1e9' is text to YAML, not a number; write 1.0e+9",
+        "mine.yaml:19: unknown key 'hiden'; did you mean 'hidden'?",
+    ]
+
+
+def test_the_first_item_of_a_list_that_is_not_there_blames_the_command_line(scenario: Path) -> None:
+    scenario.write_text("description: bare\ncell: thesis\ntree: tree.xml\ngravity: earth\n")
+    told = "obstacles is empty, so it has no item to change; set the whole list, obstacles=[...]"
+    assert findings("obstacles.0.size=[1, 1, 1]") == [f"--set:1: 'obstacles.0.size=[1, 1, 1]': {told}"]
+    assert findings("obstacles=[]", "obstacles.0.yaw_deg=1") == [f"--set:2: 'obstacles.0.yaw_deg=1': {told}"]
+
+
+def test_a_scenario_s_light_takes_the_place_of_the_cell_s(scenario: Path) -> None:
+    before = load_scenario("mine.yaml").cell
+    cell = load_scenario("mine.yaml", ["light={brightness: 0.5, ambient: 0.2, direction: [0, 0, 1]}"]).cell
+    light = cell.hidden.light
+    assert light.ambient == pytest.approx(0.1)
+    assert list(light.direction) == [0, 0, 1]
+    assert light.diffuse == pytest.approx(0.5 * before.hidden.light.diffuse)
+    assert light.brightness_jitter == before.hidden.light.brightness_jitter
+    assert cell.known == before.known
+
+
+def test_inputs_reach_the_tree_as_a_tree_file_writes_them(scenario: Path) -> None:
+    inputs = load_scenario("mine.yaml", ["inputs.tries=3"]).inputs
+    assert inputs == {"tries": "3"}
+    assert (tree_text(True), tree_text(0.25), tree_text("rear")) == ("true", "0.25", "rear")

@@ -6,29 +6,25 @@ import subprocess
 import sys
 import textwrap
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from app.record import Expectation, Result, Slip
+from app.scenario_file import Scenario
 from app.study import run_demo, wilson
 from interfaces.cause import Cause, CauseCode
 
 
-def load(name: str, overrides: list[str]) -> dict[str, Any]:
-    return {"name": name, "overrides": overrides}
-
-
-def episode(scenario: dict[str, Any], out: Path | None, *, seed: int, video: bool) -> Result:
+def episode(scenario: Scenario, out: Path | None, *, seed: int, video: bool) -> Result:
     """Succeeds but for the tall obstacle's seed 1, and dies, raises there in other ways."""
-    name, gravity = scenario["name"], scenario["overrides"][-1]
-    if (name, gravity, seed) == ("no_obstacle", "gravity=earth", 0):
+    name, gravity = scenario.name, scenario.file.gravity
+    if (name, gravity, seed) == ("no_obstacle", "earth", 0):
         raise ValueError("no such joint")
-    if (name, gravity, seed) == ("short_obstacle", "gravity=zero", 1):
+    if (name, gravity, seed) == ("short_obstacle", "zero", 1):
         os._exit(7)
     if out is not None:
         out.mkdir(parents=True)
-        (out / "result.json").write_text(json.dumps(scenario["overrides"]))
+        (out / "result.json").write_text(json.dumps(scenario.overrides))
     failed = name == "tall_obstacle" and seed == 1
     return Result(
         scenario=name,
@@ -47,7 +43,7 @@ def episode(scenario: dict[str, Any], out: Path | None, *, seed: int, video: boo
 
 
 def test_a_study_goes_on_to_its_end_and_counts_every_run(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    assert run_demo(range(2), 2, tmp_path, ["limits.tries=2"], load=load, episode=episode) == 0
+    assert run_demo(range(2), 2, tmp_path, ["inputs.tries=2"], episode) == 0
     demo = json.loads((tmp_path / "demo.json").read_text())
     assert (demo["runs"], demo["succeeded"], demo["seeds"]) == (12, 8, [0, 1])
     rows = {(r["scenario"], r["gravity"], r["seed"]): r for r in demo["rows"]}
@@ -64,13 +60,13 @@ def test_a_study_goes_on_to_its_end_and_counts_every_run(tmp_path: Path, capfd: 
     assert (bad["outcome"], bad["unmet"], bad["cause"]["code"]) == ("safe_stop", ["outcome"], "search_exhausted")
     assert rows["no_obstacle", "earth", 0]["cause"]["message"] == "ValueError: no such joint"
     assert rows["short_obstacle", "zero", 1]["cause"]["message"] == "the process died with exit code 7"
-    kept = json.loads((tmp_path / "runs" / "tall_obstacle-earth-0" / "result.json").read_text())
-    assert kept == ["limits.tries=2", "gravity=earth"]
+    kept = json.loads((tmp_path / "runs" / "tall_obstacle-gravity=earth-0" / "result.json").read_text())
+    assert kept == ["inputs.tries=2"]
 
     out, err = capfd.readouterr()
     lines = [re.split(r"\s{2,}", line.strip()) for line in out.splitlines()]
     assert lines[0] == ["case", "succeeded", "95 % interval", "median sim s", "median x real time", "max force N"]
-    assert lines[1] == ["no_obstacle zero", "2/2", "34.2 to 100.0 %", "90.5", "2.00", "2.00"]
+    assert lines[1] == ["no_obstacle gravity=zero", "2/2", "34.2 to 100.0 %", "90.5", "2.00", "2.00"]
     assert lines[-1][:3] == ["all", "8/12", "39.1 to 86.2 %"]
     assert len(err.splitlines()) == 12
     assert "[12/12]" in err
@@ -78,11 +74,11 @@ def test_a_study_goes_on_to_its_end_and_counts_every_run(tmp_path: Path, capfd: 
 
 def test_a_folder_with_a_study_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "demo.json").write_text("{}")
-    assert run_demo(range(1), 1, tmp_path, load=load, episode=episode) == 2
+    assert run_demo(range(1), 1, tmp_path, episode=episode) == 2
     assert "demo.json" in capsys.readouterr().err
 
 
-def slow_after_two(scenario: dict[str, Any], out: Path | None, *, seed: int, video: bool) -> Result:
+def slow_after_two(scenario: Scenario, out: Path | None, *, seed: int, video: bool) -> Result:
     """The third run waits for a signal that only the study can bring."""
     if seed == 2:
         assert out is not None
@@ -94,7 +90,7 @@ def slow_after_two(scenario: dict[str, Any], out: Path | None, *, seed: int, vid
         except KeyboardInterrupt:
             (out / "interrupted").touch()
             raise
-    return Result(scenario["name"], seed, "stowed", succeeded=True)
+    return Result(scenario.name, seed, "stowed", succeeded=True)
 
 
 def test_ctrl_c_keeps_what_was_done_and_stops_what_runs(tmp_path: Path) -> None:
@@ -102,9 +98,9 @@ def test_ctrl_c_keeps_what_was_done_and_stops_what_runs(tmp_path: Path) -> None:
         import sys
         from pathlib import Path
         from app.study import run_demo
-        from test_study import load, slow_after_two
+        from test_study import slow_after_two
         if __name__ == "__main__":
-            sys.exit(run_demo(range(3), 1, Path(sys.argv[1]), load=load, episode=slow_after_two))
+            sys.exit(run_demo(range(3), 1, Path(sys.argv[1]), episode=slow_after_two))
     """)
     (tmp_path / "program.py").write_text(program)
     arguments = [sys.executable, str(tmp_path / "program.py"), str(tmp_path / "study")]
@@ -116,7 +112,7 @@ def test_ctrl_c_keeps_what_was_done_and_stops_what_runs(tmp_path: Path) -> None:
         assert process.wait() == 130
     demo = json.loads((tmp_path / "study" / "demo.json").read_text())
     assert (demo["runs"], demo["succeeded"], demo["planned"]) == (2, 2, 18)
-    assert (tmp_path / "study" / "runs" / "no_obstacle-zero-2" / "interrupted").exists()
+    assert (tmp_path / "study" / "runs" / "no_obstacle-gravity=zero-2" / "interrupted").exists()
 
 
 @pytest.mark.parametrize(

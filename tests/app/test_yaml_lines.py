@@ -10,9 +10,11 @@ from app.yaml_lines import MAX_DEPTH, parse
 
 
 def findings(text: str) -> str:
-    with pytest.raises(Findings) as raised:
-        parse(text, "f.yaml")
-    return str(raised.value)
+    """All that is found, whether the rest of the document can be read or not."""
+    try:
+        return str(Findings(parse(text, "f.yaml").findings))
+    except Findings as error:
+        return str(error)
 
 
 def test_every_value_knows_the_line_of_its_key() -> None:
@@ -32,21 +34,28 @@ def test_a_merge_key_yields_to_own_keys_and_to_earlier_mappings() -> None:
     ("text", "expected"),
     [
         ("a: 1\na: 2", "f.yaml:2: key 'a' stands twice; keep one"),
-        ("a: 1e3", "f.yaml:1: '1e3' is no plain finite number; write it such as 1000, 0.3 or 1.0e+3"),
-        ("a: .nan", "f.yaml:1: '.nan' is no plain finite number"),
+        ("a: 1e3", "f.yaml:1: '1e3' is text to YAML, not a number; write 1.0e+3"),
+        ("a: -2.5E9", "f.yaml:1: '-2.5E9' is text to YAML, not a number; write -2.5e+9"),
+        ("a: .nan", "f.yaml:1: '.nan' is no plain finite number; write it such as 1000, 0.3 or 1.0e+3"),
         ("a: -.inf", "f.yaml:1: '-.inf' is no plain finite number"),
         ("a: 1.0e+999", "f.yaml:1: '1.0e+999' is no plain finite number"),
-        ("a: 010", "f.yaml:1: '010' is no plain finite number"),
-        ("a: 1:30", "f.yaml:1: '1:30' is no plain finite number"),
+        ("a: 010", "f.yaml:1: '010' is 8 to some readers of YAML and not to others; write 8, or quotes around text"),
+        ("a: 1:30", "f.yaml:1: '1:30' is 90 to some readers of YAML and not to others; write 90, or quotes"),
+        ("a: 1_000", "f.yaml:1: '1_000' is 1000 to some readers of YAML and not to others; write 1000, or quotes"),
         ("a: " + "9" * 5000, "is no plain finite number"),
         ("\na: !!python/name:os.system", "f.yaml:2: tag 'tag:yaml.org,2002:python/name:os.system' is not allowed"),
         ("a: !!set {x}", "f.yaml:1: tag 'tag:yaml.org,2002:set' is not allowed"),
-        ("[1]: 2", "f.yaml:1: a key must be a name"),
-        ("a: [1,\nb: 2", "f.yaml:2: not YAML: expected ',' or ']'"),
-        ("a: 1\n---\nb: 2", "f.yaml:2: not YAML: but found another document"),
-        ("a: *nowhere", "f.yaml:1: not YAML: found undefined alias"),
+        ("[1]: 2", "f.yaml:1: a key must be a name; write text before the colon"),
+        ("a: [1,\nb: 2", "f.yaml:2: not YAML: expected ',' or ']', but got '<stream end>'; close the bracket"),
+        ("a: 1\n---\nb: 2", "f.yaml:2: not YAML: but found another document; keep one"),
+        ("a: *nowhere", "f.yaml:1: not YAML: found undefined alias 'nowhere'; define it before"),
         ('a: "\\U99999999"', "f.yaml:1: not YAML:"),
-        ("a: 1\nb: \x00", "f.yaml:2: not YAML: '\\x00' is not text"),
+        ("a: 1\nb: \x00", "f.yaml:2: not YAML: '\\x00' is not text; remove it"),
+        ("a:\n\tb: 1", "f.yaml:2: not YAML: found character '\\t' that cannot start any token; indent with spaces"),
+        ("a: b: c", "f.yaml:1: not YAML: mapping values are not allowed here; put text that holds a colon and a blank"),
+        ("a: 'b", "f.yaml:1: not YAML: found unexpected end of stream; close the quotes"),
+        ("a: 1\n  b: 2", "f.yaml:2: not YAML: mapping values are not allowed here; "),
+        ("a:\n- 1\nb", "not YAML: could not find expected ':'; write key: value"),
         ("a: &a [*a]", "f.yaml:1: aliases expand to more than"),
         ("a: &a {<<: *a}", "f.yaml:1: aliases expand to more than"),
         ("a: {<<: 3}", "f.yaml:1: '<<' takes a mapping"),
@@ -65,6 +74,18 @@ def test_aliases_of_aliases_do_not_blow_up(open_: str, close: str) -> None:
 
 def test_all_findings_come_at_once() -> None:
     assert findings("a: 1e3\nb: .inf\nb: 010\n").count("\n") == 2
+
+
+@given(st.text(max_size=12))
+def test_every_finding_says_what_would_be_right(text: str) -> None:
+    for line in findings(f"a: {text}").splitlines():
+        assert "; " in line, line
+
+
+def test_a_number_that_cannot_be_read_leaves_the_rest() -> None:
+    document = parse("a: [1, .nan, 3]\nb: 2\n", "f.yaml")
+    assert document.value == {"a": [1, None, 3], "b": 2}
+    assert document.unread == {("a", 1)}
 
 
 def test_an_overridden_line_holds_for_all_values() -> None:

@@ -16,7 +16,7 @@ from sim.world import World
 
 REST_SPEED = 0.05  # rad/s: a joint that holds against a swinging cable
 FIELDS = [
-    *("schema", "scenario", "seed", "outcome", "succeeded", "cause", "expectations", "slips"),
+    *("schema", "scenario", "seed", "outcome", "succeeded", "case", "cause", "expectations", "slips"),
     *("sim_seconds", "wall_seconds", "real_time_factor", "renderer", "versions"),
 ]
 STATES = {"unplug", "monitor", "detect_slip", "carry", "insert", "check_cameras", "regrasp", "stow", "let_go"}

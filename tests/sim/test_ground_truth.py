@@ -2,6 +2,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import RigidTransform, Rotation
 
 from interfaces.cell import Box, Cell, FixedMount
 from interfaces.scene import Obstacle
@@ -52,6 +53,14 @@ def test_behind_an_obstacle_no_pixels(cell: Cell, world: World) -> None:
     hidden.advance(0.2)
     assert GroundTruth(hidden).connector_pixels("rear") == 0
     hidden.close()
+
+
+def test_the_seat_s_error_is_a_way_and_an_angle(cell: Cell, world: World, monkeypatch: pytest.MonkeyPatch) -> None:
+    seat = cell.known.clip.world_from_seat
+    turn = Rotation.from_euler("zx", [10.0, 77.0], degrees=True)  # about its own axis it may turn
+    moved = RigidTransform.from_components([0.0, 0.003, 0.004], turn)
+    monkeypatch.setattr(world, "connector_pose", lambda: seat * moved)
+    assert GroundTruth(world).seat_error() == pytest.approx((0.005, 10.0))
 
 
 def test_contact_peaks_are_a_copy(world: World) -> None:

@@ -1,0 +1,81 @@
+import json
+from collections.abc import Iterator
+from typing import Any, get_args
+
+import pytest
+from pydantic import BaseModel, create_model
+from pydantic.fields import FieldInfo
+from typer.testing import CliRunner
+
+from app.cli import app
+from app.scenario_schema import ScenarioFile, json_schema
+
+
+def fields(model: type[BaseModel]) -> Iterator[tuple[str, FieldInfo]]:
+    """Every field of a model and of the models in it that scenarios have to themselves."""
+    for name, info in model.model_fields.items():
+        yield f"{model.__name__}.{name}", info
+        for inner in models(info.annotation):
+            yield from fields(inner)
+
+
+def models(annotation: Any) -> Iterator[type[BaseModel]]:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        if annotation.__module__ == ScenarioFile.__module__:
+            yield annotation
+        return
+    for part in get_args(annotation):
+        yield from models(part)
+
+
+FIELDS = dict(fields(ScenarioFile))
+
+
+def test_the_fields_of_all_parts_are_looked_at() -> None:
+    assert {"ObstacleSpec.size", "ByGravity.zero", "Expect.pose_error", "PoseError.position", "Steps.first"} <= set(
+        FIELDS
+    )
+
+
+@pytest.mark.parametrize("name", FIELDS)
+def test_a_field_says_what_it_means_and_gives_an_example_that_holds(name: str) -> None:
+    info = FIELDS[name]
+    assert info.description
+    assert info.description.endswith(".")
+    assert info.examples
+    parts: dict[str, Any] = {"field": (info.annotation, info)}
+    model = create_model("OneField", **parts)
+    for example in info.examples:
+        model.model_validate_json(json.dumps({info.alias or "field": example}), strict=True)
+
+
+def test_the_json_schema_is_whole() -> None:
+    schema = json_schema()
+    assert schema["$schema"] == "https://json-schema.org/draft/2020-12/schema"
+    assert set(schema["properties"]) == set(ScenarioFile.model_fields)
+    assert schema["additionalProperties"] is False
+    references = set(_references(schema))
+    assert references == {f"#/$defs/{name}" for name in schema["$defs"]}
+    assert json.loads(json.dumps(schema, allow_nan=False)) == schema
+
+
+def _references(node: Any) -> Iterator[str]:
+    if isinstance(node, dict):
+        if "$ref" in node:
+            yield node["$ref"]
+        for below in node.values():
+            yield from _references(below)
+    if isinstance(node, list):
+        for below in node:
+            yield from _references(below)
+
+
+def test_the_command_prints_the_schema_and_a_reference_with_every_field() -> None:
+    assert json.loads(CliRunner().invoke(app, ["scenarios", "schema"]).stdout) == json_schema()
+    text = CliRunner().invoke(app, ["scenarios", "schema", "--markdown"]).stdout
+    rows = [line for line in text.splitlines() if line.startswith("| `")]
+    assert all(line.replace("\\|", "").count("|") == 7 for line in rows)
+    for name, info in FIELDS.items():
+        assert f"| `{info.alias or name.split('.')[1]}` |" in text
+        assert str(info.description) in text
+    assert "| `size` | 3 x number (above 0, at most 3) | metres | required |" in text
