@@ -65,11 +65,7 @@ def run_all(
     After each run a line goes to stderr, unless `quiet`, and `keep` gets the rows so far. A run whose process died
     counts as an internal error. `episode` stands in for `run_episode` in tests.
     """
-    if episode is None:
-        from app.episode import run_episode  # late: it brings the physics
-
-        episode = run_episode
-    tasks = [partial(episode, run.scenario, run.folder, seed=run.seed, video=video) for run in runs]
+    tasks = [partial(episode or _run_episode, run.scenario, run.folder, seed=run.seed, video=video) for run in runs]
     rows: dict[int, Row] = {}
     try:
         with contextlib.closing(run_each(tasks, jobs)) as ended:
@@ -83,6 +79,13 @@ def run_all(
         print(f"interrupted; {len(rows)} of {len(runs)} runs were done", file=sys.stderr)
         return dict(sorted(rows.items())), True
     return dict(sorted(rows.items())), False
+
+
+def _run_episode(*args: Any, **kwargs: Any) -> Result:
+    """`run_episode`, which brings the physics into the process of its own and not into ours."""
+    from app.episode import run_episode
+
+    return run_episode(*args, **kwargs)
 
 
 def _summary(row: Row) -> str:

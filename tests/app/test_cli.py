@@ -135,6 +135,27 @@ def test_bad_input_is_told_in_full_and_nothing_is_written(
     assert sorted(tmp_path.rglob("*")) == before
 
 
+def test_options_of_one_case_and_of_all_do_not_mix(calls: list[SimpleNamespace], tmp_path: Path) -> None:
+    ran = invoke("run", "mine.yaml", "--jobs", "2", "--junit", "a.xml", "--set", "gravity=mars")
+    assert (ran.exit_code, calls) == (2, [])
+    assert [line.split(" ")[0] for line in ran.stderr.splitlines()] == ["--jobs:1:", "--junit:1:", "--set:1:"]
+    ran = invoke("run", "mine.yaml", "--all", "--case", "default", "--set", "gravity=mars")
+    assert ran.exit_code == 2
+    assert ran.stderr.splitlines()[0] == "--case:1: is for a single case; leave --all out"
+    assert ran.stderr.splitlines()[1].startswith("--set:1: gravity: no 'mars'")
+
+
+def test_a_case_is_run_by_its_name_with_its_own_seed(calls: list[SimpleNamespace], scenario: Path) -> None:
+    scenario.write_text(scenario.read_text() + "vary: {seed: '4:9', gravity: [zero, earth]}\n")
+    assert invoke("run", "mine.yaml", "--case", "seed=5,gravity=earth", "--quiet").exit_code == 0
+    assert invoke("run", "mine.yaml", "--seed", "8", "--quiet").exit_code == 0
+    assert [(c.seed, c.scenario.case, c.scenario.file.gravity) for c in calls] == [
+        (5, "seed=5,gravity=earth", "earth"),
+        (8, "seed=8,gravity=zero", "zero"),
+    ]
+    assert calls[0].out == Path("runs/mine-5-1")
+
+
 @pytest.mark.parametrize(
     ("out", "expected"),
     [
@@ -189,7 +210,18 @@ def test_a_wrong_range_of_seeds_is_a_finding(text: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "command", [[], ["run"], ["trees", "show"], ["scenarios", "list"], ["doctor"], ["study", "demo"]]
+    "command",
+    [
+        [],
+        ["run"],
+        ["trees", "show"],
+        ["scenarios", "list"],
+        ["scenarios", "check"],
+        ["scenarios", "show"],
+        ["scenarios", "schema"],
+        ["doctor"],
+        ["study", "demo"],
+    ],
 )
 def test_help_is_plain_and_shows_how(command: list[str]) -> None:
     ran = invoke(*command, "--help")
