@@ -8,7 +8,7 @@ from scipy.spatial.transform import RigidTransform
 from behaviors.leaf import Failed, Steps, StepsLeaf
 from interfaces.cause import CauseCode
 from motion.failure import PlanningError
-from motion.service import Task
+from motion.task import Task
 from perception.slip import GapTest
 
 HAND = "right"  # the thesis's fixed roles: the right arm handles the cable ...

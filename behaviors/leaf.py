@@ -9,7 +9,7 @@ from py_trees.ports import BehaviourWithPorts
 from behaviors.services import Services
 from interfaces.cause import Cause, CauseCode
 from motion.failure import PlanningError
-from motion.service import Task
+from motion.task import Task
 
 Steps = Generator[Task | None, None, None]
 

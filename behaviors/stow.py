@@ -6,7 +6,8 @@ from behaviors.hand import HAND, HandLeaf
 from behaviors.leaf import Failed, Steps
 from behaviors.services import Notice
 from interfaces.cause import CauseCode
-from motion.service import NO_POINTS, OPEN_GAP
+from motion.bodies import NO_POINTS
+from motion.service import OPEN_GAP
 from perception.cable_shape import cable_course
 from perception.rgbd_pose import Estimate
 from perception.slip import seen_at

@@ -1,1 +1,19 @@
 """The world: arms, cable, sockets, cameras and their noise, faults, ground truth."""
+
+import contextlib
+import os
+
+
+def _import_quietly() -> None:
+    """Import PyBullet once without the line that it prints on standard error from below Python."""
+    with contextlib.ExitStack() as stack:
+        with contextlib.suppress(OSError):  # standard error may be closed
+            kept, null = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+            stack.callback(os.close, kept)
+            stack.callback(os.dup2, kept, 2)
+            os.dup2(null, 2)
+            os.close(null)
+        import pybullet  # noqa: F401
+
+
+_import_quietly()

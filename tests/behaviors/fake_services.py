@@ -17,7 +17,7 @@ from behaviors.services import Belief, Services
 from interfaces.cell import KnownCell
 from interfaces.frame import RgbdFrame
 from interfaces.reading import GripperReading
-from motion.service import Task
+from motion.task import Task
 from perception.rgbd_pose import Estimate, NoEstimate
 from perception.segmentation import NotSeen
 from perception.track import ConnectorTrack

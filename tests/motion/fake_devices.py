@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from interfaces.cell import KnownCell
 from interfaces.reading import GripperReading, JointReading
 from interfaces.trajectory import Trajectory
-from motion.service import Motion, Task
+from motion.service import Motion
+from motion.task import Task
 
 TICK = 0.05
 
