@@ -93,7 +93,7 @@ def _world(scenario: Scenario, seed: int, renderer: RendererName, gui: bool) -> 
     rng = np.random.default_rng([seed, 0])
     obstacles = draw_obstacles(scenario.file, rng)
     faults = draw_faults(scenario.file, rng)
-    return World(scenario.cell, scenario.file.gravity, seed, obstacles, faults, renderer, gui)
+    return World(scenario.lit_cell, scenario.file.gravity, seed, obstacles, faults, renderer, gui)
 
 
 def _assemble(scenario: Scenario, world: World, seed: int, log: Any) -> Episode:

@@ -11,7 +11,7 @@ from app.findings import Finding, Findings, nearest, shown
 from app.overrides import Assignment, apply, read
 from app.placement import misplaced
 from app.resources import read_text, resolve
-from app.scenario_schema import LightSpec, ScenarioFile, TreeInput
+from app.scenario_schema import ScenarioFile, TreeInput
 from app.schema import validated
 from app.yaml_lines import Document, Place, parse
 from interfaces.cell import Cell
@@ -22,10 +22,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Scenario:
-    """One case of a scenario, checked: what the file says with the case's values, and the cell and tree that it names.
-
-    `cell` has the scenario's light.
-    """
+    """One case of a scenario, checked: the file with the case's values, and the cell and the tree that it names."""
 
     name: str
     path: Path
@@ -41,6 +38,16 @@ class Scenario:
         return self.name if self.case == vary.DEFAULT else f"{self.name} {self.case}"
 
     @property
+    def lit_cell(self) -> Cell:
+        """The cell in the scenario's light."""
+        spec, hidden = self.file.light, self.cell.hidden
+        given = spec.model_dump(include={"direction", "ambient", "diffuse"}, exclude_none=True)
+        light = hidden.light.model_copy(update=given)
+        factor = {"ambient": light.ambient * spec.brightness, "diffuse": light.diffuse * spec.brightness}
+        lit = hidden.model_copy(update={"light": light.model_copy(update=factor)})
+        return self.cell.model_copy(update={"hidden": lit})
+
+    @property
     def inputs(self) -> dict[str, str]:
         """The tree's inputs as a tree file would state them."""
         return {key: tree_text(value) for key, value in self.file.inputs.items()}
@@ -54,7 +61,7 @@ def load_scenario(name_or_path: str, overrides: Sequence[str] = (), case: str | 
     """
     source = _Source(name_or_path, overrides)
     names = [name for name, _ in source.cases]
-    if case is not None and case not in names:
+    if case is not None and case not in names and not source.found:
         source.found[Finding("--case", 1, f"no case {case!r}; {nearest(case, names)}")] = ""
     wanted = names.index(case) if case in names else 0
     return source.checked(source.cases[wanted : wanted + 1])[0]
@@ -71,7 +78,10 @@ def cases(name_or_path: str, overrides: Sequence[str] = ()) -> list[Scenario]:
 
 def case_names(name_or_path: str, overrides: Sequence[str] = ()) -> list[str]:
     """The names of a scenario's cases, without a check of the rest. Raises `Findings`."""
-    return [name for name, _ in _Source(name_or_path, overrides).cases]
+    source = _Source(name_or_path, overrides)
+    if source.found:
+        raise Findings(source.found)
+    return [name for name, _ in source.cases]
 
 
 class _Source:
@@ -137,7 +147,7 @@ class _Source:
             self._once(case, _check_inputs, (tree, repr(file.inputs)), document, tree, file)
         if not (file and cell and tree):
             return None
-        return Scenario(self.path.stem, self.path, file, _lit(cell, file.light), tree, self.overrides, case)
+        return Scenario(self.path.stem, self.path, file, cell, tree, self.overrides, case)
 
 
 def _of_case(finding: Finding, case: str) -> Finding:
@@ -153,15 +163,6 @@ def _named(document: Document, key: Literal["cell", "tree"], folder: Path) -> Pa
 def _cell(document: Document, folder: Path, assignments: Sequence[Assignment]) -> Cell | None:
     path = _named(document, "cell", folder)
     return load_cell(path, assignments, document.place(("cell",))) if path else None
-
-
-def _lit(cell: Cell, light: LightSpec) -> Cell:
-    """The cell in a scenario's light."""
-    given = {key: value for key in ("direction", "ambient", "diffuse") if (value := getattr(light, key)) is not None}
-    lit = cell.hidden.light.model_copy(update=given)
-    factor = {"ambient": lit.ambient * light.brightness, "diffuse": lit.diffuse * light.brightness}
-    hidden = cell.hidden.model_copy(update={"light": lit.model_copy(update=factor)})
-    return cell.model_copy(update={"hidden": hidden})
 
 
 def _tree(document: Document, folder: Path) -> Path | None:

@@ -139,8 +139,8 @@ def alternatives(root: Schema, node: Schema) -> list[Schema]:
     """Follow references and unions to the nodes that say something."""
     if "$ref" in node:
         return alternatives(root, root["$defs"][node["$ref"].rsplit("/", 1)[1]])
-    if "anyOf" in node:
-        return [opened for option in node["anyOf"] for opened in alternatives(root, option)]
+    if options := node.get("anyOf", node.get("oneOf")):
+        return [opened for option in options for opened in alternatives(root, option)]
     return [] if node.get("type") == "null" else [node]
 
 

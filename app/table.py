@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 
 def print_table(header: Sequence[str], lines: Sequence[Sequence[str]]) -> None:
@@ -14,7 +15,7 @@ def print_table(header: Sequence[str], lines: Sequence[Sequence[str]]) -> None:
         for column in drawn.columns[1:]:
             column.justify = "right"
         for line in lines:
-            drawn.add_row(*line)
+            drawn.add_row(*map(Text, line))  # brackets in a name are no markup
         Console().print(drawn)
         return
     widths = [max(len(line[i]) for line in (header, *lines)) for i in range(len(header))]

@@ -275,8 +275,9 @@ def test_the_first_item_of_a_list_that_is_not_there_blames_the_command_line(scen
 
 
 def test_a_scenario_s_light_takes_the_place_of_the_cell_s(scenario: Path) -> None:
-    before = load_scenario("mine.yaml").cell
-    cell = load_scenario("mine.yaml", ["light={brightness: 0.5, ambient: 0.2, direction: [0, 0, 1]}"]).cell
+    before = load_scenario("mine.yaml").lit_cell
+    assert before == load_scenario("mine.yaml").cell
+    cell = load_scenario("mine.yaml", ["light={brightness: 0.5, ambient: 0.2, direction: [0, 0, 1]}"]).lit_cell
     light = cell.hidden.light
     assert light.ambient == pytest.approx(0.1)
     assert list(light.direction) == [0, 0, 1]
