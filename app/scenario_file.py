@@ -1,6 +1,6 @@
 """Scenario files: which cell, which tree, what goes wrong, and what must come out."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, ParamSpec, TypeVar
@@ -46,7 +46,7 @@ def load_scenario(name_or_path: str, overrides: Sequence[str] = ()) -> Scenario:
     _attempt(found, set_.apply, document, [(n, text) for n, text in numbered if not text.startswith("cell.")])
     file = _attempt(found, validated, document, ScenarioFile)
     cell = _attempt(found, _cell, document, path.parent, of_cell)
-    tree = _attempt(found, _tree, document, path.parent)
+    tree = _attempt(found, _tree, document, path.parent, cell)
     if file and cell:
         found += _misplaced(document, file, cell)
     if found or not (file and cell and tree):
@@ -104,19 +104,23 @@ def _inconsistent(document: Document, cell: Cell) -> Iterator[Finding]:
             yield Finding(*document.place(("known", key)), message)
 
 
-def _tree(document: Document, folder: Path) -> Path | None:
+def _tree(document: Document, folder: Path, cell: Cell | None) -> Path | None:
     path = _named(document, "tree", folder)
     if path is not None:
-        check_tree_file(path, document.place(("tree",)))
+        names = {"socket": [socket.name for socket in cell.known.sockets]} if cell else None
+        check_tree_file(path, document.place(("tree",)), names)
     return path
 
 
-def check_tree_file(path: Path, where: Place | None = None) -> None:
-    """Raises `Findings` for all that is wrong in a tree file; at `where`, which names it, when there is none."""
+def check_tree_file(path: Path, where: Place | None = None, names: Mapping[str, Collection[str]] | None = None) -> None:
+    """Raises `Findings` for all that is wrong in a tree file; at `where`, which names it, when there is none.
+
+    `names` are those that the cell has, by kind; without them the tree's are not checked.
+    """
     read_text(path, where)
     from trees import check_tree  # the leaves bring the planner and the compiler with them: seconds
 
-    found = [Finding(shown(path), line, message) for line, message in check_tree(path)]
+    found = [Finding(shown(path), line, message) for line, message in check_tree(path, names=names)]
     if found:
         raise Findings(found)
 
