@@ -1,6 +1,6 @@
 """Scenario files: which cell, which tree, what goes wrong, and what must come out."""
 
-from collections.abc import Callable, Hashable, Iterator, Sequence
+from collections.abc import Callable, Collection, Hashable, Iterator, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -140,11 +140,11 @@ class _Source:
         names = document.value if isinstance(document.value, dict) else {}
         laid = repr([(a.key, a.new.value) for a in of_cell])
         cell = self._once(case, _cell, (repr(names.get("cell")), laid), document, self.path.parent, of_cell)
-        tree = self._once(case, _tree, repr(names.get("tree")), document, self.path.parent)
+        tree = self._once(case, _tree, (repr(names.get("tree")), id(cell)), document, self.path.parent, cell)
         if file and cell:
             self._once(case, misplaced, (file.obstacles, id(cell)), document, file.obstacles, cell.known)
-        if file and tree:
-            self._once(case, _check_inputs, (tree, repr(file.inputs)), document, tree, file)
+        if file and tree and cell:
+            self._once(case, _check_inputs, (tree, repr(file.inputs), id(cell)), document, tree, file, cell)
         if not (file and cell and tree):
             return None
         return Scenario(self.path.stem, self.path, file, cell, tree, self.overrides, case)
@@ -165,20 +165,25 @@ def _cell(document: Document, folder: Path, assignments: Sequence[Assignment]) -
     return load_cell(path, assignments, document.place(("cell",))) if path else None
 
 
-def _tree(document: Document, folder: Path) -> Path | None:
+def _tree(document: Document, folder: Path, cell: Cell | None) -> Path | None:
     path = _named(document, "tree", folder)
     if path is not None:
-        check_tree_file(path, document.place(("tree",)))
+        check_tree_file(path, document.place(("tree",)), _names(cell) if cell else None)
     return path
 
 
-def _check_inputs(document: Document, tree: Path, file: ScenarioFile) -> None:
+def _names(cell: Cell) -> dict[str, list[str]]:
+    """What a tree may name of the cell, by kind."""
+    return {"socket": [socket.name for socket in cell.known.sockets]}
+
+
+def _check_inputs(document: Document, tree: Path, file: ScenarioFile, cell: Cell) -> None:
     from trees import check_inputs  # late, as below
 
     given = {key: tree_text(value) for key, value in file.inputs.items()}
     if found := [
         Finding(*document.place(("inputs", key)), f"inputs.{key}: {message}")
-        for key, message in check_inputs(tree, given)
+        for key, message in check_inputs(tree, given, names=_names(cell))
     ]:
         raise Findings(found)
 
@@ -218,12 +223,15 @@ def _inconsistent(document: Document, cell: Cell) -> Iterator[Finding]:
             yield Finding(*document.place(("known", key)), message)
 
 
-def check_tree_file(path: Path, where: Place | None = None) -> None:
-    """Raises `Findings` for all that is wrong in a tree file; at `where`, which names it, when there is none."""
+def check_tree_file(path: Path, where: Place | None = None, names: Mapping[str, Collection[str]] | None = None) -> None:
+    """Raises `Findings` for all that is wrong in a tree file; at `where`, which names it, when there is none.
+
+    `names` are those that the cell has, by kind; without them the tree's are not checked.
+    """
     read_text(path, where)
     from trees import check_tree  # the leaves bring the planner and the compiler with them: seconds
 
-    found = [Finding(shown(path), line, message) for line, message in check_tree(path)]
+    found = [Finding(shown(path), line, message) for line, message in check_tree(path, names=names)]
     if found:
         raise Findings(found)
 

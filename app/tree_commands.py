@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from app.findings import Finding, Findings, nearest
 from app.resources import resolve, shipped
 from app.scenario_file import check_tree_file
 
@@ -31,3 +32,49 @@ def show(tree: Annotated[str, typer.Argument(help="A shipped tree's name, or a p
     from trees import show_tree
 
     typer.echo(show_tree(path))
+
+
+@app.command("check")
+def check(
+    trees: Annotated[
+        list[str] | None, typer.Argument(help="Shipped trees' names or paths to .xml files; without any, all shipped.")
+    ] = None,
+) -> None:
+    """Find everything that is wrong in tree files, without a run. What a cell must have is checked with the scenario.
+
+    \b
+    Example:
+      regrasp trees check my/tree.xml
+
+    \b
+    Exit code: 0 no findings, 2 findings, one a line: file:line: what is wrong; what would be right.
+    """
+    found: list[Finding] = []
+    names = trees or list(shipped("tree"))
+    for name in names:
+        try:
+            check_tree_file(resolve("tree", name, Path()))
+        except Findings as error:
+            found += error.items
+    if found:
+        raise Findings(found)
+    typer.echo(f"{len(names)} tree{'s' if len(names) > 1 else ''}, no findings")
+
+
+@app.command("leaves")
+def leaves(name: Annotated[str | None, typer.Argument(help="One element, in full.")] = None) -> None:
+    """The elements of a tree file: leaves and built-in ones, each with its attributes.
+
+    \b
+    Example:
+      regrasp trees leaves SpiralSearch
+    """
+    from behaviors import LEAVES  # brings the planner and the compiler: a second
+    from trees.catalogue import describe, words
+
+    known = words(LEAVES)
+    if name is not None and name not in known:
+        raise Findings([Finding(name, 1, f"no element {name!r}; {nearest(name, known)}")])
+    for tag, kind in known.items():
+        if name in (None, tag):
+            typer.echo("\n".join(describe(tag, kind, full=name is not None)))

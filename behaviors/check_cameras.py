@@ -2,9 +2,7 @@
 
 from typing import Any, ClassVar
 
-from py_trees.ports import PortInformation
-
-from behaviors.leaf import Failed, Steps, StepsLeaf
+from behaviors.leaf import Failed, Port, Steps, StepsLeaf
 from interfaces.cause import CauseCode
 from perception.mean_pose import mean_pose
 from perception.rgbd_pose import Estimate
@@ -18,7 +16,7 @@ class CheckCameras(StepsLeaf):
     """
 
     INPUT_PORTS: ClassVar[dict[str, Any]] = {
-        "seconds": PortInformation(data_type=float, required=False, default_value=1.5)
+        "seconds": Port(data_type=float, required=False, default_value=1.5, above=0, description="s of looking")
     }
 
     def steps(self) -> Steps:

@@ -21,6 +21,7 @@ class DetectSlip(Leaf):
 
     INPUT_PORTS: ClassVar[dict[str, Any]] = {}
     OUTPUT_PORTS: ClassVar[dict[str, Any]] = {}
+    RETURNS = frozenset({Status.RUNNING, Status.FAILURE})
 
     def initialise(self) -> None:
         """Forget the readings of an earlier carry."""

@@ -12,6 +12,7 @@ class Holding(Leaf):
 
     INPUT_PORTS: ClassVar[dict[str, Any]] = {}
     OUTPUT_PORTS: ClassVar[dict[str, Any]] = {}
+    RETURNS = frozenset({Status.SUCCESS, Status.FAILURE})
 
     def update(self) -> Status:
         """See the class."""

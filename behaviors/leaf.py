@@ -1,10 +1,11 @@
 """The common ground of all leaves."""
 
 from collections.abc import Generator
+from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from py_trees.common import Status
-from py_trees.ports import BehaviourWithPorts
+from py_trees.ports import BehaviourWithPorts, PortInformation
 
 from behaviors.services import Services
 from interfaces.cause import Cause, CauseCode
@@ -22,9 +23,22 @@ class Failed(Exception):  # noqa: N818 - said inside `steps`: the leaf fails wit
         self.code = code
 
 
+@dataclass(frozen=True)
+class Port(PortInformation):
+    """A port with limits that the check of a tree file enforces.
+
+    A number is more than `above`; a string is one of the `names` that the cell gives to this kind of thing.
+    """
+
+    above: float | None = None
+    names: str | None = None
+
+
 class Leaf(BehaviourWithPorts):
     """A leaf with services; it says why it fails."""
 
+    # The statuses that `update` may return: to the check, what only comes after another one is out of reach.
+    RETURNS: ClassVar[frozenset[Status]] = frozenset({Status.SUCCESS, Status.FAILURE, Status.RUNNING})
     services: Services
 
     def setup(self, **kwargs: Any) -> None:

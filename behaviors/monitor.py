@@ -3,10 +3,9 @@
 from typing import Any, ClassVar
 
 from py_trees.common import Status
-from py_trees.ports import PortInformation
 
 from behaviors.hand import HAND
-from behaviors.leaf import Leaf
+from behaviors.leaf import Leaf, Port
 
 
 class Monitor(Leaf):
@@ -16,9 +15,10 @@ class Monitor(Leaf):
     """
 
     INPUT_PORTS: ClassVar[dict[str, Any]] = {
-        "period": PortInformation(data_type=float, required=False, default_value=0.1)
+        "period": Port(data_type=float, required=False, default_value=0.1, above=0, description="s between looks")
     }
     OUTPUT_PORTS: ClassVar[dict[str, Any]] = {}
+    RETURNS = frozenset({Status.SUCCESS})
     _due = 0.0
 
     def update(self) -> Status:

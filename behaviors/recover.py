@@ -3,10 +3,8 @@
 from itertools import chain
 from typing import Any, ClassVar
 
-from py_trees.ports import PortInformation
-
 from behaviors.hand import HAND, HandLeaf
-from behaviors.leaf import Failed, Steps
+from behaviors.leaf import Failed, Port, Steps
 from interfaces.cause import CauseCode
 from motion.service import OPEN_GAP
 from perception.stillness import Stillness
@@ -35,7 +33,7 @@ class WaitUntilStill(HandLeaf):
     """RUNNING while the rear camera sees anything move; FAILURE after `time_limit` seconds."""
 
     INPUT_PORTS: ClassVar[dict[str, Any]] = {
-        "time_limit": PortInformation(data_type=float, required=False, default_value=30.0)
+        "time_limit": Port(data_type=float, required=False, default_value=30.0, above=0, description="s of waiting")
     }
 
     def steps(self) -> Steps:

@@ -1,5 +1,7 @@
 """The safe end of a mission that failed."""
 
+from py_trees.common import Status
+
 from behaviors.leaf import Failed, Steps, StepsLeaf
 from interfaces.cause import CauseCode
 
@@ -8,6 +10,8 @@ REST = 0.3  # s within which the arms are at rest (spec)
 
 class SafeStop(StepsLeaf):
     """Stops both arms and holds them; jaws keep their force. FAILURE once they rest: the mission failed."""
+
+    RETURNS = frozenset({Status.RUNNING, Status.FAILURE})
 
     def steps(self) -> Steps:
         """See the class."""

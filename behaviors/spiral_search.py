@@ -5,11 +5,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from py_trees.ports import PortInformation
 from scipy.spatial.transform import RigidTransform
 
 from behaviors.hand import EYE
-from behaviors.leaf import Failed, Steps
+from behaviors.leaf import Failed, Port, Steps
 from behaviors.look import LookLeaf
 from interfaces.cause import CauseCode
 from interfaces.cell import FixedMount
@@ -35,8 +34,10 @@ class SpiralSearch(LookLeaf):
     """
 
     INPUT_PORTS: ClassVar[dict[str, Any]] = {
-        "time_limit": PortInformation(data_type=float, required=False, default_value=300.0),
-        "look_seconds": PortInformation(data_type=float, required=False, default_value=1.0),
+        "time_limit": Port(data_type=float, required=False, default_value=300.0, above=0, description="s of searching"),
+        "look_seconds": Port(
+            data_type=float, required=False, default_value=1.0, above=0, description="s of looking from a stop"
+        ),
     }
 
     def steps(self) -> Steps:

@@ -3,10 +3,9 @@
 from typing import Any, ClassVar
 
 import numpy as np
-from py_trees.ports import PortInformation
 
 from behaviors.hand import HAND, HandLeaf
-from behaviors.leaf import Steps
+from behaviors.leaf import Port, Steps
 
 DRAW_OUT = 0.05  # m along the plug's axis: the plug sits 0.015 deep
 SHALLOW = (
@@ -18,7 +17,9 @@ CLEAR = 0.06  # m away from the panel then
 class Unplug(HandLeaf):
     """Grips the connector in the `socket` of that name, draws it out along its axis, and away from the panel."""
 
-    INPUT_PORTS: ClassVar[dict[str, Any]] = {"socket": PortInformation(data_type=str)}
+    INPUT_PORTS: ClassVar[dict[str, Any]] = {
+        "socket": Port(data_type=str, names="socket", description="a socket of the cell")
+    }
 
     def steps(self) -> Steps:
         """See the class."""

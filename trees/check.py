@@ -6,20 +6,23 @@ that it does not know, empty composites, ports without a value.
 
 import re
 from collections.abc import Collection, Iterator, Mapping
-from difflib import get_close_matches
 from pathlib import Path
 
 from trees.element import Element, TreeSyntaxError, key_of, read_elements
-from trees.vocabulary import Kind, kinds
-from trees.wiring import check_wiring
+from trees.flow import check_flow
+from trees.vocabulary import Kind, Names, kinds, nearest
+from trees.wiring import Filled, TooLarge
 
-Finding = tuple[int, str]  # line from 1 (0: the file itself), sentence
+Finding = tuple[int, str]  # line from 1 (0: the file itself), "what is wrong; what would be right"
 
 _NAME = re.compile(r"[\w-]+")
 
 
-def check_tree(path: Path, leaves: Mapping[str, type] | None = None) -> list[Finding]:
-    """All findings, in line order; a file without any loads. `leaves` maps a tag to its class, by default all of ours.
+def check_tree(path: Path, leaves: Mapping[str, type] | None = None, names: Names | None = None) -> list[Finding]:
+    """All findings, in line order; a file without any loads.
+
+    `leaves` maps a tag to its class, by default all of ours. `names` says which names a port may hold that means a
+    thing in the cell, {"socket": ["back_1", ...]}; without it they are not checked.
 
     Raises:
         TypeError: a leaf class without ports.
@@ -31,50 +34,63 @@ def check_tree(path: Path, leaves: Mapping[str, type] | None = None) -> list[Fin
     try:
         root = read_elements(path)
     except OSError as error:
-        return [(0, f"cannot be read: {error.strerror}")]
+        return [(0, f"cannot be read: {error.strerror}; name a file that can")]
     except TreeSyntaxError as error:
         return [(error.line, str(error))]
-    known = kinds(leaves)
-    trees = {tree.attributes.get("ID", ""): tree for tree in root.children if tree.tag == "BehaviorTree"}
+    known = kinds(leaves, names)
+    given = [tree for tree in root.children if tree.tag == "BehaviorTree"]
+    trees = {tree.attributes.get("ID", ""): tree for tree in given}
     findings = [*_check_document(root, trees)]
-    for tree in trees.values():
+    for tree in given:
         findings += _check_names(tree)
         for element in tree.walk():
             if element is not tree:
                 findings += _check_element(element, known, trees)
-    loops = [*_loops(trees)]
-    if not loops:  # wiring follows subtrees without end
-        findings += check_wiring(root, trees, known)
-    return sorted(set(findings + loops))
+    findings += _never_run(root, trees)
+    findings += [*_loops(trees)] or _check_runs(root, trees, known)  # filling in follows subtrees without end
+    return sorted(set(findings))
+
+
+def _check_runs(root: Element, trees: Mapping[str, Element], known: Mapping[str, Kind]) -> list[Finding]:
+    """What shows only in the tree that will run, its subtrees filled in."""
+    main = trees.get(root.attributes.get("main_tree_to_execute", ""))
+    if main is None:
+        return []
+    try:
+        filled = Filled(main, trees, known)
+    except TooLarge as error:
+        return [(root.line, str(error))]
+    return [*filled.findings, *check_flow(filled.root)]
 
 
 def unknown(what: str, word: str, known: Collection[str]) -> str:
     """The sentence about a word that is not known, with the nearest that is."""
-    nearest = get_close_matches(word, known, 1, 0.5)
-    hint = f"did you mean {nearest[0]}?" if nearest else f"there are {', '.join(sorted(known)) or 'none'}"
-    return f"unknown {what} {word!r}; {hint}"
+    return f"unknown {what} {word!r}; {nearest(word, known)}"
 
 
 def _check_document(root: Element, trees: Mapping[str, Element]) -> Iterator[Finding]:
     if root.tag != "root":
-        yield root.line, f"the outermost element must be <root>, not <{root.tag}>"
+        yield root.line, f"the outermost element is <{root.tag}>; write <root>"
     for attribute in root.attributes.keys() - {"main_tree_to_execute"}:
         yield root.line, unknown("attribute of root", attribute, ["main_tree_to_execute"])
     main = root.attributes.get("main_tree_to_execute")
     if main is None:
-        yield root.line, "root needs main_tree_to_execute, the ID of the tree to run"
+        yield root.line, "root does not state main_tree_to_execute; write the ID of the tree to run"
     elif main not in trees:
         yield root.line, unknown("main tree", main, trees)
     for tree in root.children:
+        if tree.tag in ("Include", "Import"):
+            yield tree.line, f"{tree.tag} is refused, a tree is one file; copy the BehaviorTree into this one"
+            continue
         if tree.tag != "BehaviorTree":
             yield tree.line, unknown("element under root", tree.tag, ["BehaviorTree"])
             continue
         if not tree.attributes.get("ID"):
-            yield tree.line, "BehaviorTree needs an ID"
+            yield tree.line, "BehaviorTree has no ID; give it one"
         elif trees[tree.attributes["ID"]] is not tree:  # the mapping keeps the last
-            yield tree.line, f"BehaviorTree ID {tree.attributes['ID']!r} is given twice"
+            yield tree.line, f"BehaviorTree ID {tree.attributes['ID']!r} is given twice; rename one"
         if len(tree.children) != 1:
-            yield tree.line, f"BehaviorTree must have one child, not {len(tree.children)}"
+            yield tree.line, f"BehaviorTree has {len(tree.children)} children; give it one, such as a Sequence"
         keys = _keys_used(tree)
         for attribute, value in tree.attributes.items():
             if attribute != "ID":
@@ -89,11 +105,17 @@ def _check_names(tree: Element) -> Iterator[Finding]:
         seen = set()
         for element in parent.children:
             if not _NAME.fullmatch(element.name):
-                yield element.line, f"{element.tag} needs a name of letters, digits, _ and -, not {element.name!r}"
+                yield (
+                    element.line,
+                    f"{element.tag} has the name {element.name!r}; give it one of letters, digits, _ and -",
+                )
             elif element.name in seen:
-                yield element.line, f"the name {element.name!r} is taken by a sibling"
+                yield element.line, f"the name {element.name!r} is taken by a sibling; rename one"
             elif element.tag == "SubTree" and element.name in namespaces:
-                yield element.line, f"another SubTree here is named {element.name!r}: they would share their keys"
+                yield (
+                    element.line,
+                    f"another SubTree here is named {element.name!r}: they would share their keys; rename one",
+                )
             seen.add(element.name)
             if element.tag == "SubTree":
                 namespaces.add(element.name)
@@ -108,13 +130,13 @@ def _check_element(element: Element, known: Mapping[str, Kind], trees: Mapping[s
         return
     kind = known[element.tag]
     if len(element.children) < kind.min_children:
-        yield element.line, f"{element.tag} {element.name!r} needs a child"
+        yield element.line, f"{element.label} has no child; put one inside, or remove it"
     elif kind.max_children is not None and len(element.children) > kind.max_children:
-        limit = "no children" if kind.max_children == 0 else "one child"
-        yield element.line, f"{element.tag} {element.name!r} takes {limit}, not {len(element.children)}"
+        takes, where = ("no children", "out of it") if kind.max_children == 0 else ("one child", "into a Sequence")
+        yield element.line, f"{element.label} takes {takes} and has {len(element.children)}; move them {where}"
     for name, attribute in kind.attributes.items():
         if attribute.required and name not in element.attributes:
-            yield element.line, f"{element.tag} {element.name!r} does not state {name}"
+            yield element.line, f'{element.label} does not state {name}; write {name}="...": {attribute.takes}'
     for name, value in element.attributes.items():
         if name != "name":
             yield from _check_attribute(element, kind, name, value)
@@ -128,17 +150,17 @@ def _check_attribute(element: Element, kind: Kind, name: str, value: str) -> Ite
     try:
         is_key = key_of(value) is not None and attribute.takes_key
     except ValueError as error:
-        yield element.line, f"{element.tag} {element.name!r}: {name} {error}"
+        yield element.line, f"{element.label}: {name} {error}"
         return
     if attribute.is_output and not is_key:
-        yield element.line, f"{element.tag} {element.name!r}: {name} is an output and must be wired to a {{key}}"
+        yield element.line, f"{element.label}: {name}={value!r} is an output; wire it to a {{key}}"
     elif not is_key and (problem := attribute.problem(value)):
-        yield element.line, f"{element.tag} {element.name!r}: {name}={value!r} {problem}"
+        yield element.line, f"{element.label}: {name}={value!r} {problem}"
 
 
 def _check_subtree(element: Element, trees: Mapping[str, Element]) -> Iterator[Finding]:
     if element.children:
-        yield element.line, f"SubTree {element.name!r} takes no children, not {len(element.children)}"
+        yield element.line, f"{element.label} takes no children and has {len(element.children)}; move them out of it"
     identifier = element.attributes.get("ID", "")
     if identifier not in trees:
         yield element.line, unknown("subtree", identifier, trees)
@@ -155,7 +177,7 @@ def _check_key(element: Element, name: str, value: str) -> Iterator[Finding]:
     try:
         key_of(value)
     except ValueError as error:
-        yield element.line, f"{element.tag} {element.name!r}: {name} {error}"
+        yield element.line, f"{element.label}: {name} {error}"
 
 
 def _keys_used(tree: Element) -> set[str]:
@@ -163,23 +185,36 @@ def _keys_used(tree: Element) -> set[str]:
     return {value[1:-1] for value in values if value.startswith("{") and value.endswith("}")}
 
 
-def _loops(trees: Mapping[str, Element]) -> Iterator[Finding]:
-    """A finding at each SubTree element from which its own tree can be reached again."""
-    includes = {
-        identifier: {e.attributes.get("ID", "") for e in tree.walk() if e.tag == "SubTree"}
-        for identifier, tree in trees.items()
-    }
-
-    def reachable(identifier: str) -> set[str]:
-        found: set[str] = set()
-        todo = [identifier]
-        while todo:
-            if (current := todo.pop()) not in found:
-                found.add(current)
-                todo += includes.get(current, ())
-        return found
-
+def _never_run(root: Element, trees: Mapping[str, Element]) -> Iterator[Finding]:
+    main = root.attributes.get("main_tree_to_execute", "")
+    run: set[str] = set()
+    todo = [main]
+    while todo:
+        if (identifier := todo.pop()) in trees and identifier not in run:
+            run.add(identifier)
+            todo += [element.attributes.get("ID", "") for element in _subtrees(trees[identifier])]
     for identifier, tree in trees.items():
-        for element in tree.walk():
-            if element.tag == "SubTree" and identifier in reachable(element.attributes.get("ID", "")):
-                yield element.line, f"subtree {identifier!r} includes itself here"
+        if main in trees and identifier not in run:
+            yield tree.line, f"BehaviorTree {identifier!r} is never run; include it with a SubTree, or remove it"
+
+
+def _loops(trees: Mapping[str, Element]) -> Iterator[Finding]:
+    """The SubTree elements whose tree is open already when one follows them down."""
+    done: set[str] = set()
+    for first in trees:
+        branch = {} if first in done else {first: _subtrees(trees[first])}  # open trees, each with what is left of it
+        while branch:
+            current = next(reversed(branch))
+            element = next(branch[current], None)
+            identifier = element.attributes.get("ID", "") if element else ""
+            if element is None:
+                done.add(current)
+                del branch[current]
+            elif identifier in branch:
+                yield element.line, f"subtree {identifier!r} includes itself here; remove this SubTree"
+            elif identifier in trees and identifier not in done:
+                branch[identifier] = _subtrees(trees[identifier])
+
+
+def _subtrees(tree: Element) -> Iterator[Element]:
+    return (element for element in tree.walk() if element.tag == "SubTree")

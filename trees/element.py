@@ -5,9 +5,19 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from xml.parsers import expat
+from xml.parsers.expat import errors
 
 MAX_DEPTH = 60  # elements inside one another; the parser that builds the tree is recursive
 _KEY = re.compile(r"\{([A-Za-z_]\w*)\}")
+
+_REMEDIES = {
+    errors.XML_ERROR_INVALID_TOKEN: "write & as &amp;, < as &lt;, and every value in quotes",
+    errors.XML_ERROR_DUPLICATE_ATTRIBUTE: "give each attribute once",
+    errors.XML_ERROR_UNDEFINED_ENTITY: "there are &amp; &lt; &gt; &quot; &apos; only",
+    errors.XML_ERROR_UNBOUND_PREFIX: "write the tag without a prefix",
+    errors.XML_ERROR_UNKNOWN_ENCODING: "save the file as UTF-8",
+    errors.XML_ERROR_INCORRECT_ENCODING: "save the file as UTF-8",
+}
 
 
 class TreeSyntaxError(ValueError):
@@ -26,6 +36,11 @@ class Element:
     attributes: dict[str, str]
     line: int
     children: list["Element"] = field(default_factory=list)
+
+    @property
+    def label(self) -> str:
+        """How a sentence names it: Wait 'watch'."""
+        return f"{self.tag} {self.name!r}"
 
     @property
     def name(self) -> str:
@@ -48,7 +63,7 @@ def key_of(value: str) -> str | None:
     if match := _KEY.fullmatch(value):
         return match[1]
     if "{" in value or "}" in value:
-        raise ValueError(f"{value!r} is neither a literal nor a {{key}}")
+        raise ValueError(f"{value!r} is neither a literal nor a {{key}}; write braces around one whole word, or none")
     return None
 
 
@@ -70,13 +85,15 @@ def read_elements(path: Path) -> Element:
         open_elements[-1].children.append(element)
         open_elements.append(element)
         if len(open_elements) > MAX_DEPTH:
-            raise TreeSyntaxError(element.line, f"elements nested deeper than {MAX_DEPTH}")
+            raise TreeSyntaxError(
+                element.line, f"elements nested deeper than {MAX_DEPTH}; move some into a BehaviorTree"
+            )
 
     def end(_tag: str) -> None:
         open_elements.pop()
 
     def refuse_doctype(*_declaration: object) -> None:
-        raise TreeSyntaxError(parser.CurrentLineNumber, "a tree file must not have a document type")
+        raise TreeSyntaxError(parser.CurrentLineNumber, "a document type is refused; remove <!DOCTYPE ...>")
 
     parser.StartElementHandler = start
     parser.EndElementHandler = end
@@ -84,7 +101,16 @@ def read_elements(path: Path) -> Element:
     try:
         parser.Parse(content, True)
     except expat.ExpatError as error:
-        raise TreeSyntaxError(error.lineno, f"malformed XML: {expat.ErrorString(error.code)}") from error
+        fault = expat.ErrorString(error.code)
+        raise TreeSyntaxError(error.lineno, f"malformed XML: {fault}; {_remedy(fault, open_elements)}") from error
     except LookupError as error:  # an encoding that Python does not know
-        raise TreeSyntaxError(1, f"malformed XML: {error}") from error
+        raise TreeSyntaxError(1, f"malformed XML: {error}; save the file as UTF-8") from error
     return top.children[0]
+
+
+def _remedy(fault: str, open_elements: list[Element]) -> str:
+    """What would be right in place of expat's error `fault`."""
+    if fault in _REMEDIES:
+        return _REMEDIES[fault]
+    inner = open_elements[-1]
+    return f"close <{inner.tag}> of line {inner.line}" if inner.tag else "write one <root> with everything inside it"

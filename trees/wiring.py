@@ -1,14 +1,51 @@
-"""Where the values of ports come from, followed through subtrees as py_trees' parser does."""
+"""The tree that will run, subtrees filled in, and where its ports' values come from, as py_trees' parser does it."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 from trees.element import Element, key_of
-from trees.vocabulary import Kind
+from trees.vocabulary import Attribute, Kind
 
 # After subtrees are filled in: a few nested ones could stand for billions of nodes, and building and ticking recurse.
 MAX_NODES = 2000
 MAX_TREE_DEPTH = 150
+
+
+@dataclass(frozen=True)
+class Wire:
+    """A port on a blackboard path: what a sentence calls it, where it stands, and the type of its values.
+
+    The type is None where nobody knows it: at a misspelt port or element, which may mean to write.
+    """
+
+    what: str
+    line: int
+    path: str
+    type: Any
+    required: bool = False  # a reader that cannot do without
+    seeded: bool = False  # a writer whose default stands there from the start
+
+
+@dataclass(eq=False)
+class Node:
+    """A node of the tree that will run; `kind` None for a subtree and for an element that nobody knows.
+
+    `constants` are its attributes' literals, also those that came through a subtree's keys.
+    """
+
+    element: Element
+    kind: Kind | None = None
+    children: list["Node"] = field(default_factory=list)
+    reads: list[Wire] = field(default_factory=list)
+    writes: list[Wire] = field(default_factory=list)
+    constants: dict[str, str] = field(default_factory=dict)
+
+    def walk(self) -> Iterator["Node"]:
+        """This node and all below it, in tick order."""
+        yield self
+        for child in self.children:
+            yield from child.walk()
 
 
 @dataclass(frozen=True)
@@ -17,14 +54,6 @@ class _Source:
 
     text: str
     is_constant: bool
-
-
-@dataclass
-class _Wires:
-    readers: list[tuple[int, str, str]] = field(default_factory=list)  # line, port, blackboard path
-    written: set[str] = field(default_factory=set)
-    nodes: int = 0
-    depth: int = 0
 
 
 @dataclass(frozen=True)
@@ -44,70 +73,100 @@ class _Scope:
             return _Source(value, is_constant=True)
         return self.keys.get(key, _Source(f"{self.namespace}/{key}", is_constant=False))
 
+    def inner(self, tree: Element, call: Element | None = None) -> "_Scope":
+        """The scope of a subtree that is called here; without a call, that of the main tree."""
+        values = {**tree.attributes, **(call.attributes if call else {})}
+        keys = {name: self.source(value) for name, value in values.items() if name not in ("ID", "name")}
+        return _Scope(f"{self.namespace}/{call.name}" if call else "", keys)
 
-def check_wiring(root: Element, trees: Mapping[str, Element], kinds: Mapping[str, Kind]) -> list[tuple[int, str]]:
-    """Findings (line, sentence) about the keys of the main tree; `trees` must not include one another in a loop.
 
-    A key that is read must be written somewhere; a decorator's argument and a literal handed to a subtree must suit.
+class TooLarge(Exception):  # noqa: N818 - it stops the filling in
+    """The tree grows beyond `MAX_NODES` or `MAX_TREE_DEPTH`; the message is the finding."""
+
+
+class Filled:
+    """The main tree with its subtrees filled in: `root`, and the `findings` (line, sentence) about its wires.
+
+    `trees` must not include one another in a loop. Raises TooLarge.
     """
-    main = trees.get(root.attributes.get("main_tree_to_execute", ""))
-    if main is None:
-        return []
-    wires = _Wires()
-    findings = [*_follow(main, _Scope("", _mapped(main, {}, _Scope("", {}))), trees, kinds, wires)]
-    if wires.nodes > MAX_NODES:
-        return [(root.line, f"more than {MAX_NODES} nodes once the subtrees are filled in")]
-    if wires.depth > MAX_TREE_DEPTH:
-        return [(root.line, f"deeper than {MAX_TREE_DEPTH} nodes once the subtrees are filled in")]
-    return findings + [
-        (line, f"{port} reads {path}, which no port writes")
-        for line, port, path in wires.readers
-        if path not in wires.written
-    ]
 
+    def __init__(self, main: Element, trees: Mapping[str, Element], kinds: Mapping[str, Kind]) -> None:
+        self._trees, self._kinds, self._count = trees, kinds, 0
+        self.findings: list[tuple[int, str]] = []
+        self.root = Node(main)
+        self._fill(self.root, main, _Scope("", {}).inner(main), 1)
+        self.findings += _mistyped([*self.root.walk()])
 
-def _mapped(tree: Element, given: Mapping[str, str], caller: _Scope) -> dict[str, _Source]:
-    values = {**tree.attributes, **given}
-    return {name: caller.source(value) for name, value in values.items() if name not in ("ID", "name")}
+    def _fill(self, node: Node, parent: Element, scope: _Scope, depth: int) -> None:
+        for child in parent.children:
+            self._count += 1
+            if self._count > MAX_NODES:
+                raise TooLarge(f"more than {MAX_NODES} nodes once the subtrees are filled in; include fewer")
+            if depth > MAX_TREE_DEPTH:
+                raise TooLarge(f"deeper than {MAX_TREE_DEPTH} nodes once the subtrees are filled in; nest fewer")
+            inner = Node(child, self._kinds.get(child.tag))
+            node.children.append(inner)
+            if child.tag != "SubTree":
+                self._connect(inner, scope)
+                self._fill(inner, child, scope, depth + 1)
+            elif tree := self._trees.get(child.attributes.get("ID", "")):
+                self._fill(inner, tree, scope.inner(tree, child), depth + 1)
 
+    def _connect(self, node: Node, scope: _Scope) -> None:
+        """Sort the node's attributes into reads, writes and constants; findings where a key brings what does not do."""
+        element = node.element
+        for name, value in element.attributes.items():
+            source = scope.source(value)
+            attribute = node.kind.attributes.get(name) if node.kind else None
+            what = f"{element.label}: {name}={value}"
+            if attribute is None:
+                if not source.is_constant:
+                    node.writes.append(Wire(what, element.line, source.text, None))
+                continue
+            if source.is_constant:
+                node.constants[name] = source.text
+            if value.startswith("{") and attribute.takes_key:  # literals are checked where they stand
+                self._wire(node, what, attribute, source)
 
-def _follow(
-    element: Element,
-    scope: _Scope,
-    trees: Mapping[str, Element],
-    kinds: Mapping[str, Kind],
-    wires: _Wires,
-    depth: int = 1,
-) -> Iterator[tuple[int, str]]:
-    for child in element.children:
-        wires.nodes += 1
-        wires.depth = max(wires.depth, depth)
-        if wires.nodes > MAX_NODES or depth > MAX_TREE_DEPTH:
-            return
-        if child.tag == "SubTree":
-            if tree := trees.get(child.attributes.get("ID", "")):
-                inner = _Scope(f"{scope.namespace}/{child.name}", _mapped(tree, child.attributes, scope))
-                yield from _follow(tree, inner, trees, kinds, wires, depth + 1)
-        elif child.tag in kinds:
-            yield from _connect(child, scope, kinds[child.tag], wires)
-            yield from _follow(child, scope, trees, kinds, wires, depth + 1)
-
-
-def _connect(element: Element, scope: _Scope, kind: Kind, wires: _Wires) -> Iterator[tuple[int, str]]:
-    for name, value in element.attributes.items():
-        attribute = kind.attributes.get(name)
-        if attribute is None or not value.startswith("{") or not attribute.takes_key:
-            continue  # literals are checked where they stand
-        source = scope.source(value)
-        what = f"{element.tag} {element.name!r}: {name}={value}"
-        if attribute.is_output and source.is_constant:
-            yield element.line, f"{what} is an output, but the key is a constant"
-        elif attribute.is_output:
-            wires.written.add(source.text)
+    def _wire(self, node: Node, what: str, attribute: Attribute, source: _Source) -> None:
+        wrong = None
+        if source.is_constant and attribute.is_output:
+            wrong = f"is an output, but {source.text!r} is given for the key; give it a {{key}}"
         elif source.is_constant:
-            if problem := attribute.problem(source.text):
-                yield element.line, f"{what} is {source.text!r} here, which {problem}"
+            problem = attribute.problem(source.text)
+            wrong = problem and f"is {source.text!r} here, which {problem}"
         elif not attribute.is_port:
-            yield element.line, f"{what} must be a constant, also through a subtree's keys"
-        elif attribute.required:
-            wires.readers.append((element.line, what, source.text))
+            wrong = "must be a constant, also through a subtree's keys; write a literal"
+        else:
+            type_ = str if isinstance(attribute.accepts, tuple) else attribute.accepts
+            seeded = attribute.is_output and attribute.default is not None
+            wire = Wire(what, node.element.line, source.text, type_, attribute.required, seeded)
+            (node.writes if attribute.is_output else node.reads).append(wire)
+        if wrong:
+            self.findings.append((node.element.line, f"{what} {wrong}"))
+
+
+def _mistyped(nodes: list[Node]) -> Iterator[tuple[int, str]]:
+    """A key that gets values of two types, or of a type that its reader does not take."""
+    first: dict[str, Wire] = {}
+    for wire in (wire for node in nodes for wire in node.writes if wire.type is not None):
+        other = first.setdefault(wire.path, wire)
+        if wire.type != other.type:
+            message = f"{wire.what} writes {_name(wire.type)}, but line {other.line} writes {_name(other.type)} to it"
+            yield wire.line, f"{message}; write one type, or use two keys"
+    for wire in (wire for node in nodes for wire in node.reads if wire.path in first):
+        written = first[wire.path]
+        if _never(written.type, wire.type):
+            message = f"{wire.what} reads {_name(wire.type)}, but line {written.line} writes {_name(written.type)}"
+            yield wire.line, f"{message} to it; wire ports of one type"
+
+
+def _never(written: Any, read: Any) -> bool:
+    """Whether no value of one type is of the other; False for what is no plain class."""
+    if not (isinstance(written, type) and isinstance(read, type)):
+        return False
+    return not issubclass(written, read) and not issubclass(read, written)
+
+
+def _name(type_: Any) -> str:
+    return type_.__name__ if isinstance(type_, type) else str(type_)

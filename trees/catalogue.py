@@ -1,0 +1,34 @@
+"""What a tree file may say, as text to read: every leaf and built-in element with its attributes."""
+
+from collections.abc import Iterator, Mapping
+
+from trees.vocabulary import BUILT_IN, Attribute, Kind, kinds
+
+_SUBTREE = Kind(
+    {"ID": Attribute(str, about="the BehaviorTree to put here; every other attribute sets a key of it")},
+    about="Another BehaviorTree of the file, with keys of its own.",
+)
+
+
+def words(leaves: Mapping[str, type]) -> dict[str, Kind]:
+    """Every element that a tree may hold: the leaves, then the built-in ones."""
+    known = kinds(leaves)
+    return {tag: known[tag] for tag in leaves} | BUILT_IN | {"SubTree": _SUBTREE}
+
+
+def describe(tag: str, kind: Kind, full: bool = False) -> Iterator[str]:
+    """Lines: the element with the first line of what it does (or all of it), then each attribute."""
+    about = kind.about.splitlines() or [""]
+    yield f"{tag:<18} {about[0]}".rstrip()
+    if full:
+        yield from (f"{'':<18} {line}".rstrip() for line in about[1:])
+        yield f"    {'returns':<14} {', '.join(sorted(status.value.lower() for status in kind.returns))}"
+    for name, attribute in kind.attributes.items():
+        yield f"    {name:<14} {_attribute(attribute)}"
+
+
+def _attribute(attribute: Attribute) -> str:
+    direction = "output" if attribute.is_output else "input" if attribute.is_port else "constant"
+    need = "" if attribute.is_output else "required" if attribute.default is None else f"default {attribute.default}"
+    about = f": {attribute.about}" if attribute.about else ""
+    return ", ".join(part for part in (direction, attribute.takes, need) if part) + about
