@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 STAMP := .venv/.installed
 
-.PHONY: setup run test lint bench
+.PHONY: setup run test lint bench fuzz
 .DEFAULT_GOAL := run
 
 setup: $(STAMP) ; @:
@@ -29,3 +29,6 @@ lint: setup
 
 bench: setup
 	$(BIN)/python -m app.bench
+
+fuzz: setup
+	$(BIN)/python tests/app/fuzz_readers.py --cases 2000

@@ -1,0 +1,136 @@
+"""`make fuzz`: hostile scenarios, cells and trees against their readers.
+
+A worker process reads one file after another; each reading must come to an end within `SECONDS` and `MEMORY`, in
+success or with findings of a line each, and write nothing.
+"""
+
+import argparse
+import os
+import random
+import re
+import resource
+import sys
+import tempfile
+from collections import Counter
+from collections.abc import Callable
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+from hostile_files import Case, cases
+
+from app.findings import Findings
+
+SECONDS = 5.0
+MEMORY = 2**30  # bytes more than the idle worker has
+FINDING = re.compile(r"[^\n]*:\d+: [^\n]*; [^\n]+")
+
+
+def read(case: Case, folder: Path) -> str:
+    """How reading the case went: "clean", "findings", or what is wrong with the reader."""
+    from app.scenario_file import check_tree_file, load_cell, load_scenario  # late: in the worker
+
+    path = folder / ("case.xml" if case.kind == "tree" else "case.yaml")
+    path.write_bytes(case.data)
+    try:
+        if case.kind == "scenario":
+            load_scenario(str(path))
+        elif case.kind == "cell":
+            load_cell(path)
+        else:
+            check_tree_file(path)
+    except Findings as findings:
+        odd = [str(f) for f in findings.items if not FINDING.fullmatch(str(f))]
+        return f"finding without a remedy: {odd[0][:300]}" if odd else "findings"
+    except MemoryError:
+        return "more memory than allowed"
+    except BaseException as error:
+        return f"{type(error).__name__}: {error}"[:300]
+    return "clean"
+
+
+def _work(pipe: Any, folder: str) -> None:
+    """Read what the pipe brings; tell how it went and what files were opened for writing meanwhile."""
+    os.chdir(folder)
+    for kind in ("scenario", "cell", "tree"):
+        read(Case(kind, b"", ""), Path(folder))  # all imports
+    written: list[str] = []
+
+    def audit(event: str, args: tuple[Any, ...]) -> None:
+        if event == "open" and isinstance(args[1], str) and set(args[1]) & set("wax+"):
+            written.append(str(args[0]))
+
+    sys.addaudithook(audit)
+    with open("/proc/self/statm", encoding="ascii") as statm:
+        used = int(statm.read().split()[0]) * resource.getpagesize()
+    resource.setrlimit(resource.RLIMIT_AS, (used + MEMORY, used + MEMORY))
+    pipe.send("ready")
+    while True:
+        case = pipe.recv()
+        written.clear()
+        verdict = read(case, Path(folder))
+        outside = [name for name in written if not name.startswith(folder)]
+        pipe.send(f"wrote {outside[0]}" if outside else verdict)
+
+
+def fuzz(count: int, seed: int, progress: Callable[[int], None] = lambda _done: None) -> tuple[Counter[str], list[str]]:
+    """Read `count` cases. How many went how, and a line for each that a reader did not stand."""
+    context = get_context("spawn")
+    tally: Counter[str] = Counter()
+    failures = []
+    worker: tuple[Any, Any] | None = None
+    with tempfile.TemporaryDirectory() as folder:
+        for number, case in enumerate(cases(count, seed)):
+            if worker is None:
+                ours, theirs = context.Pipe()
+                process = context.Process(target=_work, args=(theirs, folder), daemon=True)
+                process.start()
+                theirs.close()
+                worker = process, ours
+                assert ours.recv() == "ready"
+            process, ours = worker
+            ours.send(case)
+            try:
+                verdict = ours.recv() if ours.poll(SECONDS) else f"no end after {SECONDS:g} s"
+            except EOFError:
+                process.join()
+                verdict = f"the reader's process died with exit code {process.exitcode}"
+            if verdict.startswith(("no end", "the reader's")):
+                process.kill()
+                worker = None
+            tally[verdict if verdict in ("clean", "findings") else "failed"] += 1
+            if verdict not in ("clean", "findings"):
+                failures.append(f"{case.kind}, {case.made}: {verdict}")
+            progress(number + 1)
+        if worker is not None:
+            worker[0].kill()
+            worker[0].join()
+    return tally, failures
+
+
+def main() -> int:
+    """Command line; 0 when every reader stood every case."""
+    parser = argparse.ArgumentParser(description="Hostile scenarios, cells and trees against their readers.")
+    parser.add_argument("--cases", type=int, default=2000)
+    parser.add_argument(
+        "--seed", type=int, default=random.SystemRandom().randrange(10**6), help="default: another each time"
+    )
+    parser.add_argument("--keep", type=int, metavar="N", help="write case N's bytes to standard output and stop")
+    options = parser.parse_args()
+    if options.keep is not None:
+        sys.stdout.buffer.write(list(cases(options.keep + 1, options.seed))[options.keep].data)
+        return 0
+
+    def progress(done: int) -> None:
+        if done % 100 == 0:
+            print(f"{done} of {options.cases}", file=sys.stderr)
+
+    tally, failures = fuzz(options.cases, options.seed, progress)
+    for failure in failures:
+        print(failure)
+    print(f"seed {options.seed}: " + ", ".join(f"{count} {name}" for name, count in sorted(tally.items())))
+    return 1 if failures else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
