@@ -12,6 +12,7 @@ import py_trees
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from app.attempts import Attempts
 from app.scenario_file import load_scenario
 from app.table import print_table
 from app.tick_log import TickLog
@@ -30,7 +31,7 @@ def main() -> None:
     world = World(scenario.cell, "zero", 0)
     try:
         rows = {
-            "tick of 61 nodes with log / bare": ticks(),
+            "tick of 61 nodes with logs / bare": ticks(),
             "cable torques by numba / numpy and scipy": springs(scenario.cell.hidden.cable.links),
             f"848x480 picture by {world.renderer.name} / TinyRenderer": pictures(world),
             "colour and depth to pose / bare OpenCV calls": poses(world),
@@ -79,6 +80,7 @@ def ticks() -> tuple[Call, Call]:
 
     logged, bare = tree(), tree()
     logged.add_visitor(TickLog(logged.root, io.StringIO(), lambda: 0.0))
+    logged.add_visitor(Attempts(logged.root, [], lambda: 0.0))
     return logged.tick, bare.tick
 
 

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from app import output, scenario_commands, study_commands, tree_commands
+from app import output, record_commands, scenario_commands, study_commands, tree_commands
 from app.findings import Finding, Findings
 from app.options import MOST_SEED, Sets
 from app.progress import shown_progress
 from app.run_every import run_every
 from app.scenario_file import load_scenario
-from app.vary import DEFAULT
+from app.summary import summary
 
 if TYPE_CHECKING:
     from app.record import Result
@@ -45,6 +45,7 @@ app = typer.Typer(
 app.add_typer(tree_commands.app, name="trees")
 app.add_typer(scenario_commands.app, name="scenarios")
 app.add_typer(study_commands.app, name="study")
+record_commands.add_to(app)
 
 
 def _version(wanted: bool) -> None:
@@ -65,6 +66,7 @@ def _root(
       regrasp doctor                           is this machine ready?
       regrasp scenarios list                   what is there to run?
       regrasp run short_obstacle --video       run one, and film it
+      regrasp explain DIR                      why did it end so?
     """
 
 
@@ -146,37 +148,6 @@ def exit_code(result: "Result") -> int:
     if result.outcome == "interrupted":
         return EXIT_INTERRUPTED
     return 0 if result.succeeded else EXIT_UNMET
-
-
-def summary(result: "Result", folder: Path) -> str:
-    """What came out, for a person."""
-    met = sum(e.met for e in result.expectations)
-    ran = result.scenario if result.case == DEFAULT else f"{result.scenario} {result.case}"
-    lines = [f"{ran}, seed {result.seed}: {result.outcome}, {met} of {len(result.expectations)} expectations met"]
-    if result.cause:
-        at = f" ({result.cause.node})" if result.cause.node else ""
-        lines.append(f"  cause   {result.cause.code}: {result.cause.message}{at}")
-    yes, no = ("✓", "✗") if (sys.stdout.encoding or "").lower().startswith("utf") else ("ok", "NOT MET")
-    lines += [
-        f"  {yes if e.met else no} {e.name}: {_plain(e.value)} (asked: {_plain(e.limit)})" for e in result.expectations
-    ]
-    for slip in result.slips:
-        seen = (
-            f"noticed at {slip.detected_at:.2f} s by {slip.detected_by}"
-            if slip.detected_at is not None
-            else "not noticed"
-        )
-        lines.append(f"  slip    lost at {slip.released_at:.2f} s, {seen}")
-    lines.append(f"  record  {folder}")
-    lines.append(
-        f"  time    {result.sim_seconds:.1f} s simulated in {result.wall_seconds:.1f} s, "
-        f"real-time factor {result.real_time_factor:.2f}, renderer {result.renderer}"
-    )
-    return "\n".join(lines)
-
-
-def _plain(value: object) -> str:
-    return f"{value:.3g}" if isinstance(value, float) else str(value)
 
 
 @app.command()

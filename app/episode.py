@@ -1,6 +1,7 @@
 """One run: the world, the services, the tree, and the loop that ticks it."""
 
 import time
+import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,10 +11,13 @@ import numpy as np
 import py_trees
 from py_trees.common import Status
 
+from app.attempts import Attempts
+from app.belief import belief_state
 from app.draw import draw_faults, draw_obstacles
 from app.film import Film
 from app.judge import Judge
-from app.record import Outcome, Record, Result
+from app.record import Link, Outcome, Record, Result
+from app.rerun import copies
 from app.scenario_file import Scenario
 from app.tick_log import TickLog, active_leaf, running_leaf
 from behaviors import LEAVES
@@ -24,7 +28,7 @@ from perception.service import Perception
 from sim.ground_truth import GroundTruth
 from sim.renderer import RendererName
 from sim.world import World
-from trees import load_tree, node_paths
+from trees import in_tree_order, load_tree, node_paths
 
 TICK = 0.05  # simulated seconds
 Progress = Callable[[float, str], None]
@@ -38,6 +42,17 @@ class Episode:
     services: Services
     tree: py_trees.trees.BehaviourTree
     judge: Judge
+    attempts: Attempts
+
+
+@dataclass
+class Ending:
+    """How a run ended, and what decided it."""
+
+    outcome: Outcome
+    cause: Cause | None = None
+    chain: tuple[Link, ...] | None = None
+    traceback: str | None = None
 
 
 def run_episode(
@@ -53,11 +68,11 @@ def run_episode(
     """Run a scenario to its end and leave its record in the folder `out` (None: nowhere).
 
     `progress` is called at every tick with the simulated second and the active leaf; a KeyboardInterrupt from it ends
-    the run cleanly. An exception inside a leaf ends it with the cause `internal_error` and its traceback in
-    events.jsonl.
+    the run cleanly. An exception inside a leaf ends it with the cause `internal_error` and its traceback
+    in the record.
     """
     began = time.perf_counter()
-    with Record(out, scenario.name, seed, scenario.case) as record:
+    with Record(out, scenario.name, seed, scenario.case, copies(scenario, seed)) as record:
         world = _world(scenario, seed, renderer, gui)
         try:
             log = record.logger(world.now)
@@ -77,12 +92,14 @@ def run_episode(
             )
             episode = _assemble(scenario, world, seed, log)
             ticks = TickLog(episode.tree.root, record.ticks, world.now)
-            episode.tree.visitors.append(ticks)
+            episode.tree.visitors += [ticks, episode.attempts]
             with Film(out / "video.mp4" if video and out else None, world) as film:
-                outcome, cause = _loop(episode, scenario, film, progress, log)
+                ending = _run(episode, scenario, film, progress, log)
             ticks.finalise()
-            result = _result(episode, scenario, seed, outcome, cause, time.perf_counter() - began)
-            log.info("end", outcome=outcome, succeeded=result.succeeded, contact_peaks=world.contact_peaks)
+            episode.attempts.finalise()
+            result = _result(episode, scenario, seed, ending, time.perf_counter() - began)
+            peaks = {pair: round(force, 2) for pair, force in world.contact_peaks.items()}  # N
+            log.info("end", outcome=ending.outcome, succeeded=result.succeeded, contact_peaks=peaks)
             record.finish(result)
         finally:
             world.close()
@@ -104,77 +121,116 @@ def _assemble(scenario: Scenario, world: World, seed: int, log: Any) -> Episode:
     services = Services(known, world, motion, perception, log)
     py_trees.blackboard.Blackboard.clear()
     tree = py_trees.trees.BehaviourTree(load_tree(scenario.tree, LEAVES, scenario.inputs))
-    tree.setup(services=services)
-    return Episode(world, services, tree, Judge(GroundTruth(world), scenario.file.expect))
+    attempts = Attempts(tree.root, services.belief.causes, world.now)
+    return Episode(world, services, tree, Judge(GroundTruth(world), scenario.file.expect), attempts)
 
 
-def _loop(
-    episode: Episode, scenario: Scenario, film: Film, progress: Progress | None, log: Any
-) -> tuple[Outcome, Cause | None]:
+def _run(episode: Episode, scenario: Scenario, film: Film, progress: Progress | None, log: Any) -> Ending:
     """Tick until the tree ends, the time is over or somebody interrupts; the arms are stopped in the end."""
-    world, root = episode.world, episode.tree.root
-    belief = episode.services.belief
+    root = episode.tree.root
     try:
-        while world.now() < scenario.file.limits.sim_seconds:
-            episode.tree.tick()
-            episode.judge.observe(world.now(), belief)
-            leaf = active_leaf(root)
-            film.show(leaf)
-            if progress:
-                progress(world.now(), leaf)
-            if root.status is Status.SUCCESS:
-                return "stowed", None
-            if root.status is Status.FAILURE:
-                return "safe_stop", belief.causes[-1] if belief.causes else None
-            world.advance(TICK)
-        limit = scenario.file.limits.sim_seconds
-        return "time_limit", Cause(CauseCode.TIME_LIMIT, f"not done after {limit:g} simulated seconds", _running(root))
+        ending = _loop(episode, scenario, film, progress)
     except KeyboardInterrupt:
-        return "interrupted", Cause(CauseCode.INTERRUPTED, "stopped from outside", _running(root))
+        cause = Cause(CauseCode.INTERRUPTED, "stopped from outside", _path(running_leaf(root), root))
+        ending = Ending("interrupted", cause, _unfinished(episode))
     except Exception as error:
-        node = _raising(error, root)
-        log.exception("exception in a leaf", node=node)
-        return "internal_error", Cause(CauseCode.INTERNAL_ERROR, f"{type(error).__name__}: {error}", node)
+        ending = _broken(episode, error, log)
+    try:
+        _stop(root)
+    except Exception as error:
+        ending = ending if ending.outcome == "internal_error" else _broken(episode, error, log)
     finally:
-        if root.status is Status.RUNNING:
-            root.stop(Status.INVALID)
         episode.services.motion.stop()
-        world.advance(0.3)
+        episode.world.advance(0.3)
+    return ending
 
 
-def _running(root: py_trees.behaviour.Behaviour) -> str:
-    """Tree path of the active leaf, '' when none is."""
-    leaf = running_leaf(root)
-    return "" if leaf is None else node_paths(root)[leaf.id]
+def _loop(episode: Episode, scenario: Scenario, film: Film, progress: Progress | None) -> Ending:
+    world, root, attempts = episode.world, episode.tree.root, episode.attempts
+    belief, limit = episode.services.belief, scenario.file.limits.sim_seconds
+    episode.tree.setup(services=episode.services)
+    while world.now() < limit:
+        episode.tree.tick()
+        episode.judge.observe(world.now(), belief)
+        leaf = active_leaf(root)
+        film.show(leaf)
+        if progress:
+            progress(world.now(), leaf)
+        if root.status is Status.SUCCESS:
+            return Ending("stowed")
+        if root.status is Status.FAILURE:
+            cause = attempts.cause() or (belief.causes[-1] if belief.causes else None)
+            return Ending("safe_stop", cause, attempts.failed_chain())
+        world.advance(TICK)
+    message = f"not done after {limit:g} simulated seconds"
+    cause = Cause(CauseCode.TIME_LIMIT, message, _path(running_leaf(root), root))
+    return Ending("time_limit", cause, _unfinished(episode))
 
 
-def _raising(error: BaseException, root: py_trees.behaviour.Behaviour) -> str:
-    """Tree path of the innermost node that an exception came through."""
-    path, trace = "", error.__traceback__
+def _unfinished(episode: Episode) -> tuple[Link, ...] | None:
+    """The chain down to the leaf that the run's end cut short."""
+    return episode.attempts.chain_to(running_leaf(episode.tree.root), "was running", "was still running")
+
+
+def _broken(episode: Episode, error: Exception, log: Any) -> Ending:
+    """The ending that an exception makes, most likely a leaf's."""
+    node = _raising(error, episode.tree.root)
+    cause = Cause(CauseCode.INTERNAL_ERROR, f"{type(error).__name__}: {error}", _path(node, episode.tree.root))
+    log.error("exception in a leaf", node=cause.node, exc_info=error)
+    chain = episode.attempts.chain_to(node, "raised", f"raised {cause.message}")
+    if node is not None and not node.children:
+        episode.attempts.raised(node, cause)
+    return Ending("internal_error", cause, chain, "".join(traceback.format_exception(error)))
+
+
+def _stop(root: py_trees.behaviour.Behaviour) -> None:
+    """Stop all that runs, also beside a leaf whose terminate raises; then raises what the first of these raised."""
+    first: Exception | None = None
+    for node in in_tree_order(root):
+        while node.status is Status.RUNNING:
+            try:
+                node.stop(Status.INVALID)
+            except Exception as error:
+                first = first or error
+                raiser = _raising(error, node)
+                (raiser if raiser and raiser.status is not Status.INVALID else node).status = Status.INVALID
+    if first is not None:
+        raise first
+
+
+def _path(node: py_trees.behaviour.Behaviour | None, root: py_trees.behaviour.Behaviour) -> str:
+    """Tree path of a node, '' of None."""
+    return "" if node is None else node_paths(root)[node.id]
+
+
+def _raising(error: BaseException, root: py_trees.behaviour.Behaviour) -> py_trees.behaviour.Behaviour | None:
+    """The innermost node of the tree that an exception came through."""
+    nodes = {id(node): node for node in in_tree_order(root)}
+    found, trace = None, error.__traceback__
     while trace is not None:
-        node = trace.tb_frame.f_locals.get("self")
-        if isinstance(node, py_trees.behaviour.Behaviour):
-            path = node_paths(root).get(node.id, path)
+        found = nodes.get(id(trace.tb_frame.f_locals.get("self")), found)
         trace = trace.tb_next
-    return path
+    return found
 
 
-def _result(
-    episode: Episode, scenario: Scenario, seed: int, outcome: Outcome, cause: Cause | None, wall: float
-) -> Result:
+def _result(episode: Episode, scenario: Scenario, seed: int, ending: Ending, wall: float) -> Result:
     judge, belief = episode.judge, episode.services.belief
-    expectations = judge.expectations(outcome, cause.code if cause else None, belief)
+    expectations = judge.expectations(ending.outcome, ending.cause.code if ending.cause else None, belief)
     return Result(
         scenario.name,
         seed,
-        outcome,
+        ending.outcome,
         succeeded=all(e.met for e in expectations),
         case=scenario.case,
-        cause=cause,
+        cause=ending.cause,
+        chain=ending.chain,
+        traceback=ending.traceback,
         expectations=expectations,
         slips=judge.slips(belief),
         sim_seconds=episode.world.now(),
         wall_seconds=wall,
         real_time_factor=episode.world.now() / wall,
         renderer=episode.world.renderer.name,
+        belief=belief_state(episode.services),
+        attempts=tuple(episode.attempts.made),
     )

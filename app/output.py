@@ -9,6 +9,8 @@ from pathlib import Path
 
 from app.findings import Finding, shown
 
+FILES = ("result.json", "events.jsonl", "ticks.jsonl", "scenario.yaml", "cell.yaml", "tree.xml")  # of a run's folder
+
 
 def free_folder(scenario: str, which: int | str) -> Path:
     """The first of runs/SCENARIO-WHICH-1, -2, ... that does not exist; WHICH is a seed, or "all"."""
@@ -21,10 +23,15 @@ def folder_name(case: str) -> str:
     return plain if plain == case else f"{plain}-{hashlib.sha256(case.encode()).hexdigest()[:8]}"
 
 
+def taken(out: Path) -> list[str]:
+    """The files in `out` that a run would overwrite."""
+    return [name for name in FILES if os.path.lexists(out / name)]
+
+
 def findings(out: Path) -> list[Finding]:
     """Why no run can be written to `out`; nothing is left behind by the look."""
-    if any(os.path.exists(out / name) for name in ("result.json", "events.jsonl", "ticks.jsonl")):
-        return [Finding(shown(out), 1, "already holds a run; name another folder")]
+    if there := taken(out):
+        return [Finding(shown(out), 1, f"already holds {', '.join(there)}; name another folder for the run")]
     if out == Path():
         return [Finding("--out", 1, "names this very folder; name one of its own for the run")]
     return unwritable(out)

@@ -1,4 +1,4 @@
-"""A run's record: result.json, events.jsonl and ticks.jsonl in one folder."""
+"""A run's record: a folder of result.json, events.jsonl, ticks.jsonl and what was run; see app/RECORD.md."""
 
 import dataclasses
 import io
@@ -7,7 +7,8 @@ import logging
 import math
 import os
 import platform
-from collections.abc import Callable, MutableMapping
+import traceback
+from collections.abc import Callable, Mapping, MutableMapping
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from types import TracebackType
@@ -15,9 +16,12 @@ from typing import Any, Literal, Self, TextIO
 
 import structlog
 
+from app import output
 from interfaces.cause import Cause, CauseCode
 
 Outcome = Literal["stowed", "safe_stop", "time_limit", "interrupted", "internal_error"]
+NodeStatus = Literal["RUNNING", "SUCCESS", "FAILURE", "INVALID"]
+SCHEMA = 1  # of result.json; fields may be added to it, none changes its meaning
 
 _PACKAGES = (
     "regrasp",
@@ -66,16 +70,80 @@ class Slip:
 
 
 @dataclasses.dataclass(frozen=True)
+class Attempt:
+    """One execution of a leaf, in simulated seconds; INVALID: it was stopped. What ended alike tick by tick is one."""
+
+    path: str
+    started: float
+    ended: float
+    status: NodeStatus
+    cause: Cause | None = None
+    times: int = 1
+
+
+@dataclasses.dataclass(frozen=True)
+class Link:
+    """One node of the chain from the root down to the leaf that decided the outcome: what became of it, and when."""
+
+    path: str
+    type: str
+    at: float
+    why: str
+
+
+@dataclasses.dataclass(frozen=True)
+class Pose:
+    """Metres, and x, y, z, w."""
+
+    position: tuple[float, float, float]
+    quaternion: tuple[float, float, float, float]
+
+
+@dataclasses.dataclass(frozen=True)
+class Sighting:
+    """Where (m, world) and when (simulated s) a camera saw the connector."""
+
+    at: float
+    camera: str
+    position: tuple[float, float, float]
+
+
+@dataclasses.dataclass(frozen=True)
+class ArmState:
+    """Joints (rad) as read, and world_from_tool by them."""
+
+    joints: tuple[float, ...]
+    tool: Pose
+
+
+@dataclasses.dataclass(frozen=True)
+class BeliefState:
+    """The world as the robot knew it at the end; no ground truth."""
+
+    held: Pose | None  # tool_from_connector of the right hand
+    connector: Pose | None  # world_from_connector as last found for a grasp
+    sure: bool  # whether the whole of it was seen there
+    found_by: str | None
+    last_seen: Sighting | None
+    arms: dict[str, ArmState]
+    occupied_voxels: int  # of the obstacles that it mapped
+    vain_searches: int  # since the connector was found last
+    notices: tuple[tuple[float, str], ...]  # losses that it noticed: when (simulated s), by which test
+
+
+@dataclasses.dataclass(frozen=True)
 class Result:
     """What came out of a run; the fields of result.json in their order. Seconds and ratios are plain floats."""
 
-    schema: int = dataclasses.field(default=1, init=False)
+    schema: int = dataclasses.field(default=SCHEMA, init=False)
     scenario: str
     seed: int
     outcome: Outcome
     succeeded: bool
     case: str = "default"  # of the scenario's, where some of its values vary
     cause: Cause | None = None
+    chain: tuple[Link, ...] | None = None  # None where the run ended stowed, or in no node
+    traceback: str | None = None  # of an internal_error
     expectations: tuple[Expectation, ...] = ()
     slips: tuple[Slip, ...] = ()
     sim_seconds: float = 0.0
@@ -83,6 +151,8 @@ class Result:
     real_time_factor: float = 0.0
     renderer: str = ""
     versions: dict[str, str] = dataclasses.field(default_factory=versions)
+    belief: BeliefState | None = None
+    attempts: tuple[Attempt, ...] = ()
 
     def to_json(self) -> str:
         """The text of result.json; numbers that JSON has no word for (inf, nan) become null."""
@@ -123,8 +193,15 @@ class Record:
     to `finish`, or, where the run did not come so far, one that tells of the interrupt or the error.
     """
 
-    def __init__(self, folder: Path | None, scenario: str, seed: int, case: str = "default") -> None:
-        """Create the folder.
+    def __init__(
+        self,
+        folder: Path | None,
+        scenario: str,
+        seed: int,
+        case: str = "default",
+        copies: Mapping[str, str] | None = None,
+    ) -> None:
+        """Create the folder, with `copies` (name to text) of what is run.
 
         Raises:
             FileExistsError: it holds a run already.
@@ -139,10 +216,12 @@ class Record:
         self.ticks: TextIO = io.StringIO()
         if folder is not None:
             folder.mkdir(parents=True, exist_ok=True)
-            if taken := [name for name in ("result.json", "events.jsonl", "ticks.jsonl") if (folder / name).exists()]:
+            if taken := output.taken(folder):
                 raise FileExistsError(f"{folder} holds a run already ({', '.join(taken)})")
             self.events = (folder / "events.jsonl").open("x", encoding="utf-8", newline="\n")
             self.ticks = (folder / "ticks.jsonl").open("x", encoding="utf-8", newline="\n")
+            for name, text in (copies or {}).items():
+                (folder / name).write_text(text, encoding="utf-8", newline="\n")
 
     def logger(self, now: Callable[[], float]) -> Any:
         """A structlog logger into events.jsonl; each line begins with `t`, the simulated second by `now`."""
@@ -182,4 +261,13 @@ class Record:
             return Result(self._scenario, self._seed, "interrupted", succeeded=False, case=self._case, cause=cause)
         message = f"{type(error).__name__}: {error}" if error else "the run ended without a result"
         cause = Cause(CauseCode.INTERNAL_ERROR, message)
-        return Result(self._scenario, self._seed, "internal_error", succeeded=False, case=self._case, cause=cause)
+        trace = "".join(traceback.format_exception(error)) if error else None
+        return Result(
+            self._scenario,
+            self._seed,
+            "internal_error",
+            succeeded=False,
+            case=self._case,
+            cause=cause,
+            traceback=trace,
+        )

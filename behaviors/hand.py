@@ -1,14 +1,11 @@
 """Small steps of the right hand that several states share."""
 
-from collections.abc import Generator
-
 import numpy as np
 from scipy.spatial.transform import RigidTransform
 
 from behaviors.leaf import Failed, Steps, StepsLeaf
 from interfaces.cause import CauseCode
 from motion.failure import PlanningError
-from motion.task import Task
 from perception.slip import GapTest
 
 HAND = "right"  # the thesis's fixed roles: the right arm handles the cable ...
@@ -37,21 +34,17 @@ class HandLeaf(StepsLeaf):
         services.belief.held = services.motion.tool(HAND).inv() * world_from_connector
         self.say("grasped", gap=evidence.value)
 
-    def attempt(self, task: Task) -> Generator[Task | None, None, bool]:
-        """Do a motion if it can be done; False (and a line in the log) when not."""
-        try:
-            yield from self.follow(task)
-        except PlanningError as error:
-            self.say("left out", why=str(error))
-            return False
-        return True
-
     def draw_back(self) -> Steps:
-        """Draw the hand straight back as far as may be."""
+        """Draw the hand straight back as far as may be; left out (and said once) where no distance is free."""
         motion = self.services.motion
+        why = ""
         for distance in BACK:
-            if (yield from self.attempt(motion.shift(HAND, motion.tool(HAND).rotation.apply([-distance, 0.0, 0.0])))):
-                break
+            try:
+                yield from self.follow(motion.shift(HAND, motion.tool(HAND).rotation.apply([-distance, 0.0, 0.0])))
+                return
+            except PlanningError as error:
+                why = str(error)
+        self.say("left out", why=why)
 
     def go_to_sleep(self, arm: str) -> Steps:
         """Bring an arm to its sleep pose, out of the cameras' and the other arm's way."""

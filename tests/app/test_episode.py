@@ -6,11 +6,14 @@ from typing import Any, ClassVar
 import numpy as np
 import py_trees
 import pytest
+from py_trees.common import Status
 
 from app.episode import run_episode
+from app.explain import explanation
 from app.record import Result
+from app.record_reader import read_record
 from app.scenario_file import Scenario, load_scenario
-from behaviors.leaf import Failed, Steps, StepsLeaf
+from behaviors.leaf import Failed, Leaf, Steps, StepsLeaf
 from interfaces.cause import CauseCode
 from sim.world import World
 
@@ -37,6 +40,32 @@ class Breaks(StepsLeaf):
         raise ZeroDivisionError("no joint that long")
 
 
+class BreaksAtOnce(Leaf):
+    """Raises in the method that `WHERE` names."""
+
+    INPUT_PORTS: ClassVar[dict[str, Any]] = {}
+    OUTPUT_PORTS: ClassVar[dict[str, Any]] = {}
+    WHERE: ClassVar[str] = "update"
+
+    def _may_raise(self, where: str) -> None:
+        if where == self.WHERE:
+            raise ZeroDivisionError(f"no joint that long in {where}")
+
+    def setup(self, **kwargs: Any) -> None:
+        super().setup(**kwargs)
+        self._may_raise("setup")
+
+    def initialise(self) -> None:
+        self._may_raise("initialise")
+
+    def update(self) -> Status:
+        self._may_raise("update")
+        return Status.RUNNING
+
+    def terminate(self, new_status: Status) -> None:
+        self._may_raise("terminate")
+
+
 class GivesUp(StepsLeaf):
     """Fails with a cause after half a second."""
 
@@ -53,7 +82,7 @@ class Done(StepsLeaf):
 
 
 SWINGS = (("left", 0.4), ("right", -0.4))
-LEAVES = {leaf.__name__: leaf for leaf in (Swing, Breaks, GivesUp, Done)}
+LEAVES = {leaf.__name__: leaf for leaf in (Swing, Breaks, BreaksAtOnce, GivesUp, Done)}
 BOTH = '<Parallel name="both" policy="success_on_one"><Swing name="swing"/>{}</Parallel>'
 
 
@@ -143,6 +172,38 @@ def test_an_error_in_a_leaf_is_told_with_its_node_and_traceback(tmp_path: Path, 
     assert at_rest(ends)
 
 
+@pytest.mark.parametrize("where", ["setup", "initialise", "update", "terminate"])
+def test_wherever_a_leaf_raises_the_arms_rest_and_the_record_says_so(
+    tmp_path: Path, ends: list[tuple[bool, float]], monkeypatch: pytest.MonkeyPatch, where: str
+) -> None:
+    monkeypatch.setattr(BreaksAtOnce, "WHERE", where)
+    made = scenario(tmp_path, BOTH.format('<BreaksAtOnce name="breaks"/>'), "limits.sim_seconds=0.5")
+    result = run_episode(made, tmp_path / "run", seed=0)
+    read = json.loads((tmp_path / "run/result.json").read_text())
+    assert (result.outcome, read["cause"]["node"]) == ("internal_error", "both/breaks")
+    assert f"in {where}" in read["traceback"]
+    assert [(link["path"], link["type"]) for link in read["chain"]] == [
+        ("both", "Parallel"),
+        ("both/breaks", "BreaksAtOnce"),
+    ]
+    assert read["chain"][1]["why"] == f"raised ZeroDivisionError: no joint that long in {where}"
+    assert read["attempts"][-1]["path"] == "both/breaks"
+    assert read["attempts"][-1]["cause"]["code"] == "internal_error"
+    assert "RUNNING" not in {line["path"]: line["status"] for line in records(tmp_path / "run", "ticks.jsonl")}.values()
+    assert at_rest(ends)
+
+
+def test_the_record_holds_what_it_takes_to_run_the_same_again(tmp_path: Path) -> None:
+    body, change = '<GivesUp name="reach"/>', "cell.hidden.errors.arm_tool=0.0"
+    made = scenario(tmp_path, body, "limits.sim_seconds=0.8", change, "gravity=earth")
+    run_episode(made, tmp_path / "run", seed=4)
+    again = load_scenario(str(tmp_path / "run/scenario.yaml"))
+    assert again.cell == made.cell
+    assert again.file == made.file.model_copy(update={"cell": "cell.yaml", "tree": "tree.xml", "seed": 4})
+    run_episode(again, tmp_path / "again", seed=4)
+    assert (tmp_path / "again/ticks.jsonl").read_bytes() == (tmp_path / "run/ticks.jsonl").read_bytes()
+
+
 def test_ctrl_c_between_two_ticks_leaves_a_whole_record(tmp_path: Path, ends: list[tuple[bool, float]]) -> None:
     shown = []
 
@@ -168,6 +229,21 @@ def test_a_failed_tree_ends_in_a_safe_stop_with_the_cause_of_its_leaf(tmp_path: 
     assert read["cause"]["code"] == "out_of_reach"
     assert "0.82 m" in read["cause"]["message"]
     assert read["cause"]["node"].endswith("reach")
+
+
+def test_what_a_fallback_caught_is_in_the_record_of_a_run(tmp_path: Path) -> None:
+    body = '<Fallback name="either" memory="true"><GivesUp name="reach"/><Done name="done"/></Fallback>'
+    run_episode(scenario(tmp_path, body, "limits.sim_seconds=2.0"), tmp_path / "run", seed=0)
+    record = read_record(tmp_path / "run")
+    assert record.result is not None
+    assert record.result.belief is not None
+    assert [(a.path, a.status, a.cause and a.cause.code) for a in record.result.attempts] == [
+        ("either/reach", "FAILURE", CauseCode.OUT_OF_REACH),
+        ("either/done", "SUCCESS", None),
+    ]
+    page = " ".join(explanation(record, 80).split())
+    assert "out_of_reach: connector 0.82 m from the right arm, reach 0.75 m" in page
+    assert "the right hand holds nothing" in page
 
 
 def test_a_tree_that_says_stowed_is_not_believed(tmp_path: Path) -> None:

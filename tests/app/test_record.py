@@ -1,16 +1,35 @@
+import dataclasses
 import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from app.record import Expectation, Record, Result, Slip
+from app.record import (
+    ArmState,
+    Attempt,
+    BeliefState,
+    Expectation,
+    Link,
+    Pose,
+    Record,
+    Result,
+    Sighting,
+    Slip,
+)
 from interfaces.cause import Cause, CauseCode
 
 FIELDS = [
-    *("schema", "scenario", "seed", "outcome", "succeeded", "case", "cause", "expectations", "slips"),
-    *("sim_seconds", "wall_seconds", "real_time_factor", "renderer", "versions"),
+    *("schema", "scenario", "seed", "outcome", "succeeded", "case", "cause", "chain", "traceback", "expectations"),
+    *("slips", "sim_seconds", "wall_seconds", "real_time_factor", "renderer", "versions", "belief", "attempts"),
 ]
+
+
+def test_the_documentation_names_every_field() -> None:
+    told = (Path(__file__).parents[2] / "app" / "RECORD.md").read_text()
+    kinds = (Result, Cause, Link, Expectation, Slip, BeliefState, Pose, Sighting, ArmState, Attempt)
+    fields = [field.name for kind in kinds for field in dataclasses.fields(kind)]
+    assert [name for name in fields if f"`{name}`" not in told] == []
 
 
 def a_result() -> Result:
@@ -75,6 +94,7 @@ def test_a_run_cut_short_leaves_a_whole_record(tmp_path: Path, error: BaseExcept
     read = json.loads((tmp_path / "run" / "result.json").read_text())
     assert (read["outcome"], read["scenario"], read["seed"], read["succeeded"]) == (outcome, "tall_obstacle", 7, False)
     assert str(error) in read["cause"]["message"]
+    assert (outcome == "internal_error") == ("Traceback" in str(read["traceback"]))
     assert (tmp_path / "run" / "ticks.jsonl").read_text() == '{"t": 0.0}\n'
     assert record.ticks.closed
     assert record.events.closed
@@ -89,7 +109,12 @@ def test_a_result_given_before_the_interrupt_is_kept(tmp_path: Path) -> None:
     assert json.loads((tmp_path / "result.json").read_text())["outcome"] == "safe_stop"
 
 
-@pytest.mark.parametrize("name", ["result.json", "events.jsonl", "ticks.jsonl"])
+def test_copies_of_what_is_run_are_there_from_the_beginning(tmp_path: Path) -> None:
+    Record(tmp_path, "s", 1, copies={"tree.xml": "<root/>"}).ticks.close()
+    assert (tmp_path / "tree.xml").read_text() == "<root/>"
+
+
+@pytest.mark.parametrize("name", ["result.json", "events.jsonl", "ticks.jsonl", "tree.xml"])
 def test_a_folder_that_holds_a_run_is_refused_and_left_alone(tmp_path: Path, name: str) -> None:
     (tmp_path / name).write_text("mine")
     with pytest.raises(FileExistsError, match=name):

@@ -85,3 +85,12 @@ def test_a_leaf_stopped_midway_stops_its_arm_and_one_that_ended_does_not(stage: 
     assert stage.run(tree, 5.0) is Status.SUCCESS  # begins anew
     tree.root.stop(Status.INVALID)
     assert stage.motion.cancelled == ["right"]
+
+
+def test_a_way_back_that_is_nowhere_free_is_left_out_and_said_once(stage: Stage) -> None:
+    stage.motion.error = PlanningError(CauseCode.MOTION_BLOCKED, "0.03 m straight on the arm is 5 mm in back_panel")
+    tree = stage.tree(ROOM)
+    while stage.motion.moves == [] and stage.clock.t < 10.0:
+        stage.run(tree, 0.05)
+    assert len(stage.motion.shifts) == 6
+    assert [line["why"] for line in stage.log.of("left out")] == ["0.03 m straight on the arm is 5 mm in back_panel"]

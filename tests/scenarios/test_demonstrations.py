@@ -10,14 +10,15 @@ import numpy as np
 import pytest
 
 from app.episode import run_episode
+from app.output import FILES
 from app.record import Result
 from app.scenario_file import load_scenario
 from sim.world import World
 
 REST_SPEED = 0.05  # rad/s: a joint that holds against a swinging cable
 FIELDS = [
-    *("schema", "scenario", "seed", "outcome", "succeeded", "case", "cause", "expectations", "slips"),
-    *("sim_seconds", "wall_seconds", "real_time_factor", "renderer", "versions"),
+    *("schema", "scenario", "seed", "outcome", "succeeded", "case", "cause", "chain", "traceback", "expectations"),
+    *("slips", "sim_seconds", "wall_seconds", "real_time_factor", "renderer", "versions", "belief", "attempts"),
 ]
 STATES = {"unplug", "monitor", "detect_slip", "carry", "insert", "check_cameras", "regrasp", "stow", "let_go"}
 EXPECTED = {"outcome", "slips", "unintended_force"}
@@ -45,6 +46,8 @@ def check_result(folder: Path, scenario: str, expected: set[str]) -> None:
     assert (read["outcome"], read["succeeded"], read["cause"]) == ("stowed", True, None)
     assert {e["name"] for e in read["expectations"]} == expected
     assert all(set(e) == {"name", "met", "value", "limit"} and e["met"] is True for e in read["expectations"])
+    assert read["chain"] is None
+    assert {own_name(attempt) for attempt in read["attempts"]} >= {"unplug", "detect_slip", "regrasp", "let_go"}
     assert read["slips"]
     for slip in read["slips"]:
         assert set(slip) == {"released_at", "detected_at", "detected_by"}
@@ -86,7 +89,7 @@ def test_a_demonstration_comes_out(
     assert result.succeeded, told(tmp_path / "run", result)
     check_result(tmp_path / "run", scenario, expected)
     check_ticks(tmp_path / "run", states)
-    assert sorted(p.name for p in (tmp_path / "run").iterdir()) == ["events.jsonl", "result.json", "ticks.jsonl"]
+    assert {p.name for p in (tmp_path / "run").iterdir()} == set(FILES)
 
 
 def test_two_processes_with_one_seed_write_the_same_bytes(tmp_path: Path) -> None:

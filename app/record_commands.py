@@ -1,0 +1,120 @@
+"""`regrasp explain`, `replay` and `diff`: look at the records that runs left."""
+
+import json
+import shutil
+import sys
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from app.findings import Finding, Findings, printable
+
+if TYPE_CHECKING:
+    from app.record_reader import RunRecord
+
+EXIT_DIFFERENT = 1
+WIDTHS = (80, 120)  # columns of a page
+Folder = Annotated[Path, typer.Argument(metavar="DIR", help="A run's folder.")]
+
+
+def add_to(app: typer.Typer) -> None:
+    """Mount the commands."""
+    app.command()(explain)
+    app.command()(replay)
+    app.command()(diff)
+
+
+def explain(
+    folder: Folder, as_json: Annotated[bool, typer.Option("--json", help="Print it as JSON, for a program.")] = False
+) -> None:
+    """Say what a run tried, when, how each attempt ended, why the run ended so, and what the robot knew.
+
+    \b
+    Example:
+      regrasp explain runs/short_obstacle-0-1
+    """
+    record = _read(folder)
+    if as_json:
+        typer.echo(_json(record))
+        return
+    from app.explain import explanation
+
+    width = min(max(shutil.get_terminal_size((100, 24)).columns, WIDTHS[0]), WIDTHS[1])
+    typer.echo(explanation(record, width), nl=False)
+
+
+def replay(
+    folder: Folder,
+    begin: Annotated[float | None, typer.Option("--from", metavar="SECONDS", help="Begin here.")] = None,
+    end: Annotated[float | None, typer.Option("--to", metavar="SECONDS", help="In a pipe, end here.")] = None,
+    part: Annotated[str, typer.Option("--filter", metavar="TEXT", help="Only nodes with this in their path.")] = "",
+) -> None:
+    """Step through a run's ticks on the terminal: the tree, what changed, what happened. In a pipe, print them.
+
+    \b
+    Keys: right/left step, PgDn/PgUp ten ticks, Home/End, n next failure, g go to a time, / filter, q quit.
+    \b
+    Examples:
+      regrasp replay runs/short_obstacle-0-1
+      regrasp replay runs/short_obstacle-0-1 --from 8 --to 12 --filter delivery | less
+    """
+    from app.replay import Replay
+
+    run = Replay(_read(folder))
+    if sys.stdin.isatty() and sys.stdout.isatty():
+        from app.replay_screen import show
+
+        show(run, part, begin or 0.0)
+        return
+    for line in run.lines(begin or 0.0, float("inf") if end is None else end, part):
+        typer.echo(line)
+
+
+def diff(folder: Folder, other: Annotated[Path, typer.Argument(metavar="DIR", help="Another run's folder.")]) -> None:
+    """Say where two runs part: their scenario, seed, versions and outcome, the first tick and the first event.
+
+    \b
+    Example:
+      regrasp diff runs/short_obstacle-0-1 runs/short_obstacle-0-2
+    \b
+    Exit code: 0 the same, 1 different, 2 bad input.
+    """
+    from app.record_diff import differences
+
+    lines = differences(*_read_both(folder, other))
+    if not lines:
+        typer.echo("the same")
+        return
+    typer.echo(f"{printable(str(folder))} | {printable(str(other))}")
+    typer.echo("\n".join(lines))
+    raise typer.Exit(EXIT_DIFFERENT)
+
+
+def _read(folder: Path) -> "RunRecord":
+    from app.record_reader import read_record  # late, like all that only these commands need
+
+    return read_record(folder)
+
+
+def _read_both(*folders: Path) -> "list[RunRecord]":
+    """The records, or the findings of all of them."""
+    found: list[Finding] = []
+    records: list[RunRecord] = []
+    for folder in folders:
+        try:
+            records.append(_read(folder))
+        except Findings as error:
+            found += error.items
+    if found:
+        raise Findings(found)
+    return records
+
+
+def _json(record: "RunRecord") -> str:
+    from app.record import plain
+
+    result = asdict(record.result) if record.result else None
+    value = {"run": record.begin, "result": result, "remarks": record.remarks}
+    return json.dumps(plain(value), indent=2, allow_nan=False)

@@ -1,0 +1,157 @@
+import json
+from pathlib import Path
+
+import pytest
+from toy_record import kill, write_record
+from typer.testing import CliRunner
+
+from app.cli import app
+from app.explain import explanation
+from app.record import Attempt
+from app.record_reader import Event, read_record
+from app.timeline import timeline
+from interfaces.cause import Cause, CauseCode
+
+
+def page(folder: Path, width: int = 100) -> str:
+    return explanation(read_record(folder), width)
+
+
+def test_the_page_of_a_run_that_stopped_safely(tmp_path: Path) -> None:
+    assert page(write_record(tmp_path / "run")).splitlines() == [
+        "toy, seed 7: safe_stop, 1 of 2 expectations met, 2.0 simulated seconds",
+        *explain_head(),
+        "",
+        "Why it ended so",
+        "  slipped: grasp 1 mm",
+        "  in grasp",
+        "  root               1.50 s  Fallback: all 3 children failed",
+        "    mission          1.00 s  Sequence: child tries failed (2 of 2)",
+        "      tries          1.00 s  Retry: 2 of 2 tries failed",
+        "        one/try      1.00 s  Sequence: child grasp failed (2 of 2)",
+        "          grasp      1.00 s  Script: slipped: grasp 1 mm",
+        "",
+        "What was tried (simulated seconds, from and to)",
+        "                     root",
+        "                       mission",
+        "      0.00     0.00      start                            SUCCESS",
+        "                         tries/one/try",
+        "      0.00     0.00        held                           SUCCESS",
+        "      0.00     0.50        grasp                          FAILURE",
+        "                               0.50 s slip: by=gap, value=0.0443",
+        "                               slipped: grasp 0 mm",
+        "                         tries/one/try  again, round 2",
+        "      1.00     1.00        held                           SUCCESS",
+        "      1.00     1.00        grasp                          FAILURE",
+        "                               slipped: grasp 1 mm",
+        "      1.00     1.50    stop                               FAILURE",
+        "      1.50     1.50    never                              FAILURE",
+        "",
+        "Losses of the connector, by ground truth",
+        "  lost at 0.40 s, noticed at 0.50 s by gap",
+        "",
+        "What the robot knew at the end",
+        "  the right hand holds nothing",
+        "  connector found by the wrist camera at (0.100, 0.200, 0.300) m, all of it seen",
+        "  connector seen last at 1.25 s by the rear camera at (0.300, 0.100, 0.400) m",
+        "  searches in vain since then: 2",
+        "  obstacles mapped: 1902 voxels",
+        "  left arm: tool at (0.100, 0.200, 0.300) m",
+        "    joints (0.000, 0.000, 0.000, 0.000, 0.000, 0.000) rad",
+        "  noticed a loss at 1.50 s by gap",
+        "",
+        "What was expected",
+        "  ✗ outcome: safe_stop (asked: stowed)",
+        "  ✓ slips: 1 (asked: 1)",
+    ]
+
+
+def explain_head() -> list[str]:
+    from importlib.metadata import version
+
+    return [f"  gravity zero, regrasp {version('regrasp')}", "  changed: limits.tries=2"]
+
+
+@pytest.mark.parametrize("outcome", ["stowed", "time_limit", "interrupted", "internal_error"])
+def test_every_outcome_has_its_page(tmp_path: Path, outcome: str) -> None:
+    cause = None if outcome == "stowed" else Cause(CauseCode(outcome), "why", "root/mission")
+    trace = "Traceback (most recent call last):\n  at home\n" if outcome == "internal_error" else None
+    told = page(write_record(tmp_path / "run", outcome=outcome, cause=cause, chain=None, traceback=trace))
+    assert told.startswith(f"toy, seed 7: {outcome}, ")
+    assert ("Why it ended so" in told) == (outcome != "stowed")
+    assert ("\nTraceback\n  Traceback (most recent call last):\n    at home\n" in told) == (trace is not None)
+
+
+def test_a_killed_run_is_told_as_far_as_it_is_known(tmp_path: Path) -> None:
+    kill(write_record(tmp_path / "run"))
+    told = page(tmp_path / "run")
+    assert told.startswith("toy, seed 7: no result\n")
+    assert "note: there is no result.json: the run was killed, or still goes on" in told
+    assert "What was running at 0.50 s, when the record ends\n  root/mission/tries\n" in told
+    assert "slip: by=gap, value=0.0443" in told
+
+
+@pytest.mark.parametrize("width", [80, 100, 120])
+def test_long_sentences_are_wrapped(tmp_path: Path, width: int) -> None:
+    cause = Cause(CauseCode.SLIPPED, "the connector slipped away " * 20, "root")
+    told = page(write_record(tmp_path / "run", cause=cause), width)
+    assert " ".join(told.split()).count("slipped away") == 20
+    assert max(map(len, told.splitlines())) <= width
+
+
+def test_what_stands_in_a_record_does_not_steer_the_terminal(tmp_path: Path) -> None:
+    cause = Cause(CauseCode.SLIPPED, "\x1b[2J\x07gone", "root")
+    told = page(write_record(tmp_path / "run", cause=cause, traceback="a\n\x1b[31mb"))
+    assert "\\x1b[2J\\x07gone" in told
+    assert "\x1b" not in told
+
+
+def attempts(*lines: tuple[str, float, float, str]) -> list[Attempt]:
+    return [Attempt(path, start, end, status) for path, start, end, status in lines]  # type: ignore[arg-type]
+
+
+def test_rounds_that_went_alike_are_folded() -> None:
+    again = [
+        line
+        for i in range(1, 6)
+        for line in attempts(
+            ("r/t/look", i, i, "SUCCESS"), ("r/t/grasp", i, i + 0.5, "FAILURE" if i < 5 else "SUCCESS")
+        )
+    ]
+    assert [" ".join(line.split()) for line in timeline(again, [], 100)] == [
+        "r/t",
+        "1.00 1.00 look SUCCESS",
+        "1.00 1.50 grasp FAILURE",
+        "r/t again, round 2",
+        "2.00 2.00 look SUCCESS",
+        "2.00 2.50 grasp FAILURE",
+        "3.00 4.50 and the same again, 2 more times",
+        "r/t again, round 5",
+        "5.00 5.00 look SUCCESS",
+        "5.00 5.50 grasp SUCCESS",
+    ]
+
+
+def test_what_runs_side_by_side_is_no_new_round() -> None:
+    both = attempts(("p/watch", 0.0, 1.0, "SUCCESS"), ("p/move", 0.0, 5.0, "SUCCESS"), ("p/watch", 2.0, 3.0, "SUCCESS"))
+    assert not any("again" in line for line in timeline(both, [], 100))
+
+
+def test_many_events_of_an_attempt_are_counted() -> None:
+    events = [Event(1.0, "look", "a/b", {"n": i}) for i in range(20)]
+    told = [*timeline(attempts(("a/b", 0.0, 2.0, "SUCCESS")), events, 100)]
+    assert len(told) == 8
+    assert told[-1].strip() == "and 14 events more"
+
+
+def test_explain_prints_the_page_or_json(tmp_path: Path) -> None:
+    folder = write_record(tmp_path / "run")
+    told = CliRunner().invoke(app, ["explain", str(folder)])
+    assert (told.exit_code, told.stdout) == (0, page(folder))
+    value = json.loads(CliRunner().invoke(app, ["explain", str(folder), "--json"]).stdout)
+    assert value["result"] == json.loads((folder / "result.json").read_text())
+    assert value["run"]["overrides"] == ["limits.tries=2"]
+    assert value["remarks"] == []
+    bad = CliRunner().invoke(app, ["explain", str(tmp_path)])
+    assert (bad.exit_code, bad.stdout) == (2, "")
+    assert "holds no run" in bad.stderr

@@ -1,0 +1,76 @@
+from pathlib import Path
+
+import pytest
+from toy_record import kill, write_record
+from typer.testing import CliRunner
+
+from app.cli import app
+from app.record_diff import differences
+from app.record_reader import read_record
+
+
+def differ(a: Path, b: Path) -> list[str]:
+    return differences(read_record(a), read_record(b))
+
+
+def test_the_wall_clock_makes_no_difference(tmp_path: Path) -> None:
+    runs = [write_record(tmp_path / name, wall_seconds=seconds) for name, seconds in (("a", 1.0), ("b", 2.0))]
+    assert differ(*runs) == []
+
+
+def test_seed_outcome_cause_and_versions_are_compared(tmp_path: Path) -> None:
+    a = write_record(tmp_path / "a", versions={"numpy": "2.0", "python": "3.11"})
+    b = write_record(
+        tmp_path / "b",
+        seed=8,
+        outcome="stowed",
+        succeeded=True,
+        cause=None,
+        versions={"numpy": "2.1", "python": "3.11"},
+    )
+    assert differ(a, b) == [
+        "seed: 7 | 8",
+        "outcome: safe_stop | stowed",
+        "succeeded: False | True",
+        "cause.code: slipped | -",
+        "cause.message: grasp 1 mm | -",
+        "cause.node: grasp | -",
+        "versions.numpy: 2.0 | 2.1",
+    ]
+
+
+def test_the_first_reading_that_differs_is_named(tmp_path: Path) -> None:
+    runs = [write_record(tmp_path / name, gap=gap) for name, gap in (("a", 0.0443), ("b", 0.05))]
+    assert differ(*runs) == [
+        "first differing event at 0.50 s: root/mission/tries/one/try/grasp slip",
+        "  value: 0.0443 | 0.05",
+    ]
+
+
+def test_the_first_tick_that_differs_is_told_by_its_deepest_node(tmp_path: Path) -> None:
+    a, b = (write_record(tmp_path / name) for name in ("a", "b"))
+    text = (b / "ticks.jsonl").read_text().splitlines(keepends=True)
+    failed = [line for line in text if not ('"t": 0.5' in line and ("/try" in line))]
+    (b / "ticks.jsonl").write_text("".join(failed))
+    assert differ(a, b) == ["first differing tick at 0.50 s: root/mission/tries/one/try/grasp: FAILURE | RUNNING"]
+
+
+def test_a_run_that_goes_on_where_the_other_was_killed(tmp_path: Path) -> None:
+    a, b = (write_record(tmp_path / name) for name in ("a", "b"))
+    kill(b)
+    told = differ(a, b)
+    assert "outcome: safe_stop | -" in told
+    assert "first differing tick at 1.00 s: root/mission/tries: FAILURE | RUNNING" in told
+
+
+@pytest.mark.parametrize(("other", "code"), [("a", 0), ("b", 1), ("nowhere", 2)])
+def test_the_exit_code_says_whether_they_differ(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, other: str, code: int
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_record(Path("a"))
+    write_record(Path("b"), seed=9)
+    ran = CliRunner().invoke(app, ["diff", "a", other])
+    told = {0: "the same\n", 1: "a | b\nseed: 7 | 9\n", 2: ""}
+    assert (ran.exit_code, ran.stdout) == (code, told[code])
+    assert ran.stderr.startswith("nowhere:1: does not exist" if code == 2 else "")
