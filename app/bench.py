@@ -10,17 +10,21 @@ import cv2
 import numpy as np
 import py_trees
 from numpy.typing import NDArray
+from py_trees.parsers.behaviour_tree_xml import parse_behaviour_tree_xml
 from scipy.spatial.transform import Rotation
 
 from app.attempts import Attempts
+from app.resources import shipped
 from app.scenario_file import load_scenario
 from app.table import print_table
 from app.tick_log import TickLog
+from behaviors import LEAVES
 from perception.rgbd_pose import NoEstimate, estimate
 from perception.segmentation import SegmentationParameters
 from sim.cable import spring_torques
 from sim.renderer import make_renderer
 from sim.world import World
+from trees import check_tree
 
 Call = Callable[[], Any]
 
@@ -31,6 +35,7 @@ def main() -> None:
     world = World(scenario.cell, "zero", 0)
     try:
         rows = {
+            "shipped trees checked / parsed by py_trees": checks(),
             "tick of 61 nodes with logs / bare": ticks(),
             "cable torques by numba / numpy and scipy": springs(scenario.cell.hidden.cable.links),
             f"848x480 picture by {world.renderer.name} / TinyRenderer": pictures(world),
@@ -82,6 +87,18 @@ def ticks() -> tuple[Call, Call]:
     logged.add_visitor(TickLog(logged.root, io.StringIO(), lambda: 0.0))
     logged.add_visitor(Attempts(logged.root, [], lambda: 0.0))
     return logged.tick, bare.tick
+
+
+def checks() -> tuple[Call, Call]:
+    """All shipped trees, checked in full and built by py_trees' parser, which checks little."""
+    paths = list(shipped("tree").values())
+
+    def parse() -> None:
+        for path in paths:
+            parse_behaviour_tree_xml(str(path), node_registry=dict(LEAVES))
+        py_trees.blackboard.Blackboard.clear()
+
+    return lambda: [check_tree(path, LEAVES) for path in paths], parse
 
 
 def springs(links: int) -> tuple[Call, Call]:

@@ -24,7 +24,6 @@ from motion.kinematics import ArmKinematics
 from motion.planner import plan
 from motion.straight import straight_line
 from motion.task import Task
-from motion.timing import time_path
 
 FloatArray = NDArray[np.float64]
 
@@ -164,6 +163,8 @@ class Motion(Bodies):
             arm.stop()
 
     def _follow(self, arm: str, path: FloatArray, speed: float) -> Iterator[None]:
+        from motion.timing import time_path  # late: it brings matplotlib, which a tree's check does not need
+
         trajectory = time_path(path, speed)
         start = self._clock.now() + self.known.latencies.plan
         while self._clock.now() < start - 1e-9:

@@ -6,6 +6,7 @@ that it does not know, empty composites, ports without a value.
 
 import re
 from collections.abc import Collection, Iterator, Mapping
+from itertools import islice
 from pathlib import Path
 
 from trees.element import Element, TreeSyntaxError, key_of, read_elements
@@ -15,6 +16,8 @@ from trees.wiring import Filled, TooLarge
 
 Finding = tuple[int, str]  # line from 1 (0: the file itself), "what is wrong; what would be right"
 
+MOST_FINDINGS = 500  # a file with more was not written by hand
+MOST_SHOWN = 80  # letters of a word that nobody knows
 _NAME = re.compile(r"[\w-]+")
 
 
@@ -37,18 +40,22 @@ def check_tree(path: Path, leaves: Mapping[str, type] | None = None, names: Name
         return [(0, f"cannot be read: {error.strerror}; name a file that can")]
     except TreeSyntaxError as error:
         return [(error.line, str(error))]
-    known = kinds(leaves, names)
+    return sorted(set(islice(_findings(root, kinds(leaves, names)), MOST_FINDINGS)))
+
+
+def _findings(root: Element, known: Mapping[str, Kind]) -> Iterator[Finding]:
     given = [tree for tree in root.children if tree.tag == "BehaviorTree"]
     trees = {tree.attributes.get("ID", ""): tree for tree in given}
-    findings = [*_check_document(root, trees)]
+    keys = {identifier: _keys_used(tree) for identifier, tree in trees.items()}
+    yield from _check_document(root, trees, keys)
     for tree in given:
-        findings += _check_names(tree)
+        yield from _check_names(tree)
         for element in tree.walk():
             if element is not tree:
-                findings += _check_element(element, known, trees)
-    findings += _never_run(root, trees)
-    findings += [*_loops(trees)] or _check_runs(root, trees, known)  # filling in follows subtrees without end
-    return sorted(set(findings))
+                yield from _check_element(element, known, keys)
+    yield from _never_run(root, trees)
+    # Without loops only: filling in follows subtrees without end.
+    yield from [*_loops(trees)] or _check_runs(root, trees, known)
 
 
 def _check_runs(root: Element, trees: Mapping[str, Element], known: Mapping[str, Kind]) -> list[Finding]:
@@ -65,10 +72,10 @@ def _check_runs(root: Element, trees: Mapping[str, Element], known: Mapping[str,
 
 def unknown(what: str, word: str, known: Collection[str]) -> str:
     """The sentence about a word that is not known, with the nearest that is."""
-    return f"unknown {what} {word!r}; {nearest(word, known)}"
+    return f"unknown {what} {word[:MOST_SHOWN]!r}; {nearest(word, known)}"
 
 
-def _check_document(root: Element, trees: Mapping[str, Element]) -> Iterator[Finding]:
+def _check_document(root: Element, trees: Mapping[str, Element], keys: Mapping[str, set[str]]) -> Iterator[Finding]:
     if root.tag != "root":
         yield root.line, f"the outermost element is <{root.tag}>; write <root>"
     for attribute in root.attributes.keys() - {"main_tree_to_execute"}:
@@ -91,12 +98,11 @@ def _check_document(root: Element, trees: Mapping[str, Element]) -> Iterator[Fin
             yield tree.line, f"BehaviorTree ID {tree.attributes['ID']!r} is given twice; rename one"
         if len(tree.children) != 1:
             yield tree.line, f"BehaviorTree has {len(tree.children)} children; give it one, such as a Sequence"
-        keys = _keys_used(tree)
         for attribute, value in tree.attributes.items():
             if attribute != "ID":
                 yield from _check_key(tree, attribute, value)
-                if attribute not in keys:
-                    yield tree.line, unknown("default of a key", attribute, keys)
+                if attribute not in (used := keys[tree.attributes.get("ID", "")]):
+                    yield tree.line, unknown("default of a key", attribute, used)
 
 
 def _check_names(tree: Element) -> Iterator[Finding]:
@@ -121,9 +127,9 @@ def _check_names(tree: Element) -> Iterator[Finding]:
                 namespaces.add(element.name)
 
 
-def _check_element(element: Element, known: Mapping[str, Kind], trees: Mapping[str, Element]) -> Iterator[Finding]:
+def _check_element(element: Element, known: Mapping[str, Kind], keys: Mapping[str, set[str]]) -> Iterator[Finding]:
     if element.tag == "SubTree":
-        yield from _check_subtree(element, trees)
+        yield from _check_subtree(element, keys)
         return
     if element.tag not in known:
         yield element.line, unknown("element", element.tag, [*known, "SubTree"])
@@ -158,19 +164,18 @@ def _check_attribute(element: Element, kind: Kind, name: str, value: str) -> Ite
         yield element.line, f"{element.label}: {name}={value!r} {problem}"
 
 
-def _check_subtree(element: Element, trees: Mapping[str, Element]) -> Iterator[Finding]:
+def _check_subtree(element: Element, keys: Mapping[str, set[str]]) -> Iterator[Finding]:
     if element.children:
         yield element.line, f"{element.label} takes no children and has {len(element.children)}; move them out of it"
     identifier = element.attributes.get("ID", "")
-    if identifier not in trees:
-        yield element.line, unknown("subtree", identifier, trees)
+    if identifier not in keys:
+        yield element.line, unknown("subtree", identifier, keys)
         return
-    keys = _keys_used(trees[identifier])
     for name, value in element.attributes.items():
         if name not in ("ID", "name"):
             yield from _check_key(element, name, value)
-            if name not in keys:
-                yield element.line, unknown(f"key of subtree {identifier}", name, keys)
+            if name not in keys[identifier]:
+                yield element.line, unknown(f"key of subtree {identifier}", name, keys[identifier])
 
 
 def _check_key(element: Element, name: str, value: str) -> Iterator[Finding]:

@@ -19,7 +19,7 @@ from py_trees.ports_utils import convert_str_to_type, is_instance_of_type
 Accepts = Any  # a type, or the words that may stand there as a tuple of strings
 Names = Mapping[str, Collection[str]]  # the names that a kind of thing has: {"socket": ["back_1", "back_2"]}
 ANY_STATUS = frozenset({Status.SUCCESS, Status.FAILURE, Status.RUNNING})
-MOST_LISTED = 100  # known words among which the nearest is looked for, and which are listed when none is near
+MOST_LISTED = 50  # known words among which the nearest is looked for, and which are listed when none is near
 _EXAMPLES = {int: "a whole number such as 3", float: "a number such as 0.5", bool: "true or false"}
 
 
