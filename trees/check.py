@@ -161,7 +161,7 @@ def _check_attribute(element: Element, kind: Kind, name: str, value: str) -> Ite
     if attribute.is_output and not is_key:
         yield element.line, f"{element.label}: {name}={value!r} is an output; wire it to a {{key}}"
     elif not is_key and (problem := attribute.problem(value)):
-        yield element.line, f"{element.label}: {name}={value!r} {problem}"
+        yield element.line, f"{element.label}: {name}={value[:MOST_SHOWN]!r} {problem}"
 
 
 def _check_subtree(element: Element, keys: Mapping[str, set[str]]) -> Iterator[Finding]:

@@ -1,13 +1,20 @@
 from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar
 
 import py_trees
 import pytest
+import random_trees
 from hypothesis import given
 from hypothesis import strategies as st
+from py_trees.common import Status
+from py_trees.ports import BehaviourWithPorts, NoDataAvailable, PortInformation
 from toy_leaves import GOOD, LEAVES
 
 from trees import check_tree, load_tree
+from trees.check import MOST_FINDINGS
 
 
 @pytest.fixture(autouse=True)
@@ -115,6 +122,52 @@ CASES = {
     ),
     "tree given twice": ('ID="Search" camera', 'ID="Main" camera', 2, "BehaviorTree ID 'Main' is given twice"),
     "include": ("</root>", '<Include file="/etc/passwd"/></root>', 20, "Include is refused"),
+    "import": ("</root>", '<Import src="other.xml"/></root>', 20, "Import is refused, a tree is one file; copy the"),
+    "tree that nothing includes": (
+        "</root>",
+        '<BehaviorTree ID="Left"><Fail name="f"/></BehaviorTree></root>',
+        20,
+        "BehaviorTree 'Left' is never run; include it with a SubTree, or remove it",
+    ),
+    "key written as two types": (
+        "<Go ",
+        '<Say name="say" word="{place}"/><Go ',
+        9,
+        "Say 'say': word={place} writes str, but line 16 writes float to it; write one type, or use two keys",
+    ),
+    "key read as another type": (
+        "<Go ",
+        '<Hear name="hear" word="{place}"/><Go ',
+        9,
+        "Hear 'hear': word={place} reads str, but line 16 writes float to it; wire ports of one type",
+    ),
+    "key that is read too early": (
+        '<SubTree ID="Search"',
+        '<Go name="early" place="{place}"/><SubTree ID="Search"',
+        4,
+        "Go 'early': place={place} reads /place before anything can have written it; tick Look 'look' of line 16",
+    ),
+    "child that is never reached": (
+        "<Go ",
+        '<SuccessIsRunning name="r"><Wait name="w" ticks="1"/></SuccessIsRunning><Go ',
+        9,
+        "Go 'go' is never reached: SuccessIsRunning 'r' before it never succeeds; move it before that, or remove it",
+    ),
+    "parallel that never succeeds": (
+        'policy="success_on_one">',
+        'policy="success_on_all"><FailureIsRunning name="r"><Inverter name="i"><Inverter name="j">'
+        '<SuccessIsFailure name="k"><Wait name="w" ticks="1"/></SuccessIsFailure>'
+        "</Inverter></Inverter></FailureIsRunning>",
+        5,
+        "Parallel 'carry' can never succeed with success_on_all: FailureIsRunning 'r' never does; write policy",
+    ),
+    "attribute given twice": ('ticks="99"', 'ticks="99" ticks="9"', 6, "duplicate attribute; give each attribute once"),
+    "bare ampersand": (
+        'ticks="99"',
+        'ticks="9&9"',
+        6,
+        "not well-formed (invalid token); write & as &amp;",
+    ),
     "not XML": ("</Inverter>", "", 17, "malformed XML: mismatched tag; close <Inverter> of line 15"),
     "entities": ("<root", '<!DOCTYPE root [<!ENTITY e SYSTEM "file:///etc/passwd">]>\n<root', 1, "document type"),
 }
@@ -125,11 +178,27 @@ def test_each_fault_is_named_with_its_line(tmp_path: Path, old: str, new: str, l
     assert old in GOOD
     findings = check(tmp_path, GOOD.replace(old, new) if old == "Inverter" else GOOD.replace(old, new, 1))
     assert any(at == line and message in text for at, text in findings), findings
+    assert all("; " in text for _, text in findings), "what is wrong; what would be right"
 
 
 def test_all_findings_come_at_once_in_line_order(tmp_path: Path) -> None:
     text = GOOD.replace('memory="true"', "").replace("<Go ", "<Goo ").replace('ticks="1"', 'ticks=""')
     assert [line for line, _ in check(tmp_path, text)] == [3, 9, 15]
+
+
+def test_one_misspelt_writer_is_one_finding(tmp_path: Path) -> None:
+    for old, new in (("<Look ", "<Lok "), (' place="{place}"/>\n      </F', ' plac="{place}"/>\n      </F')):
+        assert [line for line, _ in check(tmp_path, GOOD.replace(old, new))] == [16]
+
+
+def test_an_output_with_a_default_is_there_from_the_start(tmp_path: Path) -> None:
+    leaves = '<Hear name="hear" word="{w}"/><Say name="say" word="{w}"/>'
+    assert check(tmp_path, GOOD.replace("<Go ", leaves + "<Go ")) == []
+    tree = py_trees.trees.BehaviourTree(load_tree(tmp_path / "tree.xml", LEAVES))
+    tree.setup()
+    tree.tick()
+    tree.tick()
+    assert tree.root.status is Status.SUCCESS
 
 
 def test_a_missing_file_a_folder_and_an_odd_encoding_are_findings(tmp_path: Path) -> None:
@@ -158,15 +227,67 @@ def test_trees_that_would_grow_without_bound_are_refused(tmp_path: Path) -> None
     load_tree(tmp_path / "tree.xml", LEAVES)
 
 
+def test_a_file_that_no_hand_wrote_is_told_in_few_words(tmp_path: Path) -> None:
+    trees = "".join(f'<BehaviorTree ID="T{i}"><SubTree ID="x{i}" name="s"/></BehaviorTree>' for i in range(3000))
+    findings = check(tmp_path, f'<root main_tree_to_execute="T0">{trees}</root>')
+    assert len(findings) == MOST_FINDINGS
+    [(_, sentence)] = check(tmp_path, GOOD.replace("Go name", "Go" * 50_000 + " name"))
+    assert len(sentence) < 500
+
+
+@dataclass(frozen=True)
+class Limited(PortInformation):  # type: ignore[misc]
+    above: float | None = None
+    names: str | None = None
+
+
+class Plug(BehaviourWithPorts):  # type: ignore[misc]
+    INPUT_PORTS: ClassVar[dict[str, PortInformation]] = {
+        "seconds": Limited(data_type=float, above=0.0),
+        "socket": Limited(data_type=str, names="socket"),
+    }
+    OUTPUT_PORTS: ClassVar[dict[str, PortInformation]] = {}
+
+
+@pytest.mark.parametrize("through_a_subtree", [False, True])
+def test_a_leaf_states_what_its_ports_hold(tmp_path: Path, through_a_subtree: bool) -> None:
+    path, names = tmp_path / "tree.xml", {"socket": ["back_1", "back_2"]}
+
+    def findings(seconds: str, socket: str, names: dict[str, list[str]] | None) -> str:
+        ports = 'seconds="{s}" socket="{t}"' if through_a_subtree else f'seconds="{seconds}" socket="{socket}"'
+        keys = f's="{seconds}" t="{socket}"' if through_a_subtree else ""
+        tree = f'<BehaviorTree ID="Main" {keys}><Plug name="plug" {ports}/></BehaviorTree>'
+        path.write_text(f'<root main_tree_to_execute="Main">{tree}</root>')
+        return "\n".join(sentence for _, sentence in check_tree(path, {"Plug": Plug}, names))
+
+    assert findings("0.1", "back_2", names) == ""
+    assert findings("0.1", "back_3", None) == ""
+    assert "is unknown; did you mean back_" in findings("0.1", "back_3", names)
+    assert "is not above 0; write more than 0" in findings("0", "back_1", names)
+    assert "is not above 0; write more than 0" in findings("-1e300", "back_1", names)
+    assert "is not finite; write a number such as 0.5" in findings("inf", "back_1", names)
+
+
 WORDS = st.sampled_from(GOOD.replace('"', ' " ').replace("<", " < ").replace(">", " > ").split())
+TEXTS = st.tuples(st.just(GOOD), st.just(LEAVES)) | st.tuples(random_trees.trees(), st.just(random_trees.LEAVES))
 
 
-@given(at=st.integers(0, len(GOOD)), length=st.integers(0, 30), insert=st.lists(WORDS, max_size=3).map("".join))
-def test_whatever_passes_the_check_loads(
-    tmp_path_factory: pytest.TempPathFactory, at: int, length: int, insert: str
+@given(tree=TEXTS, at=st.floats(0, 1), length=st.sampled_from([0, 0, 1, 5, 30]), insert=st.lists(WORDS, max_size=3))
+def test_whatever_passes_the_check_loads_and_ticks(
+    tmp_path_factory: pytest.TempPathFactory,
+    tree: tuple[str, dict[str, type[py_trees.behaviour.Behaviour]]],
+    at: float,
+    length: int,
+    insert: list[str],
 ) -> None:
+    text, leaves = tree
+    cut = int(at * len(text))
     path = tmp_path_factory.getbasetemp() / "mutant.xml"
-    path.write_text(GOOD[:at] + insert + GOOD[at + length :])
-    if not check_tree(path, LEAVES):
-        load_tree(path, LEAVES)
-        py_trees.blackboard.Blackboard.clear()
+    path.write_text(text[:cut] + "".join(insert) + text[cut + length :])
+    if check_tree(path, leaves):
+        return
+    py_trees.blackboard.Blackboard.clear()
+    root = load_tree(path, leaves)
+    with suppress(NoDataAvailable):  # a writer may have failed, or not been ticked, in this run
+        for _ in range(4):
+            root.tick_once()

@@ -59,7 +59,31 @@ class ToyGo(_Leaf):
         return Status.SUCCESS
 
 
-LEAVES: dict[str, type[py_trees.behaviour.Behaviour]] = {"Wait": ToyWait, "Fail": ToyFail, "Look": ToyLook, "Go": ToyGo}
+class ToySay(_Leaf):
+    INPUT_PORTS: ClassVar[Ports] = {}
+    OUTPUT_PORTS: ClassVar[Ports] = {"word": PortInformation(data_type=str, default_value="yes")}
+
+    def update(self) -> Status:
+        return Status.SUCCESS
+
+
+class ToyHear(_Leaf):
+    INPUT_PORTS: ClassVar[Ports] = {"word": PortInformation(data_type=str)}
+    OUTPUT_PORTS: ClassVar[Ports] = {}
+
+    def update(self) -> Status:
+        self.heard = self.get_input("word")
+        return Status.SUCCESS
+
+
+LEAVES: dict[str, type[py_trees.behaviour.Behaviour]] = {
+    "Wait": ToyWait,
+    "Fail": ToyFail,
+    "Look": ToyLook,
+    "Go": ToyGo,
+    "Say": ToySay,
+    "Hear": ToyHear,
+}
 
 GOOD = """\
 <root main_tree_to_execute="Main">
