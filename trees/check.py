@@ -54,19 +54,21 @@ def _findings(root: Element, known: Mapping[str, Kind]) -> Iterator[Finding]:
             if element is not tree:
                 yield from _check_element(element, known, keys)
     yield from _never_run(root, trees)
-    # Without loops only: filling in follows subtrees without end.
-    yield from [*_loops(trees)] or _check_runs(root, trees, known)
+    loops = [*_loops(trees)]
+    yield from loops
+    try:
+        yield from _check_runs(root, trees, known)
+    except TooLarge as error:
+        if not loops:  # filling one in has no end
+            yield root.line, str(error)
 
 
 def _check_runs(root: Element, trees: Mapping[str, Element], known: Mapping[str, Kind]) -> list[Finding]:
-    """What shows only in the tree that will run, its subtrees filled in."""
+    """What shows only in the tree that will run, its subtrees filled in. Raises TooLarge."""
     main = trees.get(root.attributes.get("main_tree_to_execute", ""))
     if main is None:
         return []
-    try:
-        filled = Filled(main, trees, known)
-    except TooLarge as error:
-        return [(root.line, str(error))]
+    filled = Filled(main, trees, known)
     return [*filled.findings, *check_flow(filled.root)]
 
 
@@ -111,10 +113,8 @@ def _check_names(tree: Element) -> Iterator[Finding]:
         seen = set()
         for element in parent.children:
             if not _NAME.fullmatch(element.name):
-                yield (
-                    element.line,
-                    f"{element.tag} has the name {element.name!r}; give it one of letters, digits, _ and -",
-                )
+                has = f"the name {element.name!r}" if element.name else "no name"
+                yield element.line, f"{element.tag} has {has}; give it one of letters, digits, _ and -"
             elif element.name in seen:
                 yield element.line, f"the name {element.name!r} is taken by a sibling; rename one"
             elif element.tag == "SubTree" and element.name in namespaces:
@@ -142,7 +142,7 @@ def _check_element(element: Element, known: Mapping[str, Kind], keys: Mapping[st
         yield element.line, f"{element.label} takes {takes} and has {len(element.children)}; move them {where}"
     for name, attribute in kind.attributes.items():
         if attribute.required and name not in element.attributes:
-            yield element.line, f'{element.label} does not state {name}; write {name}="...": {attribute.takes}'
+            yield element.line, f'{element.label} does not state {name}; write {name}="..." ({attribute.takes})'
     for name, value in element.attributes.items():
         if name != "name":
             yield from _check_attribute(element, kind, name, value)

@@ -90,7 +90,7 @@ def _hopeless(nodes: list[Node], flow: "_Flow") -> Iterator[tuple[int, str]]:
     for places in parallels.values():
         parallel = places[0]
         element, policy = parallel.element, parallel.constants.get("policy")
-        if policy is None or any(flow.can(node, SUCCESS) for node in places):
+        if policy not in ("success_on_all", "success_on_one") or any(flow.can(node, SUCCESS) for node in places):
             continue
         never = [child for child in parallel.children if not flow.can(child, SUCCESS)]
         fails = [child for child in parallel.children if flow.only(child, FAILURE)]

@@ -87,7 +87,7 @@ class TooLarge(Exception):  # noqa: N818 - it stops the filling in
 class Filled:
     """The main tree with its subtrees filled in: `root`, and the `findings` (line, sentence) about its wires.
 
-    `trees` must not include one another in a loop. Raises TooLarge.
+    Raises TooLarge, also where trees include one another in a loop.
     """
 
     def __init__(self, main: Element, trees: Mapping[str, Element], kinds: Mapping[str, Kind]) -> None:

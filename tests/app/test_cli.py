@@ -190,6 +190,32 @@ def test_trees_show_draws_a_file_and_tells_its_findings(tmp_path: Path) -> None:
     assert broken.stderr.startswith("tree.xml:1: ")
 
 
+def test_trees_check_tells_every_finding_of_every_file(tmp_path: Path) -> None:
+    clean = invoke("trees", "check", "tree.xml", "tree.xml")
+    assert (clean.exit_code, clean.stdout, clean.stderr) == (0, "2 trees, no findings\n", "")
+    text = (tmp_path / "tree.xml").read_text()
+    (tmp_path / "late.xml").write_text(text.replace('seconds="0.1"', 'seconds="soon"').replace('name="settle" ', ""))
+    (tmp_path / "cut.xml").write_text("<root")
+    wrong = invoke("trees", "check", "late.xml", "nowhere", "tree.xml", "cut.xml")
+    assert (wrong.exit_code, wrong.stdout) == (2, "")
+    places = [line.split(": ")[0] for line in wrong.stderr.splitlines()]
+    assert places == ["cut.xml:1", "late.xml:2", "late.xml:2", "nowhere:1"]
+
+
+def test_trees_leaves_says_what_a_tree_may_hold() -> None:
+    everything = invoke("trees", "leaves").stdout
+    for text in ("Wait", "    seconds        input, float, required", "Sequence           Ticks its", "SubTree"):
+        assert text in everything
+    one = invoke("trees", "leaves", "Retry").stdout.splitlines()
+    assert one == [
+        "Retry              Ticks its child anew after a failure.",
+        "    returns        failure, running, success",
+        "    num_failures   constant, int above 0, required: tries",
+    ]
+    unknown = invoke("trees", "leaves", "Wiat")
+    assert (unknown.exit_code, unknown.stderr) == (2, "Wiat:1: no element 'Wiat'; did you mean 'Wait'?\n")
+
+
 def test_study_demo_hands_on_seeds_jobs_and_overrides(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[Any] = []
 
@@ -215,6 +241,8 @@ def test_a_wrong_range_of_seeds_is_a_finding(text: str) -> None:
         [],
         ["run"],
         ["trees", "show"],
+        ["trees", "check"],
+        ["trees", "leaves"],
         ["scenarios", "list"],
         ["scenarios", "check"],
         ["scenarios", "show"],

@@ -10,6 +10,7 @@ from toy_scenario import write_scenario
 from app.findings import Finding, Findings
 from app.resources import shipped
 from app.scenario_file import load_cell, load_scenario, tree_text
+from behaviors.unplug import Unplug
 from interfaces.cause import CauseCode
 
 ARMS = 1 + shipped("cell")["thesis"].read_text().splitlines().index("  arms:")  # the line of that key
@@ -205,6 +206,19 @@ def test_findings_of_all_files_come_at_once(scenario: Path) -> None:
         "mine.yaml:18:",
         "tree.xml:2:",
     ]
+
+
+def test_a_tree_that_names_a_socket_which_the_cell_has_not_is_a_finding_in_the_tree(
+    scenario: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("behaviors.LEAVES", {"Unplug": Unplug})
+    tree = scenario.parent / "tree.xml"
+    tree.write_text(
+        tree.read_text().replace('<Wait name="settle" seconds="0.1"/>', '<Unplug name="u" socket="bck_4"/>')
+    )
+    assert findings() == ["tree.xml:2: Unplug 'u': socket='bck_4' is unknown; did you mean back_4?"]
+    tree.write_text(tree.read_text().replace("bck_4", "back_4"))
+    assert findings_if_any() == []
 
 
 def test_a_cell_beside_the_scenario_is_found_from_elsewhere(scenario: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -37,7 +37,7 @@ CASES = {
         'name="root" memory="true"',
         'name="root"',
         3,
-        "Sequence 'root' does not state memory; write memory=\"...\": true or false",
+        "Sequence 'root' does not state memory; write memory=\"...\" (true or false)",
     ),
     "memory that py_trees reads as false": (
         'memory="true"',
@@ -71,7 +71,7 @@ CASES = {
     "unknown leaf": ("<Go ", "<Goo ", 9, "unknown element 'Goo'; did you mean Go?"),
     "tag in the wrong case": ("<Go ", "<go ", 9, "unknown element 'go'; did you mean Go?"),
     "wall clock": ("Inverter", "Timeout", 15, "unknown element 'Timeout'"),
-    "missing name": ('name="go" ', "", 9, "Go has the name ''; give it one of letters"),
+    "missing name": ('name="go" ', "", 9, "Go has no name; give it one of letters"),
     "dotted name": ('name="go"', 'name="go.on"', 9, "Go has the name 'go.on'"),
     "duplicate name": ('name="move"', 'name="watch"', 7, "the name 'watch' is taken by a sibling"),
     "unknown policy": (
@@ -184,6 +184,12 @@ def test_each_fault_is_named_with_its_line(tmp_path: Path, old: str, new: str, l
 def test_all_findings_come_at_once_in_line_order(tmp_path: Path) -> None:
     text = GOOD.replace('memory="true"', "").replace("<Go ", "<Goo ").replace('ticks="1"', 'ticks=""')
     assert [line for line, _ in check(tmp_path, text)] == [3, 9, 15]
+
+
+def test_a_loop_elsewhere_hides_no_finding_of_the_tree_that_runs(tmp_path: Path) -> None:
+    loop = '<BehaviorTree ID="Old"><SubTree ID="Old" name="again"/></BehaviorTree></root>'
+    text = GOOD.replace('tries="2"', 'tries="0"').replace("</root>", loop)
+    assert [line for line, _ in check(tmp_path, text)] == [13, 20, 20]
 
 
 def test_one_misspelt_writer_is_one_finding(tmp_path: Path) -> None:
