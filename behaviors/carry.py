@@ -31,9 +31,7 @@ class Carry(HandLeaf):
 
     def steps(self) -> Steps:
         """See the class."""
-        motion = self.services.motion
-        held = self.services.belief.held
-        assert held is not None
+        motion, held = self.services.motion, self.held()
         in_and_out = (BEFORE, BEFORE - BACK[0])
         onward = [RigidTransform.from_translation([x, 0.0, 0.0]) for x in in_and_out]
         yield motion.carry(HAND, self._goals(held), held, onward=onward, speed=CARRY_SPEED)
@@ -73,9 +71,7 @@ class Insert(HandLeaf):
         """See the class."""
         motion = self.services.motion
         yield from self._look()
-        held = self.services.belief.held
-        assert held is not None
-        yield motion.straight(HAND, self._seated(held), speed=INSERT_SPEED)
+        yield motion.straight(HAND, self._seated(self.held()), speed=INSERT_SPEED)
         yield from self.wait(SEATED_SECONDS)
 
     def _look(self) -> Steps:

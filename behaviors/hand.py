@@ -19,6 +19,13 @@ BACK = (0.10, 0.08, 0.06, 0.05, 0.04, 0.03)
 class HandLeaf(StepsLeaf):
     """A state in which the right hand works."""
 
+    def held(self) -> RigidTransform:
+        """tool_from_connector as believed. Raises `Failed` when the watch beside this leaf has just noticed a loss."""
+        held = self.services.belief.held
+        if held is None:
+            raise Failed(CauseCode.SLIPPED, "the hand holds nothing any more")
+        return held
+
     def grip(self, world_from_connector: RigidTransform) -> Steps:
         """Close the jaw and feel whether something is in it; belief: held as it was thought to lie."""
         services = self.services

@@ -1,0 +1,153 @@
+"""The recovery tree with its real leaves on services that play along."""
+
+import inspect
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import py_trees
+import pytest
+from fake_services import Clock, FakeGripper, FakeMotion, FakePerception, Stage, seen
+from numpy.typing import NDArray
+from py_trees.blackboard import Blackboard
+from py_trees.common import Status
+from scipy.spatial.transform import RigidTransform
+
+from app.resources import shipped
+from behaviors import LEAVES, Leaf
+from interfaces.cell import KnownCell
+from interfaces.frame import Intrinsics, RgbdFrame
+from motion.task import Task
+from trees import in_tree_order, load_tree
+
+TICK = 0.25  # s: more than a run's, for less to do
+K = Intrinsics(64, 48, 50.0, 50.0, 31.5, 23.5)
+
+
+class BusyMotion(FakeMotion):
+    """Knows which motions began and neither ended nor were stopped."""
+
+    def __init__(self, clock: Clock) -> None:
+        super().__init__(clock)
+        self.at_work: list[str] = []
+
+    def move(self, arm: str, *_goal: Any, **_options: Any) -> Task:
+        def steps() -> Iterator[None]:
+            self.at_work.append(arm)
+            yield from self._steps()
+            self.at_work.remove(arm)
+
+        return Task(steps(), lambda: self.at_work.remove(arm) if arm in self.at_work else None)
+
+    carry = straight = pick = shift = move
+
+    def model(self, arm: str, **_options: Any) -> Any:
+        return super().model(arm)
+
+    def sees(self, *_view: Any) -> bool:
+        return True
+
+    def keep_clear(self, points: Any) -> None:
+        pass
+
+    def stop(self) -> None:
+        super().stop()
+        self.at_work.clear()
+
+
+class Hand(FakeGripper):
+    """Holds whatever it closes on."""
+
+    def close(self, force: float) -> None:
+        super().close(force)
+        self.gap = 0.02
+
+
+class Eyes(FakePerception):
+    """See the connector at the clip, the rear one only while it is not `hidden`."""
+
+    def __init__(self, clock: Clock, place: NDArray[np.float64]) -> None:
+        super().__init__(clock)
+        self.hidden = False
+        self.shows = lambda camera, t: None if self.hidden and camera == "rear" else seen(t, place, camera)
+        still = np.full((48, 64, 3), 160, np.uint8)
+        self.frames = lambda t: RgbdFrame("rear", 1, t, still, np.zeros((48, 64), np.float32), K)
+        self.occupancy = SimpleNamespace(occupied_points=lambda guessed=True: np.empty((0, 3)), h=0.01)
+
+    def correct_depth(self, camera: str) -> float:
+        return 1.0
+
+
+class Play:
+    """The recovery tree with its leaves; the end is lost, once, and hidden `slip` ticks after the carrying began."""
+
+    def __init__(self, known: KnownCell, folder: Path, slip: int) -> None:
+        Blackboard.clear()
+        stage = Stage(known, folder)
+        self.clock, self.slip = stage.clock, slip
+        self.motion = BusyMotion(stage.clock)
+        self.motion.hand = RigidTransform.from_translation(known.clip.seat)
+        self.hand = self.motion.grippers["right"] = Hand(stage.clock)
+        self.eyes = Eyes(stage.clock, np.array(known.clip.seat))
+        services = replace(stage.services, motion=cast(Any, self.motion), perception=cast(Any, self.eyes))
+        self.root = load_tree(shipped("tree")["recovery"], LEAVES)
+        self.leaves = {n.name.rsplit(".", 1)[1]: n for n in in_tree_order(self.root) if isinstance(n, Leaf)}
+        self.seen: set[str] = set()
+        py_trees.trees.BehaviourTree(self.root).setup(services=services)
+
+    def run(self, ticks: int = 500) -> int:
+        """Tick so often or until the tree ends; how often it was ticked."""
+        for tick in range(1, ticks + 1):
+            self.root.tick_once()
+            self.seen |= {name for name, leaf in self.leaves.items() if leaf.status is Status.RUNNING}
+            if self.root.status is not Status.RUNNING:
+                return tick
+            self.clock.t += TICK
+            if "carry" in self.seen:
+                self.slip -= 1
+            if self.slip == -1:
+                self.hand.gap, self.eyes.hidden = 0.0, True
+            elif "regrasp" in self.seen:
+                self.eyes.hidden = False
+        return ticks
+
+
+@pytest.fixture
+def play(known: KnownCell, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[int], Play]]:
+    # Geometry that takes long and that no motion here looks at.
+    monkeypatch.setattr("behaviors.carry.Carry._goals", lambda *_arguments: [])
+    monkeypatch.setattr("behaviors.carry.Insert._seated", lambda *_arguments: None)
+    monkeypatch.setattr("behaviors.look_closer.closer_views", lambda connector: [connector] * 2)
+    yield lambda slip: Play(known, tmp_path, slip)
+    Blackboard.clear()
+
+
+def test_stopped_after_any_tick_no_arm_moves_and_no_work_is_left(play: Callable[[int], Play]) -> None:
+    whole = play(2)
+    ticks = whole.run()
+    assert whole.root.status is Status.SUCCESS
+    assert whole.seen >= {"unplug", "carry", "make_room", "spiral_search", "look_closer", "regrasp", "insert", "let_go"}
+    moving = 0
+    for tick in range(1, ticks):
+        cut = play(2)
+        cut.run(tick)
+        moving += bool(cut.motion.at_work)
+        cut.root.stop(Status.INVALID)
+        assert cut.motion.at_work == [], f"tick {tick}"
+        assert [leaf.name for leaf in cut.leaves.values() if leaf.status is Status.RUNNING] == []
+        works = [vars(leaf)["_work"] for leaf in cut.leaves.values() if "_work" in vars(leaf)]
+        assert {inspect.getgeneratorstate(work) for work in works} == {inspect.GEN_CLOSED}
+        assert cut.eyes.hint is None
+    assert moving > 10
+    Blackboard.clear()
+    assert not Blackboard.keys()
+
+
+@pytest.mark.parametrize("slip", range(12))
+def test_a_slip_at_any_tick_of_carrying_and_inserting_ends_stowed(play: Callable[[int], Play], slip: int) -> None:
+    whole = play(slip)
+    whole.run()
+    assert whole.root.status is Status.SUCCESS
