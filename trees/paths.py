@@ -1,6 +1,7 @@
 """Tree paths: the names by which logs, golden files and results know a node (py_trees' ids are random)."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from difflib import get_close_matches
 from uuid import UUID
 
 import py_trees
@@ -34,3 +35,19 @@ def node_paths(root: py_trees.behaviour.Behaviour) -> dict[UUID, str]:
         taken.add(path)
         paths[node.id] = path
     return paths
+
+
+def find_path(name: str, paths: Iterable[str]) -> str:
+    """The one path that is `name` or ends with its parts: carry/move for root/carry/move.
+
+    Raises:
+        ValueError: none does, or several.
+    """
+    known = list(paths)
+    found = [path for path in known if path == name] or [path for path in known if path.endswith(f"/{name}")]
+    if len(found) == 1:
+        return found[0]
+    if found:
+        raise ValueError(f"{name!r} may be {' or '.join(found)}; write more of the path")
+    nearest = get_close_matches(name, [path.rsplit("/", 1)[-1] for path in known], 1, 0.5) or known
+    raise ValueError(f"the tree has no node {name!r}; there is {', '.join(dict.fromkeys(nearest))}")

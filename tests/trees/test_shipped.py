@@ -7,11 +7,14 @@ import pytest
 
 import trees
 from trees import check_tree, load_tree, node_paths, show_tree
+from trees.trials import left_by_a_stop, never_ends
 
 SHIPPED = sorted(Path(trees.__file__).parent.glob("*.xml"))
 
+every_tree = pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
 
-@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
+
+@every_tree
 def test_a_shipped_tree_is_clean_loads_and_is_shown_in_full(path: Path) -> None:
     from behaviors import LEAVES
 
@@ -22,6 +25,16 @@ def test_a_shipped_tree_is_clean_loads_and_is_shown_in_full(path: Path) -> None:
     assert len(set(paths)) == len(paths)
     shown = show_tree(path).splitlines()
     assert len(shown) == len(paths) + sum("  SubTree " in line for line in shown)
+
+
+@every_tree
+def test_a_shipped_tree_ends_whatever_its_leaves_do(path: Path) -> None:
+    assert [*never_ends(path)] == []
+
+
+@every_tree
+def test_a_shipped_tree_stopped_at_any_tick_leaves_nothing_at_work(path: Path) -> None:
+    assert [*left_by_a_stop(path)] == []
 
 
 WRONG = {
