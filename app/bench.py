@@ -25,6 +25,7 @@ from sim.cable import spring_torques
 from sim.renderer import make_renderer
 from sim.world import World
 from trees import check_tree
+from trees.scripted import ScriptedTree
 
 Call = Callable[[], Any]
 
@@ -36,7 +37,7 @@ def main() -> None:
     try:
         rows = {
             "shipped trees checked / parsed by py_trees": checks(),
-            "tick of 61 nodes with logs / bare": ticks(),
+            "tick of the recovery tree with logs / bare": ticks(),
             "cable torques by numba / numpy and scipy": springs(scenario.cell.hidden.cable.links),
             f"848x480 picture by {world.renderer.name} / TinyRenderer": pictures(world),
             "colour and depth to pose / bare OpenCV calls": poses(world),
@@ -65,23 +66,14 @@ def in_turn(ours: Call, other: Call, seconds: float = 2.0) -> tuple[float, float
 
 
 def ticks() -> tuple[Call, Call]:
-    """The same tree with and without a log; a share of its nodes change at each tick."""
+    """The recovery tree on scripted leaves with and without the logs: it loses, searches, stows, and begins anew."""
+    script = {"DetectSlip": "8 failure, running", "Carry": "20 success"}
+    script |= {"Holding": "success, failure", "CheckCameras": "3 failure"}
 
     def tree() -> py_trees.trees.BehaviourTree:
-        groups = [
-            py_trees.composites.Sequence(
-                f"group_{i}",
-                memory=False,
-                children=[
-                    py_trees.behaviours.TickCounter(f"leaf_{j}", 1 + j, py_trees.common.Status.SUCCESS)
-                    for j in range(5)
-                ],
-            )
-            for i in range(10)
-        ]
-        return py_trees.trees.BehaviourTree(
-            py_trees.composites.Parallel("root", py_trees.common.ParallelPolicy.SuccessOnAll(False), groups)
-        )
+        made = ScriptedTree(shipped("tree")["recovery"], script, default="5 success").tree
+        made.visitors.clear()  # its table
+        return made
 
     logged, bare = tree(), tree()
     logged.add_visitor(TickLog(logged.root, io.StringIO(), lambda: 0.0))
