@@ -14,6 +14,8 @@ from interfaces.cell import Box, Cell, KnownCell
 from motion.collision import CollisionModel
 from motion.kinematics import ArmKinematics
 
+pytest_plugins = ["pytester", "app.pytest_plugin"]
+
 settings.register_profile("without deadline", deadline=None)  # compilation and other workers take their time
 settings.load_profile("without deadline")
 

@@ -147,7 +147,8 @@ class _Source:
             self._once(case, _check_inputs, (tree, repr(file.inputs), id(cell)), document, tree, file, cell)
         if not (file and cell and tree):
             return None
-        return Scenario(self.path.stem, self.path, file, cell, tree, self.overrides, case)
+        name = self.path.name.removesuffix(".yaml").removesuffix(".scenario")
+        return Scenario(name, self.path, file, cell, tree, self.overrides, case)
 
 
 def _of_case(finding: Finding, case: str) -> Finding:

@@ -1,0 +1,209 @@
+"""A pytest plugin, installed with Regrasp: scenario suites, trees that are tried out, and scripted leaves.
+
+Write a scenario suite: put scenario files named `*.scenario.yaml` beside your tests and call pytest. Each case is a
+test, `cells.scenario.yaml::gravity=zero`, that passes when all that the scenario expects comes out; otherwise its
+message is the run's explanation. The file's `markers` are the test's markers, so `-m "not slow"` leaves out what a file
+marks `slow`. Each case runs in a process of its own, hence `-n 2` is fine.
+
+    pytest --scenario-seed 0:5 --scenario-records runs     # every case with five seeds; the records are kept
+
+Try a tree out: `*.tree.xml` files are collected, and every tree file that the command line names:
+`pytest trees/*.xml`. Each gives two tests on scripted leaves: that the tree ends, and that a stop at any tick leaves
+nothing at work.
+
+Test a tree's logic: the fixture `scripted_tree` (see `trees.scripted`) takes a tree file, or a shipped tree's name.
+
+    def test_a_slip_is_recovered(scripted_tree):
+        tree = scripted_tree("recovery", {"DetectSlip": "3 failure, running", "Carry": "5 success"})
+        assert tree.run() is Status.SUCCESS
+        assert tree.entered("carry") == 2
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from contextlib import closing
+from functools import partial
+from itertools import count
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+# Everything of Regrasp comes late: a pytest that collects nothing of ours must not wait for it.
+if TYPE_CHECKING:
+    from app.record import Result
+    from app.scenario_file import Scenario
+    from trees.scripted import ScriptedTree
+
+SCENARIO, TREE = ".scenario.yaml", ".tree.xml"
+WIDTH = 100  # columns of an explanation
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """The options of scenario suites."""
+    group = parser.getgroup("regrasp", "scenario suites (*.scenario.yaml, a test a case) and trees (*.tree.xml)")
+    group.addoption(
+        "--scenario-seed", metavar="N|A:B", help="Run every case with this seed, or with each from A to B, B left out."
+    )
+    group.addoption(
+        "--scenario-records", metavar="DIR", type=Path, help="Keep the runs' records there, not in pytest's folder."
+    )
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Refuse wrong options before anything is collected."""
+    seed, records = config.getoption("--scenario-seed"), config.getoption("--scenario-records")
+    if seed is not None and not re.fullmatch(r"\d+(:\d+)?", seed):
+        raise pytest.UsageError(f"--scenario-seed {seed!r} is no seed; write a whole number, or a range such as 0:5")
+    if records is not None:
+        from app.output import findings
+
+        for finding in findings(records):
+            raise pytest.UsageError(f"--scenario-records: {finding}")
+
+
+def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Collector | None:
+    """Scenario files by their names, tree files by name or because they were asked for."""
+    if file_path.name.endswith(SCENARIO):
+        return ScenarioSuite.from_parent(parent, path=file_path)
+    if file_path.name.endswith(TREE) or (file_path.suffix == ".xml" and parent.session.isinitpath(file_path)):
+        return TreeFile.from_parent(parent, path=file_path)
+    return None
+
+
+class ScenarioSuite(pytest.File):
+    """A scenario file: a test a case."""
+
+    def collect(self) -> Iterator[pytest.Item]:
+        """The cases. Raises `CollectError` with a line for each finding in the file."""
+        from app.findings import Findings
+        from app.scenario_file import cases
+
+        try:
+            found = cases(str(self.path), _overrides(self.config.getoption("--scenario-seed")))
+        except Findings as error:
+            raise self.CollectError(str(error)) from None
+        for scenario in found:
+            for marker in scenario.file.markers:
+                self.config.addinivalue_line("markers", f"{marker}: named in a scenario file")
+            yield ScenarioCase.from_parent(self, name=scenario.case, scenario=scenario)
+
+
+def _overrides(seed: str | None) -> list[str]:
+    if seed is None:
+        return []
+    return [f"vary.seed='{seed}'" if ":" in seed else f"seed={seed}"]
+
+
+class Failed(Exception):  # noqa: N818 - the message is all of the report
+    """A test of ours failed; its message says why, and a traceback would say nothing more."""
+
+
+class _Item(pytest.Item):
+    def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
+        """The message alone."""
+        return str(excinfo.value) if isinstance(excinfo.value, Failed) else super().repr_failure(excinfo, style)
+
+    def reportinfo(self) -> tuple[Path, int | None, str]:
+        """File and test, for headings."""
+        return self.path, None, f"{self.path.name}: {self.name}"
+
+
+class ScenarioCase(_Item):
+    """One case of a scenario."""
+
+    def __init__(self, *, scenario: Scenario, **kwargs: Any) -> None:
+        super().__init__(**kwargs)
+        self.scenario = scenario
+        for marker in scenario.file.markers:
+            self.add_marker(marker)
+
+    def runtest(self) -> None:
+        """Run it in a process of its own. Raises `Failed` with the explanation when it did not come out as expected."""
+        from app.processes import run_each
+
+        folder = self._folder()
+        self.user_properties += [("seed", self.scenario.file.seed), ("record", str(folder))]
+        with closing(run_each([partial(_run, self.scenario, folder)], 1)) as ended:
+            [done] = ended
+        if done.value is None:
+            raise Failed(f"{done.error}\n  record  {folder}")
+        if not done.value.succeeded:
+            raise Failed(_explained(folder))
+
+    def _folder(self) -> Path:
+        """A folder for the record that holds none."""
+        name = re.sub(r"[^\w=.,-]+", "_", f"{self.path.name.removesuffix(SCENARIO)}-{self.name}")[:120] + "-"
+        kept: Path | None = self.config.getoption("--scenario-records")
+        if kept is None:
+            factory: pytest.TempPathFactory = self.config._tmp_path_factory  # type: ignore[attr-defined]
+            return factory.mktemp(name)
+        return next(folder for n in count() if not (folder := kept.absolute() / f"{name}{n}").exists())
+
+
+def _run(scenario: Scenario, folder: Path) -> Result:
+    """In the case's process, the only one that needs the physics."""
+    from app.episode import run_episode
+
+    return run_episode(scenario, folder, seed=scenario.file.seed)
+
+
+def _explained(folder: Path) -> str:
+    from app.explain import explanation
+    from app.record_reader import read_record
+
+    return f"{explanation(read_record(folder), WIDTH)}\nrecord  {folder}"
+
+
+class TreeFile(pytest.File):
+    """A tree file, to be tried out on scripted leaves."""
+
+    def collect(self) -> Iterator[pytest.Item]:
+        """Its two tests. Raises `CollectError` with a line for each finding in the file."""
+        from app.findings import Findings
+        from app.scenario_file import check_tree_file
+        from trees.trials import left_by_a_stop, never_ends
+
+        try:
+            check_tree_file(self.path)
+        except Findings as error:
+            raise self.CollectError(str(error)) from None
+        yield TreeTrial.from_parent(self, name="ends", trial=never_ends)
+        yield TreeTrial.from_parent(self, name="stops at every tick", trial=left_by_a_stop)
+
+
+class TreeTrial(_Item):
+    """One of the trials of `trees.trials`."""
+
+    def __init__(self, *, trial: Callable[[Path], Iterator[str]], **kwargs: Any) -> None:
+        super().__init__(**kwargs)
+        self._trial = trial
+
+    def runtest(self) -> None:
+        """Raises `Failed` with the first thing that went wrong."""
+        if wrong := next(self._trial(self.path), None):
+            raise Failed(wrong)
+
+    def teardown(self) -> None:
+        """Leave nothing of the tree on the blackboard."""
+        from py_trees.blackboard import Blackboard
+
+        Blackboard.clear()
+
+
+@pytest.fixture
+def scripted_tree() -> Iterator[Callable[..., ScriptedTree]]:
+    """Makes a tree of scripted leaves, by a tree file or a shipped tree's name; arguments as `trees.scripted` says."""
+    from py_trees.blackboard import Blackboard
+
+    from app.resources import resolve
+    from trees.scripted import ScriptedTree
+
+    def make(tree: str | Path, script: dict[str, str] | None = None, **options: Any) -> ScriptedTree:
+        return ScriptedTree(resolve("tree", str(tree), Path()), script, **options)
+
+    Blackboard.clear()
+    yield make
+    Blackboard.clear()
