@@ -1,20 +1,28 @@
-"""Tree files, and what loads and checks them."""
+"""Tree files, and what loads, checks, shows and exports them."""
 
 from trees.check import Finding, check_tree
 from trees.element import TreeSyntaxError
+from trees.graph import Node, collapsed, read_graph, recorded
 from trees.inputs import check_inputs
 from trees.load import TreeError, load_tree
 from trees.paths import in_tree_order, node_paths
+from trees.run_stats import NodeStats, run_stats
 from trees.show import show_tree
 
 __all__ = [
     "Finding",
+    "Node",
+    "NodeStats",
     "TreeError",
     "TreeSyntaxError",
     "check_inputs",
     "check_tree",
+    "collapsed",
     "in_tree_order",
     "load_tree",
     "node_paths",
+    "read_graph",
+    "recorded",
+    "run_stats",
     "show_tree",
 ]

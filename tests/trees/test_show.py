@@ -10,11 +10,11 @@ def test_a_tree_is_drawn_with_names_types_memory_and_ports(tmp_path: Path) -> No
     assert show_tree(tmp_path / "tree.xml").splitlines() == [
         "root  Sequence with memory",
         "├─ search  SubTree Search place={place} tries=2",
-        "│  └─ again  Retry num_failures={tries}",
+        "│  └─ again  Retry num_failures={tries}=2",
         "│     └─ either  Fallback reactive",
         "│        ├─ not_yet  Inverter",
         "│        │  └─ blink  Wait ticks=1",
-        "│        └─ look  Look angle=0.25 camera={camera} place={place}",
+        "│        └─ look  Look angle=0.25 camera={camera}=rear place={place}",
         "├─ carry  Parallel success_on_one",
         "│  ├─ watch  Wait ticks=99",
         "│  └─ move  Wait ticks=2",

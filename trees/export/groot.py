@@ -1,0 +1,101 @@
+"""A tree as BehaviorTree.CPP v4 XML with its TreeNodesModel, which Groot2 opens.
+
+What has a counterpart there becomes it: Sequence and Fallback are the ones that go on where they were, without memory
+ReactiveSequence and ReactiveFallback. Decorators without one, and all leaves, are named in the model. A tree's default
+keys become ports of its model; those of the main tree, which nobody calls, are written out where they are used.
+"""
+
+from xml.etree import ElementTree as ET
+
+from trees.graph import Node, Port
+
+_RENAMED = {
+    "Retry": ("RetryUntilSuccessful", {"num_failures": "num_attempts"}),
+    "Repeat": ("Repeat", {"num_success": "num_cycles"}),
+    "Inverter": ("Inverter", {}),
+    "FailureIsSuccess": ("ForceSuccess", {}),
+    "SuccessIsFailure": ("ForceFailure", {}),
+}
+_TYPES = {"str": "std::string", "float": "double", "int": "int", "bool": "bool"}
+
+
+def to_groot(root: Node) -> str:
+    """The document. A run's stats become descriptions. Takes a whole tree, not a collapsed one."""
+    document = ET.Element("root", {"BTCPP_format": "4", "main_tree_to_execute": root.tree})
+    for identifier, tops in _trees(root).items():
+        tree = ET.SubElement(document, "BehaviorTree", {"ID": identifier})
+        tree.append(_element(tops, is_main=identifier == root.tree))
+    document.append(_model(root))
+    ET.indent(document)
+    return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(document, encoding="unicode")
+
+
+def _trees(root: Node) -> dict[str, list[Node]]:
+    """Each tree's ID and the top nodes of all its instances."""
+    tops = {root.tree: [root]}
+    for node in root.walk():
+        if node.kind == "subtree" and node.children:
+            tops.setdefault(node.subtree, []).append(node.children[0])
+    return tops
+
+
+def _element(instances: list[Node], is_main: bool) -> ET.Element:
+    """One node, which may stand for several: its tree is written once, however often it is included."""
+    node = instances[0]
+    tag, ports = _words(node, is_main)
+    subtree = {"ID": node.subtree} if node.kind == "subtree" else {}
+    element = ET.Element(tag, subtree | {"name": node.name} | ports)
+    told = [f"{n.path}: {n.stats.text}{' (failed here)' if n.failed else ''}" for n in instances if n.stats]
+    if told:
+        element.set("_description", "; ".join(told))
+    if node.kind != "subtree":
+        element.extend(_element(list(same), is_main) for same in zip(*(n.children for n in instances), strict=True))
+    return element
+
+
+def _words(node: Node, is_main: bool) -> tuple[str, dict[str, str]]:
+    """The element's name there, and its attributes."""
+    ports = {port.name: _value(port, is_main) for port in node.given}
+    if node.kind in ("sequence", "fallback"):
+        name = node.kind.capitalize()
+        return (name if node.memory else f"Reactive{name}"), ports
+    if node.kind == "parallel":  # one failure ends it, as in py_trees
+        successes = "1" if node.policy == "success_on_one" else "-1"
+        return "Parallel", {"success_count": successes, "failure_count": "1"}
+    if node.type == "OneShot" and node.policy == "on_completion":
+        return "RunOnce", {"then_skip": "false"}
+    tag, names = _RENAMED.get(node.type, (node.type, {}))
+    policy = {"policy": node.policy} if node.policy else {}
+    return tag, {names.get(name, name): value for name, value in ports.items()} | policy
+
+
+def _value(port: Port, is_main: bool) -> str:
+    return port.constant if is_main and port.constant is not None else str(port.value)
+
+
+def _model(root: Node) -> ET.Element:
+    """What Groot2 must be told: leaves, decorators of our own, and the keys of subtrees."""
+    model = ET.Element("TreeNodesModel")
+    known: set[str] = set()
+    for node in sorted(root.walk(), key=lambda n: (n.type, n.subtree)):
+        identifier = node.subtree or node.type
+        custom = node.kind in ("action", "condition", "subtree") or _is_custom_decorator(node)
+        if custom and identifier not in known:
+            known.add(identifier)
+            kind = "SubTree" if node.kind == "subtree" else node.kind.capitalize()
+            entry = ET.SubElement(model, kind, {"ID": identifier})
+            entry.extend(_port(port) for port in node.ports)
+            if node.policy:
+                entry.append(_port(Port("policy")))
+    return model
+
+
+def _is_custom_decorator(node: Node) -> bool:
+    return node.kind == "decorator" and _words(node, False)[0] == node.type and node.type not in _RENAMED
+
+
+def _port(port: Port) -> ET.Element:
+    attributes = {"name": port.name, "type": _TYPES.get(port.type, "BT::AnyTypeAllowed")}
+    if port.default is not None:
+        attributes["default"] = port.default
+    return ET.Element(f"{port.direction}_port", attributes)

@@ -1,0 +1,132 @@
+"""A tree as a picture: boxes with a sign, a name and small text, links, frames round subtrees, and a legend."""
+
+from dataclasses import replace
+from typing import get_args
+
+from trees.export.icons import ICON, icon, icon_width
+from trees.export.labels import details, tooltip
+from trees.export.layout import Box, lay_out
+from trees.export.scene import Curve, Group, Rect, Scene, Shape, Text
+from trees.export.text_width import shortened, text_width
+from trees.export.themes import Theme
+from trees.graph import Kind, Node
+
+NAME, SMALL = 13.0, 10.5  # px, font sizes
+MAX_TEXT = 250.0  # px; what is longer is cut, and whole in the tooltip
+_MARGIN = 18.0
+_INSET = 4.0  # box to icon
+_LINE = 13.5  # px from one small line to the next
+_BASELINE = 17.6  # px below the box's top: the name's
+_BARE = ICON + 2 * _INSET  # height of a box with a name only
+
+
+def picture(root: Node, theme: Theme) -> Scene:
+    """Draw the tree."""
+    top = lay_out(root, _size)
+    boxes = list(top.walk())
+    for box in boxes:
+        box.x += _MARGIN
+        box.y += _MARGIN
+    groups = [_frame(box, theme) for box in boxes if box.is_frame]
+    groups += [_link(box, child, theme) for box in boxes if not box.is_frame for child in box.children]
+    groups += [_node(box, theme) for box in boxes if not box.is_frame]
+    width = max(box.right for box in boxes) + _MARGIN
+    legend, width, height = _legend(root, width, max(box.bottom for box in boxes) + _MARGIN, theme)
+    return Scene(f"Behaviour tree {root.name}", width, height, theme.background, groups + legend)
+
+
+def _texts(node: Node) -> list[tuple[str, float, bool, float, float]]:
+    """The name and the small lines as they fit: text, size, bold, and where from the text's left end and the box's top.
+
+    Small text stands below the name, which keeps inner nodes narrow; beside it in frames, and in leaves with room for
+    it, which keeps the picture low.
+    """
+    name = shortened(node.name, NAME, MAX_TEXT, bold=True)
+    small = [shortened(line, SMALL, MAX_TEXT) for line in details(node)]
+    x, y = text_width(name, NAME, bold=True) + 7.0, _BASELINE
+    lines = [(name, NAME, True, 0.0, y)]
+    is_frame = node.kind == "subtree" and bool(node.children)
+    fits = not node.children and len(small) == 1 and x + text_width(small[0], SMALL) <= MAX_TEXT
+    for line in small:
+        if not (is_frame or fits):
+            x, y = 0.0, y + _LINE
+        lines.append((line, SMALL, False, x, y))
+        x += text_width(line, SMALL) + 7.0
+    return lines
+
+
+def _size(node: Node) -> tuple[float, float]:
+    lines = _texts(node)
+    widest = max(x + text_width(text, size, bold) for text, size, bold, x, _ in lines)
+    return _left(node) + widest + 9.0, lines[-1][-1] + _BARE - _BASELINE
+
+
+def _left(node: Node) -> float:
+    """From the box's left edge to its text."""
+    return _INSET + icon_width(node) + 6.0
+
+
+def _node(box: Box, theme: Theme) -> Group:
+    node, colour = box.node, _colour(box.node, theme)
+    fill = theme.failed_surface if node.failed else theme.surface
+    radius = _BARE / 2 if node.kind == "condition" else 5.0
+    body = Rect(box.x, box.y, box.width, box.height, radius, fill, colour, 2.2 if node.failed else 1.2)
+    # A second sheet behind says that there is more.
+    sheets = [replace(body, x=box.x + 3, y=box.y + 3), body] if node.hidden else [body]
+    return Group((*sheets, *_content(box, theme)), tooltip(node))
+
+
+def _frame(box: Box, theme: Theme) -> Group:
+    line = theme.failed if box.node.failed else theme.frame_line
+    body = Rect(box.x, box.y, box.width, box.height, 8.0, theme.frame, line)
+    return Group((body, *_content(box, theme)), tooltip(box.node))
+
+
+def _content(box: Box, theme: Theme) -> list[Shape]:
+    """Sign and texts."""
+    node = box.node
+    ink = theme.text if node.stats is None or node.stats.visits else theme.muted
+    shapes = icon(node, box.x + _INSET, box.y + _INSET, _colour(node, theme), theme.icon)
+    for text, size, bold, x, y in _texts(node):
+        shapes.append(Text(box.x + _left(node) + x, box.y + y, text, size, ink if bold else theme.muted, bold))
+    return shapes
+
+
+def _colour(node: Node, theme: Theme) -> str:
+    """By kind; red where the run failed, grey where it never came."""
+    if node.failed:
+        return theme.failed
+    return theme.kinds[node.kind] if node.stats is None or node.stats.visits else theme.line
+
+
+def _link(parent: Box, child: Box, theme: Theme) -> Group:
+    start, end = (parent.right, parent.y + parent.height / 2), (child.top_node.x, child.middle)
+    failed = parent.node.failed and child.node.failed
+    bend = child.x - parent.right
+    pull = (start[0] + bend / 2, start[1]), (start[0] + bend / 2, end[1])
+    colour = theme.failed if failed else theme.line
+    return Group((Curve((start, *pull, end), colour, 2.2 if failed else 1.4),))
+
+
+def _legend(root: Node, width: float, y: float, theme: Theme) -> tuple[list[Group], float, float]:
+    """The signs that the picture uses, in lines; with the picture's width and height when they are in."""
+    nodes = list(root.walk())
+    entries: list[tuple[Node, str]] = []
+    for kind in get_args(Kind):
+        for memory in (None, False, True):
+            if any(n.kind == kind and n.memory is memory for n in nodes):
+                words = {True: " with memory", False: " without memory", None: ""}[memory]
+                entries.append((Node("", "", "", kind, memory), kind + words))
+    if any(n.failed for n in nodes):
+        entries.append((Node("", "", "", "action", failed=True), "path that failed"))
+    groups, x = [], _MARGIN
+    for sign, words in entries:
+        wide = icon_width(sign) + 5 + text_width(words, SMALL) + 14
+        if x > _MARGIN and x + wide > max(width, 480.0):
+            x, y = _MARGIN, y + ICON + 7
+        shapes = icon(sign, x, y, _colour(sign, theme), theme.icon)
+        shapes.append(Text(x + icon_width(sign) + 5, y + 12.7, words, SMALL, theme.muted))
+        groups.append(Group(tuple(shapes)))
+        x += wide
+        width = max(width, x)
+    return groups, width, y + ICON + _MARGIN

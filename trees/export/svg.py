@@ -1,0 +1,58 @@
+"""A tree as SVG: one file, no script, no font or picture from elsewhere."""
+
+from xml.sax.saxutils import escape, quoteattr
+
+from trees.export.picture import picture
+from trees.export.scene import Curve, Group, Lines, Rect, Scene, Shape
+from trees.export.themes import Theme
+from trees.graph import Node
+
+_FONTS = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, 'DejaVu Sans', sans-serif"
+
+
+def to_svg(root: Node, theme: Theme) -> str:
+    """The picture of the tree; pointing at a node tells all that is known of it."""
+    return _document(picture(root, theme))
+
+
+def _document(scene: Scene) -> str:
+    width, height = _n(scene.width), _n(scene.height)
+    lines = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" viewBox="0 0 {width} {height}"'
+        f' role="img" font-family="{_FONTS}">',
+        f"<title>{escape(scene.title)}</title>",
+        f'<rect width="{width}" height="{height}" fill="{scene.background}"/>',
+        *map(_group, scene.groups),
+        "</svg>",
+    ]
+    return "\n".join(lines)
+
+
+def _group(group: Group) -> str:
+    title = f"<title>{escape(group.title)}</title>" if group.title else ""
+    return f"<g>{title}{''.join(map(_shape, group.shapes))}</g>"
+
+
+def _shape(shape: Shape) -> str:
+    if isinstance(shape, Rect):
+        place = f'x="{_n(shape.x)}" y="{_n(shape.y)}" width="{_n(shape.width)}" height="{_n(shape.height)}"'
+        return f'<rect {place} rx="{_n(shape.radius)}" fill="{shape.fill}"{_stroke(shape)}/>'
+    if isinstance(shape, Curve):
+        (x0, y0), *others = shape.points
+        pulls = " ".join(f"{_n(x)},{_n(y)}" for x, y in others)
+        return f'<path d="M{_n(x0)},{_n(y0)} C{pulls}" fill="none"{_stroke(shape)}/>'
+    if isinstance(shape, Lines):
+        points = " ".join(f"{_n(x)},{_n(y)}" for x, y in shape.points)
+        ends = ' stroke-linecap="round" stroke-linejoin="round"'
+        return f'<polyline points="{points}" fill="none"{_stroke(shape)}{ends}/>'
+    weight = ' font-weight="600"' if shape.bold else ""
+    place = f'x="{_n(shape.x)}" y="{_n(shape.y)}" font-size="{_n(shape.size)}"'
+    return f"<text {place}{weight} fill={quoteattr(shape.colour)}>{escape(shape.text)}</text>"
+
+
+def _stroke(shape: Rect | Curve | Lines) -> str:
+    return f' stroke="{shape.stroke}" stroke-width="{_n(shape.stroke_width)}"' if shape.stroke_width else ""
+
+
+def _n(value: float) -> str:
+    return f"{value:.1f}".removesuffix(".0")

@@ -1,0 +1,30 @@
+"""How wide a text gets before it is drawn, in a font that nobody knows yet."""
+
+# In ems, rounded up from the widest font that browsers take for sans-serif (DejaVu Sans Bold).
+_CLASSES = {
+    0.35: " ijl'",
+    0.41: ",./:;IJ\\|",
+    0.47: "!()[]-f",
+    0.55: '"*_`rt',
+    0.61: "?csz",
+    0.72: "0123456789abdeghknopquvxy${}",
+    0.86: "ABCDEFGHKLNOPQRSTUVXYZ",
+    0.93: "#+<=>^~&w",
+}
+_WIDTHS = {char: width for width, chars in _CLASSES.items() for char in chars}
+_WIDEST = 1.11
+_REGULAR = 0.94  # of the bold width, at most
+
+
+def text_width(text: str, size: float, bold: bool = False) -> float:
+    """Upper bound in pixels at a font of `size` pixels."""
+    return sum(_WIDTHS.get(char, _WIDEST) for char in text) * size * (1.0 if bold else _REGULAR)
+
+
+def shortened(text: str, size: float, width: float, bold: bool = False) -> str:
+    """The text, cut with … where it would be wider than `width` pixels."""
+    if text_width(text, size, bold) <= width:
+        return text
+    while text and text_width(text + "…", size, bold) > width:
+        text = text[:-1]
+    return text + "…"

@@ -1,0 +1,231 @@
+"""A tree as one value that every writer takes: what the file says, with subtrees filled in."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
+
+from py_trees.common import Status
+
+from trees.element import Element, key_of, read_elements
+from trees.run_stats import NodeStats
+
+Kind = Literal["sequence", "fallback", "parallel", "decorator", "action", "condition", "subtree"]
+_COMPOSITES: dict[str, Kind] = {
+    "Sequence": "sequence",
+    "Fallback": "fallback",
+    "Selector": "fallback",
+    "Parallel": "parallel",
+    "SubTree": "subtree",
+}
+
+
+@dataclass(frozen=True)
+class Port:
+    """A port of a leaf, an argument of a decorator, or a key of a subtree."""
+
+    name: str
+    value: str | None = None  # as written; None where the file leaves it out
+    constant: str | None = None  # the literal that the value stands for; None where it comes from the blackboard
+    direction: Literal["input", "output", "inout"] = "input"
+    type: str = "str"
+    default: str | None = None
+
+    @property
+    def text(self) -> str:
+        """What is written, with the constant behind a key beside it: tries={tries}=5."""
+        behind = "" if self.constant in (None, self.value) else f"={self.constant}"
+        return _printable(f"{self.name}={self.value}{behind}")
+
+
+@dataclass(frozen=True)
+class Node:
+    """One node, or a SubTree with the top node of its tree as its only child."""
+
+    path: str  # as `node_paths` names it
+    name: str
+    type: str  # the element's tag
+    kind: Kind
+    memory: bool | None = None
+    policy: str = ""
+    ports: tuple[Port, ...] = ()
+    tree: str = ""  # the ID of the tree that it is written in
+    subtree: str = ""  # the ID of a SubTree's tree
+    children: tuple["Node", ...] = ()
+    note: str = ""  # why a SubTree has no child
+    hidden: int = 0  # nodes below that are not shown
+    stats: NodeStats | None = None  # of a recorded run
+    failed: bool = False  # on the path by which the run failed
+
+    def walk(self) -> Iterator["Node"]:
+        """This node and all below it, a parent before its children."""
+        yield self
+        for child in self.children:
+            yield from child.walk()
+
+    @property
+    def given(self) -> list[Port]:
+        """The ports that the file gives a value."""
+        return [port for port in self.ports if port.value is not None]
+
+
+@dataclass(frozen=True)
+class _Scope:
+    """One instance of a tree: where it stands, what is a constant in it, and the trees that it stands in."""
+
+    trees: Mapping[str, Element]
+    leaves: Mapping[str, type]
+    keys: Mapping[str, str]
+    opened: tuple[str, ...]
+
+
+def read_graph(path: Path, leaves: Mapping[str, type] | None = None, inputs: Mapping[str, str] | None = None) -> Node:
+    """The file's main tree. `leaves` maps a tag to its class, by default all of ours; what is in no mapping has no types.
+
+    `inputs` take the place of the main BehaviorTree's default values, as in `load_tree`.
+
+    Raises:
+        OSError: the file cannot be read.
+        TreeSyntaxError: it is not well-formed.
+        ValueError: it has no main tree.
+    """
+    if leaves is None:
+        from behaviors import LEAVES  # late: they bring the planner
+
+        leaves = LEAVES
+    root = read_elements(path)
+    trees = {tree.attributes.get("ID", ""): tree for tree in root.children}
+    main = root.attributes.get("main_tree_to_execute", "")
+    if main not in trees or not trees[main].children:
+        raise ValueError(f"no tree {main!r}")
+    keys = _constants(trees[main].attributes | dict(inputs or {}), {})
+    return _node(trees[main].children[0], "", _Scope(trees, leaves, keys, (main,)))
+
+
+def collapsed(node: Node, depth: int) -> Node:
+    """The tree without what is more than `depth` levels below its top."""
+    if depth > 0 or not node.children:
+        return replace(node, children=tuple(collapsed(child, depth - 1) for child in node.children))
+    return replace(node, children=(), hidden=sum(n.kind != "subtree" for n in node.walk() if n is not node))
+
+
+def recorded(node: Node, stats: Mapping[str, NodeStats], ended_at: str = "") -> Node:
+    """The tree with the stats of a run, and the path by which it failed marked.
+
+    That path follows the nodes whose last status is FAILURE; of a run that was cut short it leads to `ended_at`.
+    """
+    return _marked(_with_stats(node, stats), ended_at)
+
+
+def _with_stats(node: Node, stats: Mapping[str, NodeStats]) -> Node:
+    children = tuple(_with_stats(child, stats) for child in node.children)
+    own = children[0].stats if node.kind == "subtree" and children else stats.get(node.path, NodeStats())
+    return replace(node, children=children, stats=own)
+
+
+def _marked(node: Node, ended_at: str) -> Node:
+    last = node.stats.last if node.stats else ""
+    if last != "FAILURE" and (last == "SUCCESS" or not f"{ended_at}/".startswith(f"{node.path}/")):
+        return node
+    return replace(node, failed=True, children=tuple(_marked(child, ended_at) for child in node.children))
+
+
+def _node(element: Element, above: str, scope: _Scope) -> Node:
+    path = f"{above}/{element.name}" if above else element.name
+    if element.tag == "SubTree":
+        return _subtree(element, path, scope)
+    leaf = scope.leaves.get(element.tag)
+    declared = _declared(leaf)
+    attributes = dict(element.attributes)
+    attributes.pop("name", None)
+    memory, policy = attributes.pop("memory", None), attributes.pop("policy", "")
+    given = (_given(declared.pop(name, Port(name)), value, scope.keys) for name, value in attributes.items())
+    return Node(
+        path,
+        element.name,
+        element.tag,
+        _COMPOSITES.get(element.tag) or _leaf_kind(leaf, element),
+        None if memory is None else memory == "true",
+        policy,
+        (*given, *declared.values()),
+        scope.opened[-1],
+        children=tuple(_node(child, path, scope) for child in element.children),
+    )
+
+
+def _subtree(element: Element, path: str, scope: _Scope) -> Node:
+    given = {name: value for name, value in element.attributes.items() if name not in ("ID", "name")}
+    identifier = element.attributes.get("ID", "")
+    node = Node(path, element.name, element.tag, "subtree", tree=scope.opened[-1], subtree=identifier)
+    ports = {name: _given(Port(name), value, scope.keys) for name, value in given.items()}
+    if identifier in scope.opened or not (tree := scope.trees.get(identifier)) or not tree.children:
+        note = "includes itself" if identifier in scope.opened else "missing"
+        return replace(node, ports=tuple(ports.values()), note=note)
+    inner = replace(scope, keys=_constants(tree.attributes | given, scope.keys), opened=(*scope.opened, identifier))
+    child = _node(tree.children[0], path, inner)
+    for name, value in tree.attributes.items():
+        if name != "ID":
+            ports[name] = replace(ports.get(name, Port(name)), default=value)
+    typed = (_used(port, child) for port in ports.values())
+    return replace(node, ports=tuple(typed), children=(child,))
+
+
+def _given(port: Port, value: str, keys: Mapping[str, str]) -> Port:
+    return replace(port, value=value, constant=_constant(value, keys))
+
+
+def _constant(value: str, keys: Mapping[str, str]) -> str | None:
+    try:
+        key = key_of(value)
+    except ValueError:  # a finding of the check
+        key = None
+    return value if key is None else keys.get(key)
+
+
+def _constants(attributes: Mapping[str, str], keys: Mapping[str, str]) -> dict[str, str]:
+    """The literals that a tree's attributes hand to its inside."""
+    known = {name: _constant(value, keys) for name, value in attributes.items() if name not in ("ID", "name")}
+    return {name: value for name, value in known.items() if value is not None}
+
+
+def _used(port: Port, top: Node) -> Port:
+    """A subtree's key with type and direction from the ports inside that it is wired to."""
+    inside = [p for node in _same_tree(top) for p in node.ports if p.value == f"{{{port.name}}}"]
+    directions = {p.direction for p in inside} or {"input"}
+    types = {p.type for p in inside}
+    return replace(
+        port,
+        direction=directions.pop() if len(directions) == 1 else "inout",
+        type=types.pop() if len(types) == 1 else "str",
+    )
+
+
+def _same_tree(node: Node) -> Iterator[Node]:
+    yield node
+    if node.kind != "subtree":
+        for child in node.children:
+            yield from _same_tree(child)
+
+
+def _declared(leaf: Any) -> dict[str, Port]:
+    if leaf is None:
+        return {}
+    known: dict[str, Port] = {}
+    for direction, ports in (("input", leaf.input_ports()), ("output", leaf.output_ports())):
+        for name, port in ports.items():
+            default = str(port.default_value) if direction == "input" and port.has_default else None
+            kind = getattr(port.data_type, "__name__", str(port.data_type))
+            known[name] = Port(name, direction=direction, type=kind, default=default)
+    return known
+
+
+def _leaf_kind(leaf: Any, element: Element) -> Kind:
+    if element.children:
+        return "decorator"
+    at_once = getattr(leaf, "RETURNS", None) == {Status.SUCCESS, Status.FAILURE}  # an answer, with no work to wait for
+    return "condition" if at_once else "action"
+
+
+def _printable(text: str) -> str:
+    """What stands in a file must not steer a terminal or break a line."""
+    return "".join(c if c.isprintable() else " " for c in text)
