@@ -34,6 +34,44 @@ def show(tree: Annotated[str, typer.Argument(help="A shipped tree's name, or a p
     typer.echo(show_tree(path))
 
 
+@app.command("export")
+def export(
+    tree: Annotated[
+        str | None,
+        typer.Argument(help="A shipped tree's name, or a path to an .xml file; with --run, by default its own."),
+    ] = None,
+    form: Annotated[
+        str | None,
+        typer.Option("--format", help="dot, mermaid, svg, png, ascii, json or groot; by default as FILE's name ends."),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", metavar="FILE", help="Write here, not to standard output.")
+    ] = None,
+    depth: Annotated[
+        int | None, typer.Option(min=0, metavar="N", help="Leave out what is more than N levels below the top.")
+    ] = None,
+    theme: Annotated[str, typer.Option(help="Of dot, svg and png: light or dark.")] = "light",
+    run: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Show what this recorded run did at each node.")
+    ] = None,
+) -> None:
+    """Write a tree as a picture, as text, or for another program. Needs no other program.
+
+    \b
+    Examples:
+      regrasp trees export recovery -o recovery.svg --theme dark
+      regrasp trees export recovery --format mermaid --depth 4
+      regrasp trees export --run runs/short_obstacle-0-1 -o what_happened.png
+    \b
+    ascii is what `trees show` draws; groot is BehaviorTree.CPP v4 XML, which Groot2 opens.
+    """
+    from app.tree_export import Request, exported  # late, like all that only this command needs
+
+    content = exported(Request(tree, form, out, depth, theme, run))
+    if out is None:
+        typer.echo(content, nl=False)
+
+
 @app.command("check")
 def check(
     trees: Annotated[

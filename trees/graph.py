@@ -1,6 +1,6 @@
 """A tree as one value that every writer takes: what the file says, with subtrees filled in."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -80,7 +80,7 @@ class _Scope:
 
 
 def read_graph(path: Path, leaves: Mapping[str, type] | None = None, inputs: Mapping[str, str] | None = None) -> Node:
-    """The file's main tree. `leaves` maps a tag to its class, by default all of ours; what is in no mapping has no types.
+    """The file's main tree. `leaves` maps a tag to its class, by default all of ours; others show as far as written.
 
     `inputs` take the place of the main BehaviorTree's default values, as in `load_tree`.
 
@@ -109,25 +109,12 @@ def collapsed(node: Node, depth: int) -> Node:
     return replace(node, children=(), hidden=sum(n.kind != "subtree" for n in node.walk() if n is not node))
 
 
-def recorded(node: Node, stats: Mapping[str, NodeStats], ended_at: str = "") -> Node:
-    """The tree with the stats of a run, and the path by which it failed marked.
-
-    That path follows the nodes whose last status is FAILURE; of a run that was cut short it leads to `ended_at`.
-    """
-    return _marked(_with_stats(node, stats), ended_at)
-
-
-def _with_stats(node: Node, stats: Mapping[str, NodeStats]) -> Node:
-    children = tuple(_with_stats(child, stats) for child in node.children)
-    own = children[0].stats if node.kind == "subtree" and children else stats.get(node.path, NodeStats())
-    return replace(node, children=children, stats=own)
-
-
-def _marked(node: Node, ended_at: str) -> Node:
-    last = node.stats.last if node.stats else ""
-    if last != "FAILURE" and (last == "SUCCESS" or not f"{ended_at}/".startswith(f"{node.path}/")):
-        return node
-    return replace(node, failed=True, children=tuple(_marked(child, ended_at) for child in node.children))
+def recorded(node: Node, stats: Mapping[str, NodeStats], failed: Collection[str] = ()) -> Node:
+    """The tree with the stats of a run by path, and a mark on the paths of the nodes by which it failed."""
+    children = tuple(recorded(child, stats, failed) for child in node.children)
+    if node.kind == "subtree" and children:  # no node of its own in a run
+        return replace(node, children=children, stats=children[0].stats, failed=children[0].failed)
+    return replace(node, children=children, stats=stats.get(node.path, NodeStats()), failed=node.path in failed)
 
 
 def _node(element: Element, above: str, scope: _Scope) -> Node:
@@ -211,12 +198,16 @@ def _declared(leaf: Any) -> dict[str, Port]:
     if leaf is None:
         return {}
     known: dict[str, Port] = {}
-    for direction, ports in (("input", leaf.input_ports()), ("output", leaf.output_ports())):
-        for name, port in ports.items():
-            default = str(port.default_value) if direction == "input" and port.has_default else None
-            kind = getattr(port.data_type, "__name__", str(port.data_type))
-            known[name] = Port(name, direction=direction, type=kind, default=default)
+    for name, port in leaf.input_ports().items():
+        default = str(port.default_value) if port.has_default else None
+        known[name] = Port(name, type=_type_name(port), default=default)
+    for name, port in leaf.output_ports().items():
+        known[name] = Port(name, direction="output", type=_type_name(port))
     return known
+
+
+def _type_name(port: Any) -> str:
+    return getattr(port.data_type, "__name__", str(port.data_type))
 
 
 def _leaf_kind(leaf: Any, element: Element) -> Kind:

@@ -1,8 +1,7 @@
 """What a recorded run did at each node, counted from its tick log."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
 
 
 @dataclass
@@ -30,16 +29,15 @@ class NodeStats:
         return ", ".join([*parts, f"{self.running_seconds:.2f} s"] if self.running_seconds else parts)
 
 
-def run_stats(ticks: Iterable[Mapping[str, Any]]) -> dict[str, NodeStats]:
-    """The stats of each node by its path, from the lines of a tick log in their order.
+def run_stats(ticks: Iterable[tuple[float, str, str]]) -> dict[str, NodeStats]:
+    """The stats of each node by its path, from the changes of status in their order: simulated s, path, status.
 
-    Each line holds t (simulated s), path and status. A node that still runs has run until the last line.
+    A node that still runs has run until the last line.
     """
     stats: dict[str, NodeStats] = {}
     running_since: dict[str, float] = {}
     now = 0.0
-    for tick in ticks:
-        now, path, status = tick["t"], tick["path"], tick["status"]
+    for now, path, status in ticks:
         node = stats.setdefault(path, NodeStats())
         if path in running_since:
             node.running_seconds += now - running_since.pop(path)

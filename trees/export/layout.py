@@ -23,7 +23,7 @@ Size = Callable[[Node], tuple[float, float]]
 
 @dataclass(eq=False)
 class Box:
-    """A node's rectangle in px, y downward. Of a SubTree that is shown: the frame round its tree, with a title strip."""
+    """A node's rectangle in px, y downward. Of a SubTree that is shown: the frame round its tree, with a title."""
 
     node: Node
     x: float

@@ -1,0 +1,110 @@
+"""What `regrasp trees export` asks for, checked, and written."""
+
+import sys
+from collections.abc import Collection
+from dataclasses import dataclass
+from pathlib import Path
+
+from app.findings import Finding, Findings, nearest, shown
+from app.record import write_whole
+from app.record_reader import RunRecord, read_record
+from app.resources import resolve
+from app.scenario_file import check_tree_file, tree_text
+from trees import Node, collapsed, read_graph, recorded, run_stats
+from trees.export import FORMATS, SUFFIXES, THEMES, export_tree
+
+
+@dataclass(frozen=True)
+class Request:
+    """The command's arguments and options as they were typed; None where they were left out."""
+
+    tree: str | None
+    form: str | None
+    out: Path | None
+    depth: int | None
+    theme: str
+    run: Path | None
+
+
+def exported(request: Request) -> bytes:
+    """The tree in the format asked for, also written to `out` if there is one. Raises `Findings`."""
+    form = _form(request)
+    record = read_record(request.run) if request.run else None
+    path = _tree_file(request, record)
+    check_tree_file(path)
+    node = _with_run(path, record) if record else read_graph(path)
+    if request.depth is not None:
+        node = collapsed(node, request.depth)
+    content = export_tree(node, form, request.theme)
+    if request.out:
+        _write(request.out, content, path)
+    return content
+
+
+def _form(request: Request) -> str:
+    """The format's name, when all that can be seen without a tree is right."""
+    out, found = request.out, []
+    form = request.form or (SUFFIXES.get(out.suffix.lower(), "") if out else "ascii")
+    if request.form and request.form not in FORMATS:
+        found.append(Finding("--format", 1, f"no format {request.form!r}; {nearest(request.form, FORMATS)}"))
+    if out and not form:
+        endings = ", ".join(SUFFIXES)
+        found.append(Finding(shown(out), 1, f"the name ends in none of {endings}; rename it, or name a --format"))
+    if out and (out.is_dir() or not out.absolute().parent.is_dir()):
+        wrong = "is a folder" if out.is_dir() else f"there is no folder {shown(out.absolute().parent)!r}"
+        found.append(Finding(shown(out), 1, f"{wrong}; name a file in a folder that exists"))
+    if request.theme not in THEMES:
+        found.append(Finding("--theme", 1, f"no theme {request.theme!r}; {nearest(request.theme, THEMES)}"))
+    if form == "groot" and request.depth is not None:
+        found.append(
+            Finding("--depth", 1, "Groot2 opens whole trees only; leave --depth out, or take another --format")
+        )
+    if form == "png" and out is None and sys.stdout.isatty():
+        found.append(Finding("--format", 1, "a terminal shows no png; name a file with -o"))
+    if request.tree is None and request.run is None:
+        found.append(Finding("TREE", 1, "is missing; name a tree (`regrasp trees list`), or a run with --run"))
+    if found:
+        raise Findings(found)
+    return form
+
+
+def _tree_file(request: Request, record: RunRecord | None) -> Path:
+    """The file of the tree that is named, else the run's own copy, else the shipped one that the run names."""
+    if request.tree is not None:
+        return resolve("tree", request.tree, Path())
+    assert record is not None  # _form saw to it
+    copy = record.folder / "tree.xml"
+    if copy.is_file():
+        return copy
+    name = record.begin.get("tree")
+    where = (shown(record.folder / "events.jsonl"), 1)
+    if not isinstance(name, str):
+        raise Findings([Finding(*where, "does not name the run's tree; name it: regrasp trees export TREE --run DIR")])
+    return resolve("tree", name, Path(), where)
+
+
+def _with_run(path: Path, record: RunRecord) -> Node:
+    inputs = record.begin.get("inputs")
+    given = {key: tree_text(value) for key, value in inputs.items()} if isinstance(inputs, dict) else {}
+    node = read_graph(path, inputs=given)
+    stats = run_stats((tick.t, tick.path, tick.status) for tick in record.ticks)
+    _check_paths(path, record, {n.path for n in node.walk() if n.kind != "subtree"})
+    chain = (record.result.chain if record.result else None) or ()
+    return recorded(node, stats, {link.path for link in chain})
+
+
+def _check_paths(path: Path, record: RunRecord, known: Collection[str]) -> None:
+    for number, tick in enumerate(record.ticks, 1):
+        if tick.path not in known:
+            wrong = f"there is no node {tick.path!r} in {shown(path)}; {nearest(tick.path, known)}"
+            hint = "name the tree that ran, or leave TREE out"
+            raise Findings([Finding(shown(record.folder / "ticks.jsonl"), number, f"{wrong} ({hint})")])
+
+
+def _write(out: Path, content: bytes, tree: Path) -> None:
+    if out.exists() and out.samefile(tree):
+        raise Findings([Finding(shown(out), 1, "is the tree itself; name another file")])
+    try:
+        write_whole(out, content)
+    except OSError as error:
+        raise Findings([Finding(shown(out), 1, f"cannot be written ({error.strerror}); name another file")]) from None
