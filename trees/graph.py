@@ -9,6 +9,7 @@ from py_trees.common import Status
 
 from trees.element import Element, key_of, read_elements
 from trees.run_stats import NodeStats
+from trees.vocabulary import BUILT_IN
 
 Kind = Literal["sequence", "fallback", "parallel", "decorator", "action", "condition", "subtree"]
 _COMPOSITES: dict[str, Kind] = {
@@ -122,10 +123,12 @@ def _node(element: Element, above: str, scope: _Scope) -> Node:
     if element.tag == "SubTree":
         return _subtree(element, path, scope)
     leaf = scope.leaves.get(element.tag)
-    declared = _declared(leaf)
+    declared = _declared(element.tag, leaf)
     attributes = dict(element.attributes)
     attributes.pop("name", None)
     memory, policy = attributes.pop("memory", None), attributes.pop("policy", "")
+    for own_field in ("memory", "policy"):
+        declared.pop(own_field, None)
     given = (_given(declared.pop(name, Port(name)), value, scope.keys) for name, value in attributes.items())
     return Node(
         path,
@@ -194,20 +197,23 @@ def _same_tree(node: Node) -> Iterator[Node]:
             yield from _same_tree(child)
 
 
-def _declared(leaf: Any) -> dict[str, Port]:
+def _declared(tag: str, leaf: Any) -> dict[str, Port]:
+    """The ports that an element has, by name; none are known of a leaf without class."""
     if leaf is None:
-        return {}
-    known: dict[str, Port] = {}
+        arguments = BUILT_IN[tag].attributes if tag in BUILT_IN else {}
+        return {name: Port(name, type=_name(argument.accepts)) for name, argument in arguments.items()}
+    ports: dict[str, Port] = {}
     for name, port in leaf.input_ports().items():
         default = str(port.default_value) if port.has_default else None
-        known[name] = Port(name, type=_type_name(port), default=default)
+        ports[name] = Port(name, type=_name(port.data_type), default=default)
     for name, port in leaf.output_ports().items():
-        known[name] = Port(name, direction="output", type=_type_name(port))
-    return known
+        ports[name] = Port(name, direction="output", type=_name(port.data_type))
+    return ports
 
 
-def _type_name(port: Any) -> str:
-    return getattr(port.data_type, "__name__", str(port.data_type))
+def _name(kind: Any) -> str:
+    """Of a type; what takes one of several words is a str."""
+    return "str" if isinstance(kind, tuple) else getattr(kind, "__name__", str(kind))
 
 
 def _leaf_kind(leaf: Any, element: Element) -> Kind:

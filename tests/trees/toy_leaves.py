@@ -76,6 +76,25 @@ class ToyHear(_Leaf):
         return Status.SUCCESS
 
 
+class ToyTell(_Leaf):
+    INPUT_PORTS: ClassVar[Ports] = {"words": PortInformation(data_type=str)}
+    OUTPUT_PORTS: ClassVar[Ports] = {}
+
+    def update(self) -> Status:
+        return Status.SUCCESS
+
+
+class ToySeen(_Leaf):
+    """A condition: it answers at once."""
+
+    INPUT_PORTS: ClassVar[Ports] = {}
+    OUTPUT_PORTS: ClassVar[Ports] = {}
+    RETURNS = frozenset({Status.SUCCESS, Status.FAILURE})
+
+    def update(self) -> Status:
+        return Status.SUCCESS
+
+
 LEAVES: dict[str, type[py_trees.behaviour.Behaviour]] = {
     "Wait": ToyWait,
     "Fail": ToyFail,
@@ -83,6 +102,8 @@ LEAVES: dict[str, type[py_trees.behaviour.Behaviour]] = {
     "Go": ToyGo,
     "Say": ToySay,
     "Hear": ToyHear,
+    "Tell": ToyTell,
+    "Seen": ToySeen,
 }
 
 GOOD = """\

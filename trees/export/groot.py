@@ -9,12 +9,14 @@ from xml.etree import ElementTree as ET
 
 from trees.graph import Node, Port
 
+_BUILT_IN = {"ForceFailure", "ForceSuccess", "Inverter", "Repeat", "RetryUntilSuccessful", "RunOnce"}
 _RENAMED = {
     "Retry": ("RetryUntilSuccessful", {"num_failures": "num_attempts"}),
     "Repeat": ("Repeat", {"num_success": "num_cycles"}),
     "Inverter": ("Inverter", {}),
     "FailureIsSuccess": ("ForceSuccess", {}),
     "SuccessIsFailure": ("ForceFailure", {}),
+    "Condition": ("StatusCondition", {}),  # the word is taken: leaves that answer at once
 }
 _TYPES = {"str": "std::string", "float": "double", "int": "int", "bool": "bool"}
 
@@ -75,23 +77,19 @@ def _value(port: Port, is_main: bool) -> str:
 
 def _model(root: Node) -> ET.Element:
     """What Groot2 must be told: leaves, decorators of our own, and the keys of subtrees."""
-    model = ET.Element("TreeNodesModel")
-    known: set[str] = set()
-    for node in sorted(root.walk(), key=lambda n: (n.type, n.subtree)):
-        identifier = node.subtree or node.type
-        custom = node.kind in ("action", "condition", "subtree") or _is_custom_decorator(node)
-        if custom and identifier not in known:
-            known.add(identifier)
+    entries: dict[tuple[str, str], Node] = {}
+    for node in root.walk():
+        word = node.subtree or _words(node, False)[0]
+        if node.kind in ("action", "condition", "subtree") or (node.kind == "decorator" and word not in _BUILT_IN):
             kind = "SubTree" if node.kind == "subtree" else node.kind.capitalize()
-            entry = ET.SubElement(model, kind, {"ID": identifier})
-            entry.extend(_port(port) for port in node.ports)
-            if node.policy:
-                entry.append(_port(Port("policy")))
+            entries.setdefault((kind, word), node)
+    model = ET.Element("TreeNodesModel")
+    for (kind, word), node in sorted(entries.items(), key=lambda entry: entry[0]):
+        entry = ET.SubElement(model, kind, {"ID": word})
+        entry.extend(_port(port) for port in sorted(node.ports, key=lambda port: port.name))
+        if node.policy:
+            entry.append(_port(Port("policy")))
     return model
-
-
-def _is_custom_decorator(node: Node) -> bool:
-    return node.kind == "decorator" and _words(node, False)[0] == node.type and node.type not in _RENAMED
 
 
 def _port(port: Port) -> ET.Element:

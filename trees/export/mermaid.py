@@ -8,7 +8,7 @@ from trees.graph import Kind, Node
 
 _SHAPES: dict[Kind, tuple[str, str]] = {"decorator": ("{{", "}}"), "action": ("(", ")"), "condition": ("([", "])")}
 _LIGHT = THEMES["light"]  # every node brings its colours, so that it is read on a dark page too
-_CODES = {'"': "#quot;", "#": "#35;", "&": "#amp;", "<": "#lt;", ">": "#gt;", "`": "#96;", "\n": "<br/>"}
+_CODES = {'"': "#quot;", "#": "#35;", "&": "#amp;", "<": "#lt;", ">": "#gt;", "`": "#96;", "\\": "#92;", "\n": "<br/>"}
 
 
 def to_mermaid(root: Node) -> str:
