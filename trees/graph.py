@@ -65,6 +65,11 @@ class Node:
             yield from child.walk()
 
     @property
+    def unvisited(self) -> bool:
+        """Whether a run is shown that never came here."""
+        return self.stats is not None and not self.stats.visits
+
+    @property
     def given(self) -> list[Port]:
         """The ports that the file gives a value."""
         return [port for port in self.ports if port.value is not None]

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 
 from trees.export.labels import details, heading, identifiers, links, tooltip
-from trees.export.themes import Theme
+from trees.export.themes import Theme, colour_of
 from trees.graph import Node
 
 
@@ -25,7 +25,7 @@ def to_dot(root: Node, theme: Theme) -> str:
 def _nodes(node: Node, ids: Mapping[str, str], theme: Theme, indent: str) -> Iterator[str]:
     label = _quoted("\n".join([heading(node), *details(node)]))
     hint = _quoted(tooltip(node))
-    colour = theme.failed if node.failed else theme.kinds[node.kind]
+    colour = colour_of(node, theme)
     inner = indent
     if is_cluster := node.kind == "subtree" and bool(node.children):
         inner += "  "

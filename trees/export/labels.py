@@ -14,11 +14,15 @@ def heading(node: Node) -> str:
 
 
 def details(node: Node) -> list[str]:
-    """Lines below the name: type (unless symbol or name say it), policy and ports; what is left out; a run's stats."""
+    """Lines below the name: type (unless symbol or name say it), policy and ports; what is left out; a run's stats.
+
+    That a run never came to a node is for colours to say.
+    """
     said = node.type if _says_type(node) else ""
     about = " ".join(filter(None, [said, node.policy, node.subtree, *(port.text for port in node.given)]))
     hidden = f"+{node.hidden} node{'' if node.hidden == 1 else 's'}" if node.hidden else ""
-    return [line for line in (about, node.note, hidden, node.stats.text if node.stats else "") if line]
+    run = node.stats.text if node.stats and node.stats.visits else ""
+    return [line for line in (about, node.note, hidden, run) if line]
 
 
 def tooltip(node: Node) -> str:

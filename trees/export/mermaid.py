@@ -14,18 +14,24 @@ _CODES = {'"': "#quot;", "#": "#35;", "&": "#amp;", "<": "#lt;", ">": "#gt;", "`
 def to_mermaid(root: Node) -> str:
     """A flowchart from left to right; subtrees are subgraphs."""
     ids = identifiers(root)
-    used = {node.kind for node in root.walk()}
-    classes = [
-        f"  classDef {kind} fill:{_LIGHT.surface},stroke:{colour},color:{_LIGHT.text}"
-        for kind, colour in _LIGHT.kinds.items()
-        if kind in used
-    ]
-    if root.failed:
-        fill, line = _LIGHT.failed_surface, _LIGHT.failed
-        classes.append(f"  classDef failed fill:{fill},stroke:{line},color:{_LIGHT.text},stroke-width:3px")
+    used = {_class(node) for node in root.walk()}
+    classes = [f"  classDef {name} {style}" for name, style in _styles().items() if name in used]
     # A link inside a subgraph would draw both its ends into it.
     pairs = [f"  {ids[a.path]} --> {ids[b.path]}" for a, b in links(root)]
     return "\n".join(["flowchart LR", *classes, *_nodes(root, ids, "  "), *pairs])
+
+
+def _class(node: Node) -> str:
+    return "failed" if node.failed else "unvisited" if node.unvisited else node.kind
+
+
+def _styles() -> dict[str, str]:
+    plain = f"fill:{_LIGHT.surface},color:{_LIGHT.text}"
+    return {
+        **{kind: f"{plain},stroke:{colour}" for kind, colour in _LIGHT.kinds.items()},
+        "failed": f"fill:{_LIGHT.failed_surface},color:{_LIGHT.text},stroke:{_LIGHT.failed},stroke-width:3px",
+        "unvisited": f"fill:{_LIGHT.surface},color:{_LIGHT.muted},stroke:{_LIGHT.line}",
+    }
 
 
 def _nodes(node: Node, ids: Mapping[str, str], indent: str) -> Iterator[str]:
@@ -36,12 +42,12 @@ def _nodes(node: Node, ids: Mapping[str, str], indent: str) -> Iterator[str]:
         yield f'{indent}subgraph {own}["{label}"]'
     else:
         before, after = _SHAPES.get(node.kind, ("[", "]"))
-        yield f'{indent}{own}{before}"{label}"{after}:::{"failed" if node.failed else node.kind}'
+        yield f'{indent}{own}{before}"{label}"{after}:::{_class(node)}'
     for child in node.children:
         yield from _nodes(child, ids, inner)
     if is_subgraph:
         yield f"{indent}end"
-        yield f"{indent}class {own} {'failed' if node.failed else node.kind}"
+        yield f"{indent}class {own} {_class(node)}"
 
 
 def _escaped(text: str) -> str:

@@ -8,8 +8,9 @@ from trees.export.labels import details, tooltip
 from trees.export.layout import Box, lay_out
 from trees.export.scene import Curve, Group, Rect, Scene, Shape, Text
 from trees.export.text_width import shortened, text_width
-from trees.export.themes import Theme
+from trees.export.themes import Theme, colour_of
 from trees.graph import Kind, Node
+from trees.run_stats import NodeStats
 
 NAME, SMALL = 13.0, 10.5  # px, font sizes
 MAX_TEXT = 250.0  # px; what is longer is cut, and whole in the tooltip
@@ -41,11 +42,11 @@ def _texts(node: Node) -> list[tuple[str, float, bool, float, float]]:
     Small text stands below the name, which keeps inner nodes narrow; beside it in frames, and in leaves with room for
     it, which keeps the picture low.
     """
+    is_frame = node.kind == "subtree" and bool(node.children)
     name = shortened(node.name, NAME, MAX_TEXT, bold=True)
-    small = [shortened(line, SMALL, MAX_TEXT) for line in details(node)]
+    small = [shortened(line, SMALL, MAX_TEXT * (2 if is_frame else 1)) for line in details(node)]
     x, y = text_width(name, NAME, bold=True) + 7.0, _BASELINE
     lines = [(name, NAME, True, 0.0, y)]
-    is_frame = node.kind == "subtree" and bool(node.children)
     fits = not node.children and len(small) == 1 and x + text_width(small[0], SMALL) <= MAX_TEXT
     for line in small:
         if not (is_frame or fits):
@@ -67,7 +68,7 @@ def _left(node: Node) -> float:
 
 
 def _node(box: Box, theme: Theme) -> Group:
-    node, colour = box.node, _colour(box.node, theme)
+    node, colour = box.node, colour_of(box.node, theme)
     fill = theme.failed_surface if node.failed else theme.surface
     radius = _BARE / 2 if node.kind == "condition" else 5.0
     body = Rect(box.x, box.y, box.width, box.height, radius, fill, colour, 2.2 if node.failed else 1.2)
@@ -85,18 +86,11 @@ def _frame(box: Box, theme: Theme) -> Group:
 def _content(box: Box, theme: Theme) -> list[Shape]:
     """Sign and texts."""
     node = box.node
-    ink = theme.text if node.stats is None or node.stats.visits else theme.muted
-    shapes = icon(node, box.x + _INSET, box.y + _INSET, _colour(node, theme), theme.icon)
+    ink = theme.muted if node.unvisited else theme.text
+    shapes = icon(node, box.x + _INSET, box.y + _INSET, colour_of(node, theme), theme.icon)
     for text, size, bold, x, y in _texts(node):
         shapes.append(Text(box.x + _left(node) + x, box.y + y, text, size, ink if bold else theme.muted, bold))
     return shapes
-
-
-def _colour(node: Node, theme: Theme) -> str:
-    """By kind; red where the run failed, grey where it never came."""
-    if node.failed:
-        return theme.failed
-    return theme.kinds[node.kind] if node.stats is None or node.stats.visits else theme.line
 
 
 def _link(parent: Box, child: Box, theme: Theme) -> Group:
@@ -119,12 +113,14 @@ def _legend(root: Node, width: float, y: float, theme: Theme) -> tuple[list[Grou
                 entries.append((Node("", "", "", kind, memory), kind + words))
     if any(n.failed for n in nodes):
         entries.append((Node("", "", "", "action", failed=True), "path that failed"))
+    if any(n.unvisited for n in nodes):
+        entries.append((Node("", "", "", "action", stats=NodeStats()), "not visited"))
     groups, x = [], _MARGIN
     for sign, words in entries:
         wide = icon_width(sign) + 5 + text_width(words, SMALL) + 14
         if x > _MARGIN and x + wide > max(width, 480.0):
             x, y = _MARGIN, y + ICON + 7
-        shapes = icon(sign, x, y, _colour(sign, theme), theme.icon)
+        shapes = icon(sign, x, y, colour_of(sign, theme), theme.icon)
         shapes.append(Text(x + icon_width(sign) + 5, y + 12.7, words, SMALL, theme.muted))
         groups.append(Group(tuple(shapes)))
         x += wide

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from trees.graph import Kind
+from trees.graph import Kind, Node
 
 
 @dataclass(frozen=True)
@@ -67,3 +67,10 @@ THEMES = {
         },
     ),
 }
+
+
+def colour_of(node: Node, theme: Theme) -> str:
+    """By kind; red on the path that failed, grey where a run never came."""
+    if node.failed:
+        return theme.failed
+    return theme.line if node.unvisited else theme.kinds[node.kind]
