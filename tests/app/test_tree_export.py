@@ -1,0 +1,74 @@
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree as ET
+
+import pytest
+from toy_record import kill, write_record
+from typer.testing import CliRunner
+
+from app.cli import app
+from trees.export import FORMATS
+
+
+def export(*args: str) -> Any:
+    return CliRunner().invoke(app, ["trees", "export", *args])
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_every_format_comes_out_on_standard_output(form: str) -> None:
+    told = export("recovery", "--format", form)
+    assert told.exit_code == 0
+    assert len(told.stdout_bytes) > 500
+
+
+def test_a_file_s_ending_says_the_format_and_nothing_else_is_left(here: Path) -> None:
+    assert export("recovery", "-o", "tree.svg", "--theme", "dark").exit_code == 0
+    assert ET.parse("tree.svg").getroot().tag.endswith("svg")
+    assert export("recovery", "-o", "tree.svg", "--format", "ascii").stdout == ""
+    assert (here / "tree.svg").read_text(encoding="utf-8").startswith("recovery  Fallback")
+    assert [path.name for path in here.iterdir()] == ["tree.svg"]
+
+
+def test_without_a_format_it_is_what_show_draws() -> None:
+    assert export("recovery").stdout == CliRunner().invoke(app, ["trees", "show", "recovery"]).stdout
+
+
+def test_depth_counts_levels_below_the_top() -> None:
+    lines = export("recovery", "--depth", "1").stdout.splitlines()
+    assert [line.split()[:2] for line in lines[1:]] == [["├─", "mission"], ["└─", "safe_stop"]]
+    assert lines[1].endswith("  +25 nodes")
+
+
+WRONG = {
+    "nothing named": ([], "TREE:1: is missing"),
+    "unknown tree": (["recovry"], "recovry:1: no tree named 'recovry'; did you mean 'recovery'?"),
+    "unknown format": (["recovery", "--format", "svgg"], "--format:1: no format 'svgg'; did you mean 'svg'?"),
+    "unknown ending": (["recovery", "-o", "x.gif"], "x.gif:1: the name ends in none of .txt"),
+    "unknown theme": (["recovery", "--theme", "drak"], "--theme:1: no theme 'drak'; did you mean 'dark'?"),
+    "no folder": (["recovery", "-o", "no/x.svg"], "no/x.svg:1: there is no folder 'no'"),
+    "a folder": (["recovery", "-o", ".", "--format", "svg"], ":1: is a folder"),
+    "half a tree for Groot": (["recovery", "--format", "groot", "--depth", "1"], "--depth:1: Groot2 opens whole trees"),
+    "no run": (["recovery", "--run", "none"], "none:1: does not exist"),
+}
+
+
+@pytest.mark.parametrize(("args", "told"), WRONG.values(), ids=WRONG.keys())
+def test_bad_input_is_told_in_one_line(args: list[str], told: str) -> None:
+    result = export(*args)
+    assert result.exit_code == 2
+    assert told in result.stderr
+    assert len(result.stderr.splitlines()) == 1
+
+
+def test_a_tree_is_not_written_over_itself(here: Path) -> None:
+    text = '<root main_tree_to_execute="M"><BehaviorTree ID="M"><Holding name="h"/></BehaviorTree></root>'
+    (here / "mine.xml").write_text(text)
+    told = export("mine.xml", "-o", "mine.xml")
+    assert (told.exit_code, (here / "mine.xml").read_text()) == (2, text)
+    assert "mine.xml:1: is the tree itself" in told.stderr
