@@ -62,8 +62,12 @@ def export(
       regrasp trees export recovery -o recovery.svg --theme dark
       regrasp trees export recovery --format mermaid --depth 4
       regrasp trees export --run runs/short_obstacle-0-1 -o what_happened.png
-    \b
+
     ascii is what `trees show` draws; groot is BehaviorTree.CPP v4 XML, which Groot2 opens.
+
+    Of a run: visits, results and
+    simulated seconds of each node, and in red the path that failed; as a run logs changes of status only, a node that
+    ends in the same way at tick after tick counts as one visit.
     """
     from app.tree_export import Request, exported  # late, like all that only this command needs
 

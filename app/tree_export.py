@@ -8,9 +8,9 @@ from pathlib import Path
 from app.findings import Finding, Findings, nearest, shown
 from app.record import write_whole
 from app.record_reader import RunRecord, read_record
-from app.resources import resolve
+from app.resources import read_text, resolve
 from app.scenario_file import check_tree_file, tree_text
-from trees import Node, collapsed, read_graph, recorded, run_stats
+from trees import Node, TreeSyntaxError, collapsed, read_graph, recorded, run_stats
 from trees.export import FORMATS, SUFFIXES, THEMES, export_tree
 
 
@@ -31,8 +31,7 @@ def exported(request: Request) -> bytes:
     form = _form(request)
     record = read_record(request.run) if request.run else None
     path = _tree_file(request, record)
-    check_tree_file(path)
-    node = _with_run(path, record) if record else read_graph(path)
+    node = _read(path, record)
     if request.depth is not None:
         node = collapsed(node, request.depth)
     content = export_tree(node, form, request.theme)
@@ -83,10 +82,24 @@ def _tree_file(request: Request, record: RunRecord | None) -> Path:
     return resolve("tree", name, Path(), where)
 
 
+def _read(path: Path, record: RunRecord | None) -> Node:
+    if record is None:
+        check_tree_file(path)
+        return read_graph(path)
+    return _with_run(path, record)
+
+
 def _with_run(path: Path, record: RunRecord) -> Node:
+    """Not checked in full: it ran, perhaps with leaves that are no more."""
+    read_text(path)  # its findings are ours
     inputs = record.begin.get("inputs")
     given = {key: tree_text(value) for key, value in inputs.items()} if isinstance(inputs, dict) else {}
-    node = read_graph(path, inputs=given)
+    try:
+        node = read_graph(path, inputs=given)
+    except TreeSyntaxError as error:
+        raise Findings([Finding(shown(path), error.line, str(error))]) from None
+    except (OSError, ValueError) as error:
+        raise Findings([Finding(shown(path), 1, str(error))]) from None
     stats = run_stats((tick.t, tick.path, tick.status) for tick in record.ticks)
     _check_paths(path, record, {n.path for n in node.walk() if n.kind != "subtree"})
     chain = (record.result.chain if record.result else None) or ()

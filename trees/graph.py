@@ -1,7 +1,7 @@
 """A tree as one value that every writer takes: what the file says, with subtrees filled in."""
 
 from collections.abc import Collection, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -10,6 +10,7 @@ from py_trees.common import Status
 from trees.element import Element, key_of, read_elements
 from trees.run_stats import NodeStats
 from trees.vocabulary import BUILT_IN
+from trees.wiring import MAX_NODES, MAX_TREE_DEPTH
 
 Kind = Literal["sequence", "fallback", "parallel", "decorator", "action", "condition", "subtree"]
 _COMPOSITES: dict[str, Kind] = {
@@ -36,7 +37,7 @@ class Port:
     def text(self) -> str:
         """What is written, with the constant behind a key beside it: tries={tries}=5."""
         behind = "" if self.constant in (None, self.value) else f"={self.constant}"
-        return _printable(f"{self.name}={self.value}{behind}")
+        return printable(f"{self.name}={self.value}{behind}")
 
 
 @dataclass(frozen=True)
@@ -83,6 +84,7 @@ class _Scope:
     leaves: Mapping[str, type]
     keys: Mapping[str, str]
     opened: tuple[str, ...]
+    room: Iterator[int] = field(default_factory=lambda: iter(range(MAX_NODES)))  # one for each node of the whole
 
 
 def read_graph(path: Path, leaves: Mapping[str, type] | None = None, inputs: Mapping[str, str] | None = None) -> Node:
@@ -93,7 +95,7 @@ def read_graph(path: Path, leaves: Mapping[str, type] | None = None, inputs: Map
     Raises:
         OSError: the file cannot be read.
         TreeSyntaxError: it is not well-formed.
-        ValueError: it has no main tree.
+        ValueError: it has no main tree, or more nodes or depth than a tree may have.
     """
     if leaves is None:
         from behaviors import LEAVES  # late: they bring the planner
@@ -125,6 +127,8 @@ def recorded(node: Node, stats: Mapping[str, NodeStats], failed: Collection[str]
 
 def _node(element: Element, above: str, scope: _Scope) -> Node:
     path = f"{above}/{element.name}" if above else element.name
+    if next(scope.room, None) is None or path.count("/") >= MAX_TREE_DEPTH:
+        raise ValueError(f"more than {MAX_NODES} nodes, or deeper than {MAX_TREE_DEPTH}, with its subtrees filled in")
     if element.tag == "SubTree":
         return _subtree(element, path, scope)
     leaf = scope.leaves.get(element.tag)
@@ -228,6 +232,6 @@ def _leaf_kind(leaf: Any, element: Element) -> Kind:
     return "condition" if at_once else "action"
 
 
-def _printable(text: str) -> str:
+def printable(text: str) -> str:
     """What stands in a file must not steer a terminal or break a line."""
     return "".join(c if c.isprintable() else " " for c in text)

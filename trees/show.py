@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from pathlib import Path
 
-from trees.graph import Node, read_graph
+from trees.graph import Node, printable, read_graph
 
 
 def show_tree(path: Path) -> str:
@@ -12,7 +12,7 @@ def show_tree(path: Path) -> str:
     Raises:
         OSError: the file cannot be read.
         TreeSyntaxError: it is not well-formed.
-        ValueError: it has no main tree.
+        ValueError: it has no main tree, or more nodes or depth than a tree may have.
     """
     return to_ascii(read_graph(path, {}))
 
@@ -35,4 +35,4 @@ def _label(node: Node) -> str:
     words += [f" ({node.note})"] * bool(node.note) + [f" +{node.hidden} nodes"] * bool(node.hidden)
     words += [f" [{node.stats.text}]"] if node.stats else []
     words += [" FAILED"] * node.failed
-    return " ".join(filter(None, words))
+    return printable(" ".join(filter(None, words)))

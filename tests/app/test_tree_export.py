@@ -72,3 +72,45 @@ def test_a_tree_is_not_written_over_itself(here: Path) -> None:
     told = export("mine.xml", "-o", "mine.xml")
     assert (told.exit_code, (here / "mine.xml").read_text()) == (2, text)
     assert "mine.xml:1: is the tree itself" in told.stderr
+
+
+def test_a_run_shows_its_own_tree_with_what_happened_and_the_path_that_failed(here: Path) -> None:
+    write_record(here / "run")
+    lines = export("--run", "run").stdout.splitlines()
+    assert lines[0] == "root  Fallback with memory  [1 visit, 1 failed, 1.50 s]  FAILED"
+    grasp = next(line for line in lines if " grasp " in line)
+    # It failed in two ticks on end, which the log of changes tells once.
+    assert grasp.endswith("grasp  Grasp  [1 visit, 1 failed, 0.50 s]  FAILED")
+    held = next(line for line in lines if " held " in line)
+    assert not held.endswith("FAILED")
+
+
+def test_a_killed_run_and_one_without_a_copy_of_its_tree(here: Path) -> None:
+    kill(write_record(here / "run"))
+    assert "FAILED" not in export("--run", "run").stdout
+    (here / "run" / "tree.xml").unlink()
+    told = export("--run", "run")
+    assert "events.jsonl:1: does not name the run's tree; name it" in told.stderr
+    told = export("recovery", "--run", "run")
+    assert "ticks.jsonl:1: there is no node 'root'" in told.stderr
+    assert "name the tree that ran" in told.stderr
+
+
+@pytest.mark.parametrize("text", ["", "<root", "<root/>", "\x00", '<root main_tree_to_execute="M"/>'])
+@pytest.mark.parametrize("form", ["ascii", "groot"])
+def test_a_broken_copy_of_a_tree_is_told_in_one_line(here: Path, text: str, form: str) -> None:
+    write_record(here / "run")
+    (here / "run" / "tree.xml").write_text(text)
+    told = export("--run", "run", "--format", form)
+    assert told.exit_code == 2
+    assert told.stderr.startswith("run/tree.xml:1: ")
+
+
+def test_trees_that_include_one_another_end_in_words(here: Path) -> None:
+    write_record(here / "run")
+    text = (here / "run" / "tree.xml").read_text()
+    (here / "run" / "tree.xml").write_text(text.replace('<Look name="held"/>', '<SubTree ID="Main" name="again"/>'))
+    for form in FORMATS:
+        told = export("--run", "run", "--format", form)
+        assert told.exit_code in (0, 2)
+        assert told.exception is None or isinstance(told.exception, SystemExit)

@@ -76,6 +76,7 @@ def _own_subtrees(node: Node) -> Node:
     return replace(node, tree="Main", subtree=subtree, policy="", children=children)
 
 
+@pytest.mark.filterwarnings("ignore::DeprecationWarning:pydot.dot_parser")
 @given(nodes)
 @settings(max_examples=25)
 def test_dot_is_read_by_a_dot_parser(node: Node) -> None:

@@ -80,3 +80,15 @@ def test_a_file_without_a_main_tree_is_refused(tmp_path: Path) -> None:
     (tmp_path / "tree.xml").write_text('<root main_tree_to_execute="No"><BehaviorTree ID="Yes"/></root>')
     with pytest.raises(ValueError, match="no tree 'No'"):
         read_graph(tmp_path / "tree.xml", LEAVES)
+
+
+def test_subtrees_that_multiply_without_end_are_refused(tmp_path: Path) -> None:
+    twice = (
+        '<BehaviorTree ID="T{}"><Sequence name="s">'
+        + '<SubTree ID="T{}" name="{}"/>' * 2
+        + "</Sequence></BehaviorTree>"
+    )
+    trees = "".join(twice.format(i, i + 1, "a", i + 1, "b") for i in range(40))
+    (tmp_path / "tree.xml").write_text(f'<root main_tree_to_execute="T0">{trees}</root>')
+    with pytest.raises(ValueError, match="more than 2000 nodes"):
+        read_graph(tmp_path / "tree.xml", LEAVES)

@@ -51,7 +51,7 @@ def _element(instances: list[Node], is_main: bool) -> ET.Element:
     if told:
         element.set("_description", "; ".join(told))
     if node.kind != "subtree":
-        element.extend(_element(list(same), is_main) for same in zip(*(n.children for n in instances), strict=True))
+        element.extend(_element(list(same), is_main) for same in zip(*(n.children for n in instances), strict=False))
     return element
 
 
