@@ -9,7 +9,7 @@ from app.record_reader import Event, RunRecord, Tick
 from app.resources import read_text
 from app.timeline import event_text
 from trees.element import TreeSyntaxError
-from trees.outline import OutlineNode, outline
+from trees.graph import Node, read_graph
 
 
 @dataclass
@@ -21,8 +21,17 @@ class Frame:
     events: list[Event] = field(default_factory=list)
 
 
+@dataclass(frozen=True)
+class Row:
+    """A node by its path, its type as the file writes it, and how deep it stands (the root at 0)."""
+
+    path: str
+    type: str
+    depth: int
+
+
 class Replay:
-    """The frames of a record, and the nodes of its tree in tree order."""
+    """The frames of a record, and the rows of its tree in tree order."""
 
     def __init__(self, record: RunRecord) -> None:
         """Raises `Findings` for a tree.xml that cannot be read, and for a record in which nothing happened."""
@@ -36,7 +45,7 @@ class Replay:
                 [Finding(shown(record.folder), 1, "nothing happened in this run; there is nothing to replay")]
             )
         self.frames = [frames[t] for t in sorted(frames)]
-        self.nodes = _nodes(record)
+        self.rows = _rows(record)
         self._times = [frame.t for frame in self.frames]
         self._history: dict[str, tuple[list[int], list[str]]] = {}
         for i, frame in enumerate(self.frames):
@@ -75,18 +84,27 @@ class Replay:
             )
 
 
-def _nodes(record: RunRecord) -> list[OutlineNode]:
+def _rows(record: RunRecord) -> list[Row]:
     """The tree's nodes: of its copy in the record, and what else the ticks name (all, where there is no copy)."""
     file = record.folder / "tree.xml"
-    nodes: list[OutlineNode] = []
+    rows: list[Row] = []
     if file.exists():
         read_text(file)  # its findings are ours
         try:
-            nodes = outline(file)
+            rows = list(_below(read_graph(file, {}), 0))
         except TreeSyntaxError as error:
             raise Findings([Finding(shown(file), error.line, str(error))]) from None
         except (OSError, ValueError) as error:
             raise Findings([Finding(shown(file), 1, str(error))]) from None
-    known = {node.path for node in nodes}
+    known = {row.path for row in rows}
     others = dict.fromkeys(tick.path for tick in record.ticks if tick.path not in known)
-    return nodes + [OutlineNode(path, "", path.count("/")) for path in others]
+    return rows + [Row(path, "", path.count("/")) for path in others]
+
+
+def _below(node: Node, depth: int) -> Iterator[Row]:
+    inside = depth
+    if node.kind != "subtree":  # it has no node of its own in a run
+        yield Row(node.path, node.type, depth)
+        inside += 1
+    for child in node.children:
+        yield from _below(child, inside)

@@ -96,7 +96,7 @@ def draw(replay: Replay, view: View, width: int, height: int) -> Group:
 
 def _tree(replay: Replay, view: View, height: int) -> list[Text]:
     """As many lines of the tree as there is place, around the first change of this tick."""
-    nodes = [node for node in replay.nodes if view.part in node.path]
+    nodes = [node for node in replay.rows if view.part in node.path]
     changed = {tick.path for tick in replay.frames[view.index].changes}
     focus = next((i for i, node in enumerate(nodes) if node.path in changed), 0)
     top = max(0, min(focus - height // 3, len(nodes) - height))

@@ -39,7 +39,7 @@ def test_every_node_has_its_status_at_every_tick(replay: Replay) -> None:
     assert [frame.t for frame in replay.frames] == [0.0, 0.5, 1.0, 1.5]
     assert [replay.status(GRASP, i) for i in range(4)] == ["RUNNING", "FAILURE", "FAILURE", "INVALID"]
     assert [replay.status("root/never", i) for i in range(4)] == ["INVALID"] * 3 + ["FAILURE"]
-    assert [node.path for node in replay.nodes][:4] == [
+    assert [row.path for row in replay.rows][:4] == [
         "root",
         "root/mission",
         "root/mission/start",
@@ -53,7 +53,7 @@ def test_seconds_lead_to_the_tick_before(replay: Replay) -> None:
 
 def test_without_the_tree_the_ticks_name_the_nodes(folder: Path) -> None:
     (folder / "tree.xml").unlink()
-    assert [node.path for node in Replay(read_record(folder)).nodes][:2] == ["root", "root/mission"]
+    assert [row.path for row in Replay(read_record(folder)).rows][:2] == ["root", "root/mission"]
 
 
 def test_a_broken_tree_is_a_finding(folder: Path) -> None:
