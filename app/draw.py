@@ -4,7 +4,8 @@ import numpy as np
 
 from app.scenario_schema import ScenarioFile
 from interfaces.cell import Box
-from interfaces.scene import JawOpens, Obstacle
+from interfaces.fault import AnyFault
+from interfaces.scene import Obstacle
 
 STAND = 0.02  # m: the edge of the post that holds a foam piece off the floor
 STAND_COLOR = (0.35, 0.35, 0.38)
@@ -27,6 +28,6 @@ def draw_obstacles(file: ScenarioFile, rng: np.random.Generator) -> tuple[Obstac
     return tuple(drawn)
 
 
-def draw_faults(file: ScenarioFile, rng: np.random.Generator) -> tuple[JawOpens, ...]:
+def draw_faults(file: ScenarioFile, rng: np.random.Generator) -> tuple[AnyFault, ...]:
     """The faults at this seed's moments."""
-    return tuple(JawOpens(float(rng.uniform(*fault.carried)), fault.seconds) for fault in file.faults)
+    return tuple(fault.model_copy(update={"when": fault.when.drawn(rng)}) for fault in file.faults)

@@ -14,6 +14,7 @@ from py_trees.common import Status
 from app.attempts import Attempts
 from app.belief import belief_state
 from app.draw import draw_faults, draw_obstacles
+from app.fault_service import EnteredNodes, FaultLog, break_services
 from app.film import Film
 from app.judge import Judge
 from app.record import Link, Outcome, Record, Result
@@ -92,7 +93,8 @@ def run_episode(
             )
             episode = _assemble(scenario, world, seed, log)
             ticks = TickLog(episode.tree.root, record.ticks, world.now)
-            episode.tree.visitors += [ticks, episode.attempts]
+            faults = [EnteredNodes(episode.tree.root, world.notice), FaultLog(world.faults, log)]
+            episode.tree.visitors += [ticks, episode.attempts, *faults]
             with Film(out / "video.mp4" if video and out else None, world) as film:
                 ending = _run(episode, scenario, film, progress, log)
             ticks.finalise()
@@ -117,8 +119,10 @@ def _assemble(scenario: Scenario, world: World, seed: int, log: Any) -> Episode:
     known = scenario.cell.known
     grippers = {name: arm.gripper for name, arm in world.arms.items()}
     motion = Motion(known, world.arms, grippers, world, seed * 1000)
+    motion.remark = lambda sentence: log.warning("does not follow", why=sentence)
     perception = Perception(known, world.cameras, world, motion.camera_pose, motion.spheres)
     services = Services(known, world, motion, perception, log)
+    break_services(services, world.faults, world.now)
     py_trees.blackboard.Blackboard.clear()
     tree = py_trees.trees.BehaviourTree(load_tree(scenario.tree, LEAVES, scenario.inputs))
     attempts = Attempts(tree.root, services.belief.causes, world.now)

@@ -1,24 +1,10 @@
-"""The faults that a scenario file may name, as pydantic models."""
+"""The faults that a scenario file may name: `type` says which."""
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, get_args
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from interfaces.cell import Fraction, Model
+from interfaces.fault import AnyFault
 
-
-class JawOpensSpec(Model):
-    """The jaw opens for `seconds` at a share of the way from socket to clip, drawn from the seed within `carried`."""
-
-    type: Literal["jaw_opens"]
-    carried: tuple[Fraction, Fraction]
-    seconds: Annotated[float, Field(gt=0, le=60)] = 1.0
-
-    @model_validator(mode="after")
-    def _in_order(self) -> Self:
-        if self.carried[0] > self.carried[1]:
-            raise ValueError("carried runs backwards; put the smaller share first, such as [0.3, 0.8]")
-        return self
-
-
-FaultSpec = JawOpensSpec
+FaultSpec = Annotated[AnyFault, Field(discriminator="type")]
+FAULT_TYPES: dict[str, type] = {get_args(f.model_fields["type"].annotation)[0]: f for f in get_args(AnyFault)}

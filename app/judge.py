@@ -7,10 +7,7 @@ from app.record import Expectation, Slip
 from app.scenario_schema import Expect
 from behaviors.services import Belief
 from sim.ground_truth import GroundTruth
-
-LOST_SECONDS = 0.2  # without any pad's touch, out of clip and socket: the hold is really lost, not regripped
-STILL_SPEED = 0.01  # m/s ...
-STILL_SECONDS = 1.0  # ... for so long: settled
+from sim.phase import LOST_SECONDS, STILL_SECONDS, STILL_SPEED
 
 
 class Judge:

@@ -15,6 +15,7 @@ from app.scenario_schema import ScenarioFile, TreeInput
 from app.schema import validated
 from app.yaml_lines import Document, Place, parse
 from interfaces.cell import Cell
+from interfaces.fault import ObstacleMovesIn
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -143,6 +144,8 @@ class _Source:
         tree = self._once(case, _tree, (repr(names.get("tree")), id(cell)), document, self.path.parent, cell)
         if file and cell:
             self._once(case, misplaced, (file.obstacles, id(cell)), document, file.obstacles, cell.known)
+        if file and tree:
+            self._once(case, _check_names, (tree, file.faults, file.obstacles), document, file, tree)
         if file and tree and cell:
             self._once(case, _check_inputs, (tree, repr(file.inputs), id(cell)), document, tree, file, cell)
         if not (file and cell and tree):
@@ -241,3 +244,27 @@ def description(path: Path) -> str:
     """The sentence that a scenario file gives of itself, without a check of the rest."""
     value = parse(read_text(path), shown(path)).value
     return str(value.get("description", "")) if isinstance(value, dict) else ""
+
+
+def _check_names(document: Document, file: ScenarioFile, tree: Path) -> None:
+    """Raises `Findings` for obstacles and nodes of the tree that faults name and that are not there."""
+    found = []
+    obstacles = [o.name for o in file.obstacles]
+    for i, fault in enumerate(file.faults):
+        if isinstance(fault, ObstacleMovesIn) and fault.obstacle not in obstacles:
+            message = f"no obstacle {fault.obstacle!r}; {nearest(fault.obstacle, obstacles)}"
+            found.append(Finding(*document.place(("faults", i, "obstacle")), message))
+        if fault.when.node is not None and fault.when.node not in (names := _node_names(tree)):
+            message = f"no node {fault.when.node!r} in {tree.name}; {nearest(fault.when.node, names)}"
+            found.append(Finding(*document.place(("faults", i, "when", "node")), message))
+    if found:
+        raise Findings(found)
+
+
+def _node_names(tree: Path) -> set[str]:
+    """Every way to name a node of the tree: its path, and the last names of it."""
+    from behaviors import LEAVES
+    from trees import load_tree, node_paths
+
+    steps = [path.split("/") for path in node_paths(load_tree(tree, LEAVES)).values()]
+    return {"/".join(names[i:]) for names in steps for i in range(len(names))}

@@ -30,6 +30,13 @@ _UNITS = dict.fromkeys(_LENGTHS.split(), _METRES) | {  # by the name of the key 
     "detection_delay": "seconds, such as 0.5",
     "sleep": "radians, such as 0.8",
     "carried": "shares of the way from socket to clip, such as 0.5",
+    "at": "seconds, such as 5.0",
+    "after": "seconds, such as 1.0",
+    "by": _METRES,
+    "speed": "metres a second, such as 0.25",
+    "impulse": "newton seconds, such as 0.1",
+    "stiffness": "newtons a metre, such as 100.0",
+    "angle": "radians, such as 0.3",
 }
 
 
@@ -96,19 +103,26 @@ def _finding(document: Document, root: Schema, path: Path, error: ErrorDetails) 
     kind, last = error["type"], error["loc"][-1:]
     dotted = ".".join(map(str, path))
     if kind == "missing" and isinstance(last[0], str):
-        expected = _expected(root, (*path, last[0]))
+        expected = _expected(document, root, (*path, last[0]))
         where = f" in {dotted}" if dotted else ""
         message = f"key {last[0]!r} is missing{where}; expected {expected}"
+    elif kind in ("union_tag_invalid", "union_tag_not_found"):
+        path = (*path, error["ctx"]["discriminator"].strip("'"))
+        names = [str(schema["const"]) for schema in _at(root, path, document.value)]
+        said = f"no {error['ctx']['tag']!r}; " if "tag" in error["ctx"] else "it is missing; "
+        message = f"{'.'.join(map(str, path))}: {said}{nearest(error['ctx'].get('tag', ''), names)}"
     elif kind == "extra_forbidden":
-        keys = {key for schema in _at(root, path[:-1]) for key in schema.get("properties", {})}
+        keys = {key for schema in _at(root, path[:-1], document.value) for key in schema.get("properties", {})}
         message = f"unknown key {str(path[-1])!r}; {nearest(str(path[-1]), keys)}"
     elif kind == "value_error":
         message = f"{dotted or 'the file'}: {error['msg'].removeprefix('Value error, ')}"
     elif kind in ("literal_error", "enum") and isinstance(error["input"], str):
-        names = [name for schema in _at(root, path) for name in schema.get("enum", [schema.get("const")])]
+        names = [
+            name for schema in _at(root, path, document.value) for name in schema.get("enum", [schema.get("const")])
+        ]
         message = f"{dotted}: no {error['input']!r}; {nearest(error['input'], names)}"
     else:
-        message = f"{dotted or 'the file'} is {_short(document, path)}; expected {_expected(root, path)}"
+        message = f"{dotted or 'the file'} is {_short(document, path)}; expected {_expected(document, root, path)}"
     return Finding(*document.place(path), message)
 
 
@@ -120,10 +134,12 @@ def _short(document: Document, path: Path) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
-def _at(root: Schema, path: Path) -> list[Schema]:
-    """The schema nodes that describe the value at `path`; several where the model has a union."""
+def _at(root: Schema, path: Path, value: Value) -> list[Schema]:
+    """The schema nodes that describe what is at `path` in `value`; several where the model has a union."""
     nodes = alternatives(root, root)
     for step in path:
+        nodes = _of_type(nodes, value)
+        _, value = _child(value, step)
         below = []
         for node in nodes:
             if isinstance(step, int):
@@ -132,7 +148,13 @@ def _at(root: Schema, path: Path) -> list[Schema]:
             else:
                 below.append(node.get("properties", {}).get(step, node.get("additionalProperties")))
         nodes = [opened for node in below if isinstance(node, dict) for opened in alternatives(root, node)]
-    return nodes
+    return _of_type(nodes, value)
+
+
+def _of_type(nodes: list[Schema], value: Value) -> list[Schema]:
+    """Of a union's nodes told apart by `type`, the one that the value names; all where it names none."""
+    kind = value.get("type") if isinstance(value, dict) else None
+    return [n for n in nodes if n.get("properties", {}).get("type", {}).get("const") == kind] or nodes
 
 
 def alternatives(root: Schema, node: Schema) -> list[Schema]:
@@ -144,10 +166,14 @@ def alternatives(root: Schema, node: Schema) -> list[Schema]:
     return [] if node.get("type") == "null" else [node]
 
 
-def _expected(root: Schema, path: Path) -> str:
+def _expected(document: Document, root: Schema, path: Path) -> str:
     """What would be right at `path`, in words."""
     key = next((step for step in reversed(path) if isinstance(step, str)), "")
-    return ", or ".join(dict.fromkeys(_words(node, key) for node in _at(root, path))) or "nothing"
+    nodes = _at(root, path, document.value)
+    kinds = [node["properties"]["type"]["const"] for node in nodes if "type" in node.get("properties", {})]
+    if kinds:
+        return f"a mapping with type: one of {', '.join(kinds)}"
+    return ", or ".join(dict.fromkeys(_words(node, key) for node in nodes)) or "nothing"
 
 
 def _words(node: Schema, key: str) -> str:

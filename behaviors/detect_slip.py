@@ -27,7 +27,7 @@ class DetectSlip(Leaf):
         """Forget the readings of an earlier carry."""
         self._gap = GapTest(2 * self.services.known.connector.radius)
 
-    def update(self) -> Status:
+    def work(self) -> Status:
         """See the class."""
         self._gap.feed(self.services.motion.grippers[HAND].reading())
         for evidence in (self._gap.evidence(), self._distance()):

@@ -12,6 +12,8 @@ HAND = "right"  # the thesis's fixed roles: the right arm handles the cable ...
 EYE = "left"  # ... and the left one carries the wrist camera
 GRIP_FORCE = 40.0  # N a finger
 CLOSE_SECONDS = 1.0  # the jaw closes from 60 mm at 0.1 m/s a finger, and the readings settle
+CLOSINGS = 3  # a jaw that does not move is told again
+MOVED = 0.003  # m: three times the encoder's backlash
 # m of straight way back from a place where something was held, the first that goes
 BACK = (0.10, 0.08, 0.06, 0.05, 0.04, 0.03)
 
@@ -29,13 +31,22 @@ class HandLeaf(StepsLeaf):
     def grip(self, world_from_connector: RigidTransform) -> Steps:
         """Close the jaw and feel whether something is in it; belief: held as it was thought to lie."""
         services = self.services
-        services.motion.grippers[HAND].close(GRIP_FORCE)
-        test = GapTest(2 * services.known.connector.radius)
-        end = services.clock.now() + CLOSE_SECONDS
-        while services.clock.now() < end - 1e-9:
-            test.feed(services.motion.grippers[HAND].reading())
-            yield None
-        evidence = test.evidence()
+        jaw = services.motion.grippers[HAND]
+        before = jaw.reading().gap
+        for _ in range(CLOSINGS):
+            jaw.close(GRIP_FORCE)
+            test = GapTest(2 * services.known.connector.radius)
+            end = services.clock.now() + CLOSE_SECONDS
+            while services.clock.now() < end - 1e-9:
+                test.feed(jaw.reading())
+                yield None
+            evidence = test.evidence()
+            stood = evidence.detected and evidence.value > before - MOVED
+            if not stood:
+                break
+        if stood:
+            message = f"the right jaw stands {1e3 * evidence.value:.1f} mm open, told {CLOSINGS} times to close"
+            raise services.motion.give_up(HAND, CauseCode.GRIPPER_FAILED, message)
         if evidence.detected:
             raise Failed(CauseCode.GRASP_EMPTY, f"the jaw closed on nothing: {evidence.sentence}")
         services.belief.held = services.motion.tool(HAND).inv() * world_from_connector

@@ -14,6 +14,6 @@ class Holding(Leaf):
     OUTPUT_PORTS: ClassVar[dict[str, Any]] = {}
     RETURNS = frozenset({Status.SUCCESS, Status.FAILURE})
 
-    def update(self) -> Status:
+    def work(self) -> Status:
         """See the class."""
         return Status.SUCCESS if self.services.belief.held is not None else Status.FAILURE

@@ -8,7 +8,7 @@ from py_trees.common import Status
 from py_trees.ports import BehaviourWithPorts, PortInformation
 
 from behaviors.services import Services
-from interfaces.cause import Cause, CauseCode
+from interfaces.cause import Cause, CauseCode, ServiceError
 from motion.failure import PlanningError
 from motion.task import Task
 
@@ -35,11 +35,26 @@ class Port(PortInformation):
 
 
 class Leaf(BehaviourWithPorts):
-    """A leaf with services; it says why it fails."""
+    """A leaf with services; it says why it fails. `work` is what py_trees calls update.
+
+    A service that breaks off stops the arms and fails the leaf; any other exception is a mistake and ends the run.
+    """
 
     # The statuses that `update` may return: to the check, what only comes after another one is out of reach.
     RETURNS: ClassVar[frozenset[Status]] = frozenset({Status.SUCCESS, Status.FAILURE, Status.RUNNING})
     services: Services
+
+    def work(self) -> Status:
+        """One tick of the work."""
+        raise NotImplementedError
+
+    def update(self) -> Status:
+        """See the class."""
+        try:
+            return self.work()
+        except ServiceError as error:
+            self.services.motion.stop()
+            return self.fail(CauseCode.SERVICE_FAILED, str(error))
 
     def setup(self, **kwargs: Any) -> None:
         """Take the services that `BehaviourTree.setup(services=...)` hands round."""
@@ -78,13 +93,13 @@ class StepsLeaf(Leaf):
 
     def initialise(self) -> None:
         """Begin anew."""
-        self._work, self._task = self.steps(), None
+        self._steps, self._task = self.steps(), None
 
-    def update(self) -> Status:
+    def work(self) -> Status:
         """Poll the task under way; when it is done take the next step."""
         try:
             while self._task is None or self._task.poll():
-                self._task = next(self._work)
+                self._task = next(self._steps)
                 if self._task is None:
                     return Status.RUNNING
         except StopIteration:
@@ -98,7 +113,7 @@ class StepsLeaf(Leaf):
         if self.status is Status.RUNNING and new_status is Status.INVALID:
             if self._task is not None:
                 self._task.cancel()
-            self._work.close()
+            self._steps.close()
 
     def follow(self, task: Task) -> Steps:
         """Steps that do a task, for a leaf that handles its PlanningError itself; stopped with the leaf."""

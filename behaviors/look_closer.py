@@ -2,20 +2,16 @@
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import RigidTransform
 
 from behaviors.hand import EYE
 from behaviors.leaf import Steps
 from behaviors.look import LookLeaf
-from interfaces.cause import CauseCode
 from motion.failure import PlanningError
-from motion.viewpoints import closer_views
 from perception.mean_pose import mean_pose
 from perception.rgbd_pose import Estimate
 
 LOOK_SECONDS = 0.8
 LOOKS = 2  # from two sides: what one look takes for an obstacle's inside, the other looks through
-OTHER_SIDE = 0.77  # cosine of the 40 degrees between them
 
 
 class LookCloser(LookLeaf):
@@ -35,7 +31,8 @@ class LookCloser(LookLeaf):
         for _ in range(LOOKS):
             seen: list[Estimate] = []
             try:
-                view, goals = self._best_view(taken)
+                assert belief.connector is not None
+                view, goals = self.best_view(belief.connector, taken)
                 taken.append(view.rotation.apply([0.0, 0.0, 1.0]))
                 yield from self.go_and_look(goals, LOOK_SECONDS, seen)
             except PlanningError as error:
@@ -47,20 +44,3 @@ class LookCloser(LookLeaf):
                 belief.found_by = "wrist"
                 self.say("looked closer", position=belief.connector.translation.round(4).tolist(), sure=belief.sure)
         yield from self.go_to_sleep(EYE)
-
-    def _best_view(self, taken: list[NDArray[np.float64]]) -> tuple[RigidTransform, NDArray[np.float64]]:
-        """The best free place that has the whole connector in sight, from another side than the lines of sight `taken`.
-
-        With joints (n, 6) for it.
-        """
-        connector = self.services.belief.connector
-        assert connector is not None
-        half = 0.5 * self.services.known.connector.length
-        points = connector.apply([[-half, 0.0, 0.0], [0.0, 0.0, 0.0], [half, 0.0, 0.0]])
-        for view in closer_views(connector):
-            sight = view.rotation.apply([0.0, 0.0, 1.0])
-            if any(float(sight @ other) > OTHER_SIDE for other in taken):
-                continue
-            if self.services.motion.sees(view, points) and len(goals := self.view_goals(view)):
-                return view, goals
-        raise PlanningError(CauseCode.OUT_OF_REACH, "no free place from which the whole connector shows")

@@ -20,8 +20,9 @@ class Monitor(Leaf):
     OUTPUT_PORTS: ClassVar[dict[str, Any]] = {}
     RETURNS = frozenset({Status.SUCCESS})
     _due = 0.0
+    _trouble = False
 
-    def update(self) -> Status:
+    def work(self) -> Status:
         """See the class."""
         perception, now = self.services.perception, self.services.clock.now()
         tool, held = self.services.motion.tool(HAND), self.services.belief.held
@@ -30,9 +31,15 @@ class Monitor(Leaf):
         if now >= self._due - 1e-9:
             perception.look("rear")
             self._due = now + self.get_input("period")
+            self._tell_trouble(perception.trouble("rear"))
         state, sentence = perception.track.state(now)
         self.feedback_message = f"{state.value}: {sentence}"
         return Status.SUCCESS
+
+    def _tell_trouble(self, trouble: str | None) -> None:
+        if (trouble is not None) != self._trouble:
+            self._trouble = trouble is not None
+            self.say("camera", camera="rear", trusted=not self._trouble, why=trouble or "its frames are sound again")
 
     def terminate(self, new_status: Status) -> None:
         """Stopped from above: the hand no longer carries under watch."""

@@ -11,6 +11,7 @@ from perception.stillness import Stillness
 
 LEAVE_SECONDS = 0.3  # for the end to swing out of the open jaw
 STILL = 0.25  # of the mean brightness: a cable that moves by about 1 mm; the jaw forgives 20
+BLIND_SECONDS = 10.0  # without the camera: a released cable rests within 8
 FRAME_PERIOD = 0.2  # s between the frames that are compared
 
 
@@ -30,7 +31,11 @@ class MakeRoom(HandLeaf):
 
 
 class WaitUntilStill(HandLeaf):
-    """RUNNING while the rear camera sees anything move; FAILURE after `time_limit` seconds."""
+    """RUNNING while the rear camera sees anything move; FAILURE after `time_limit` seconds.
+
+    What stands in the cell is mapped anew then: a thing may have come in. Without a sound rear camera it waits as long
+    as the cable swings at most; without any sound camera FAILURE, for nobody could find the end.
+    """
 
     INPUT_PORTS: ClassVar[dict[str, Any]] = {
         "time_limit": Port(data_type=float, required=False, default_value=30.0, above=0, description="s of waiting")
@@ -40,11 +45,25 @@ class WaitUntilStill(HandLeaf):
         """See the class."""
         stillness, begin = Stillness(threshold=STILL), self.services.clock.now()
         limit = self.get_input("time_limit")
+        perception = self.services.perception
         while self.services.clock.now() < begin + limit:
-            self.services.perception.look("rear")
-            frame = self.services.perception.frame("rear")
+            trouble = perception.trouble("rear")
+            if trouble is not None:
+                yield from self._wait_blind(trouble)
+                return
+            perception.look("rear")
+            frame = perception.frame("rear")
             if frame is not None and frame.stamp >= begin and stillness.feed(frame):
-                self.say("still", waited=round(self.services.clock.now() - begin, 2))
+                voxels = perception.map_obstacles("rear")
+                self.say("still", waited=round(self.services.clock.now() - begin, 2), occupied_voxels=voxels)
+                self.services.motion.set_obstacles(perception.occupancy.occupied_points(), perception.occupancy.h)
                 return
             yield from self.wait(FRAME_PERIOD)
         raise Failed(CauseCode.NOT_STILL, f"the scene still moved after {limit:.0f} s")
+
+    def _wait_blind(self, trouble: str) -> Steps:
+        other = self.services.perception.trouble("wrist")
+        if other is not None:
+            raise Failed(CauseCode.CAMERA_FAILED, f"{trouble}; {other}")
+        self.say("waiting without the rear camera", seconds=BLIND_SECONDS, why=trouble)
+        yield from self.wait(BLIND_SECONDS)

@@ -45,6 +45,10 @@ class SpiralSearch(LookLeaf):
         clock, belief = self.services.clock, self.services.belief
         begin, skipped, looked = clock.now(), [], 0
         for stop in self._stops():
+            trouble = self.services.perception.trouble("wrist")
+            if trouble is not None:
+                yield from self.go_to_sleep(EYE)
+                raise Failed(CauseCode.CAMERA_FAILED, f"{trouble}; the rear camera shows no connector")
             if clock.now() > begin + self.get_input("time_limit"):
                 break
             seen: list[Estimate] = []

@@ -1,15 +1,24 @@
 """Before the work: correct the rear camera's depth by the known panel, and see what stands in the cell."""
 
-from behaviors.leaf import Steps, StepsLeaf
+from behaviors.leaf import Failed, Steps, StepsLeaf
+from interfaces.cause import CauseCode
+
+PATIENCE = 2.0  # s that the camera has to give sound frames
 
 
 class StartUp(StepsLeaf):
-    """Waits for the rear camera, corrects its depth scale, and maps the obstacles that it sees."""
+    """Waits for the rear camera, corrects its depth scale, and maps the obstacles that it sees.
+
+    FAILURE when the camera is not to be trusted: nobody would know what stands in the cell.
+    """
 
     def steps(self) -> Steps:
         """See the class."""
         perception, motion = self.services.perception, self.services.motion
-        while perception.frame("rear") is None:
+        end = self.services.clock.now() + PATIENCE
+        while perception.frame("rear") is None or perception.trouble("rear") is not None:
+            if self.services.clock.now() > end:
+                raise Failed(CauseCode.CAMERA_FAILED, f"{perception.trouble('rear')}; nothing was mapped")
             yield None
         scale = perception.correct_depth("rear")
         perception.look("rear")  # the plugged end, while no hand hides it

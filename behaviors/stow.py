@@ -2,12 +2,13 @@
 
 import numpy as np
 
-from behaviors.hand import HAND, HandLeaf
+from behaviors.hand import EYE, HAND, HandLeaf
 from behaviors.leaf import Failed, Steps
+from behaviors.look import LookLeaf
 from behaviors.services import Notice
 from interfaces.cause import CauseCode
 from motion.bodies import NO_POINTS
-from motion.service import OPEN_GAP
+from motion.failure import PlanningError
 from perception.cable_shape import cable_course
 from perception.rgbd_pose import Estimate
 from perception.slip import seen_at
@@ -22,7 +23,7 @@ class LetGo(HandLeaf):
 
     def steps(self) -> Steps:
         """See the class."""
-        self.services.motion.grippers[HAND].open(OPEN_GAP)
+        yield self.services.motion.release(HAND)
         self.services.belief.held = None
         yield from self.wait(OPEN_SECONDS)
         known, motion = self.services.known, self.services.motion
@@ -35,26 +36,47 @@ class LetGo(HandLeaf):
         motion.keep_clear(NO_POINTS)
 
 
-class LookAtStow(HandLeaf):
-    """A look at the clip: FAILURE when the connector is not there, so that an end that fell out is not left lying."""
+class LookAtStow(LookLeaf):
+    """A look at the clip: FAILURE when the connector is not there, so that an end that fell out is not left lying.
+
+    The wrist camera looks where the rear one is not to be trusted.
+    """
 
     def steps(self) -> Steps:
         """See the class."""
-        clock, seat = self.services.clock, np.array(self.services.known.clip.seat)
+        clock, perception = self.services.clock, self.services.perception
         begin = clock.now()
-        latest: Estimate | None = None
+        seen: list[Estimate] = []
         while clock.now() < begin + LOOK_SECONDS - 1e-9:
             yield None
-            result = self.services.perception.look("rear")
+            result = perception.look("rear")
             if isinstance(result, Estimate) and result.stamp > begin:
-                latest = result
-        if latest is None:
-            self._lost("the rear camera sees no connector at the clip")
+                seen.append(result)
+        trouble = perception.trouble("rear")
+        if trouble is not None:
+            yield from self._look_from_the_wrist(trouble, seen)
+        if not seen:
+            self._lost("no camera sees the connector at the clip")
         else:
-            evidence = seen_at(latest.position, seat, STOWED_RADIUS)
+            evidence = seen_at(seen[-1].position, np.array(self.services.known.clip.seat), STOWED_RADIUS)
             self.say("looked at the clip", distance=round(evidence.value, 4), stowed=evidence.detected)
             if not evidence.detected:
                 self._lost(evidence.sentence)
+
+    def _look_from_the_wrist(self, trouble: str, seen: list[Estimate]) -> Steps:
+        self.say("the wrist camera looks at the clip", why=trouble)
+        seen.clear()
+        if (other := self.services.perception.trouble("wrist")) is not None:
+            raise Failed(CauseCode.CAMERA_FAILED, f"{trouble}; {other}")
+        try:
+            _, goals = self.best_view(self.services.known.clip.world_from_seat)
+            yield from self.go_and_look(goals, LOOK_SECONDS, seen)
+        except PlanningError as error:
+            raise Failed(CauseCode.CAMERA_FAILED, f"{trouble}; the wrist camera cannot look there: {error}") from None
+        other = self.services.perception.trouble("wrist")
+        yield from self.go_to_sleep(EYE)
+        if other is not None:
+            raise Failed(CauseCode.CAMERA_FAILED, f"{trouble}; {other}")
 
     def _lost(self, message: str) -> None:
         self.services.belief.notices.append(Notice(self.services.clock.now(), "place"))

@@ -18,10 +18,18 @@ class CauseCode(StrEnum):
     SEARCH_EXHAUSTED = "search_exhausted"
     NOT_STOWED = "not_stowed"
     NOT_STILL = "not_still"
+    CAMERA_FAILED = "camera_failed"
+    ARM_FAILED = "arm_failed"
+    GRIPPER_FAILED = "gripper_failed"
+    SERVICE_FAILED = "service_failed"
     TOO_MANY_TRIES = "too_many_tries"
     TIME_LIMIT = "time_limit"
     INTERRUPTED = "interrupted"
     INTERNAL_ERROR = "internal_error"
+
+
+class ServiceError(Exception):
+    """A service broke off for a reason that its caller must reckon with: a lost connection, a driver's timeout."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""What a scenario puts into the cell: obstacles and faults, already drawn from the seed where they vary."""
+"""What a scenario puts into the cell, already drawn from the seed where it varies."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -16,11 +16,3 @@ class Obstacle:
     box: Box
     yaw: float
     stand: Box | None
-
-
-@dataclass(frozen=True)
-class JawOpens:
-    """The right jaw opens for `seconds` once the held end has gone the share `carried` of the way socket to clip."""
-
-    carried: float
-    seconds: float

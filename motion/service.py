@@ -4,7 +4,7 @@ A request returns a `Task` at once; `poll` it every tick. Nothing here reads a w
 latency on the simulated clock.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from functools import partial
 from itertools import chain
 
@@ -15,6 +15,8 @@ from scipy.spatial.transform import RigidTransform
 from interfaces.cause import CauseCode
 from interfaces.cell import KnownCell
 from interfaces.devices import Arm, Clock, Gripper
+from interfaces.trajectory import Trajectory
+from motion.arm_watch import ArmWatch, rest_of
 from motion.bodies import NO_POINTS, Bodies
 from motion.cable_path import natural_ways
 from motion.collision import CollisionModel
@@ -39,6 +41,11 @@ OPEN_GAP = 0.05  # m between the pads: 15 mm to each side of the connector, abou
 GRIP_OFFSETS = (-0.02, -0.03, 0.0)  # m along the connector from its centre, tried in turn: near the cable the tip shows
 ARRIVED = 0.05  # rad: an arm that ends further from its goal was blocked
 SETTLE = 0.10  # s after a trajectory before its end is judged
+ARRIVAL = 1.0  # s that a late arm has to come there
+FOLLOWS = 3  # times that an arm which does not follow is stopped and led on, each time at half the speed
+REST = 1.0  # s between them: what jams may come free
+JAW_COMMANDS, JAW_SECONDS = 3, 1.0  # a jaw that does not follow is told again, after so many seconds
+JAW_SLACK = 0.005  # m short of its gap that a jaw counts as open
 
 
 class Motion(Bodies):
@@ -49,6 +56,11 @@ class Motion(Bodies):
     ) -> None:
         super().__init__(known, arms, grippers)
         self._clock, self._seed = clock, seed
+        self.planner = plan
+        self.remark: Callable[[str], None] = lambda sentence: None  # told of an arm or a jaw that does not follow
+        self._watches = {name: ArmWatch(name) for name in arms}
+        self._pace = dict.fromkeys(arms, 1.0)  # share of the speed asked for; less for an arm that fell behind
+        self._out_of_order: dict[str, PlanningError] = {}
 
     def move(self, arm: str, goals: FloatArray, *, margin: float = MARGIN, tight: bool = True) -> Task:
         """Plan a way to one of the goals (n, 6) rad, `margin` m from everything, and follow it.
@@ -152,33 +164,96 @@ class Motion(Bodies):
             path = self._plan(model, q, np.array([way[0] for way in ways]))
             way = min(ways, key=lambda way: float(np.abs(way[0] - path[-1]).max()))
             yield from self._follow(arm, path, 1.0)
+            yield from self._open_jaw(arm, OPEN_GAP - JAW_SLACK)
             yield from self._follow(arm, np.vstack([self.joints(arm), way[1:]]), APPROACH_SPEED)
             self.keep_clear(NO_POINTS)
 
         return self._task(arm, steps())
 
+    def release(self, arm: str) -> Task:
+        """Open the jaw; done once it stands wider than a connector."""
+        return self._task(arm, self._open_jaw(arm, 2 * self.known.connector.radius + JAW_SLACK))
+
     def stop(self) -> None:
         """Stop both arms."""
-        for arm in self.arms.values():
-            arm.stop()
+        for arm in self.arms:
+            self._halt(arm)
+
+    def give_up(self, arm: str, code: CauseCode, message: str) -> PlanningError:
+        """Call an arm or its jaw out of order: every request to it fails with this cause from now on. The error."""
+        self.remark(f"{message}: out of order")
+        self._out_of_order[arm] = PlanningError(code, message)
+        return self._out_of_order[arm]
 
     def _follow(self, arm: str, path: FloatArray, speed: float) -> Iterator[None]:
         from motion.timing import time_path  # late: it brings matplotlib, which a tree's check does not need
 
-        trajectory = time_path(path, speed)
-        start = self._clock.now() + self.known.latencies.plan
-        while self._clock.now() < start - 1e-9:
-            yield
+        alone = self._watches[arm].moved_alone(self.arms[arm].reading())
+        if alone is not None:
+            raise self.give_up(arm, CauseCode.ARM_FAILED, alone)
+        for _ in range(FOLLOWS):
+            trajectory = time_path(path, speed * self._pace[arm])
+            yield from self._pause(self.known.latencies.plan)
+            behind, elapsed = yield from self._led(arm, trajectory)
+            if behind is None:
+                break
+            self._halt(arm)
+            self.remark(behind)
+            self._pace[arm] *= 0.5
+            path = rest_of(path, trajectory.sample(elapsed)[0])
+            yield from self._pause(REST)
+            path = np.vstack([self.joints(arm), path])
+        else:
+            raise self.give_up(arm, CauseCode.ARM_FAILED, f"{behind}, {FOLLOWS} times")
+        yield from self._arrive(arm, path[-1])
+        self._watches[arm].leave(self.joints(arm))
+
+    def _led(self, arm: str, trajectory: Trajectory) -> Generator[None, None, tuple[str | None, float]]:
+        """Let the arm follow; why it was found off the trajectory, if it was, and after how many seconds."""
+        watch, start = self._watches[arm], self._clock.now()
+        watch.begin()
+        watch.leave(None)
         self.arms[arm].follow(trajectory)
         while self.arms[arm].is_moving():
             yield
-        end = self._clock.now() + SETTLE
-        while self._clock.now() < end - 1e-9:
+            reading, elapsed = self.arms[arm].reading(), self._clock.now() - start
+            jumped = watch.jumped(reading)
+            if jumped is not None:
+                self._halt(arm)
+                raise self.give_up(arm, CauseCode.ARM_FAILED, jumped)
+            behind = watch.behind(reading, trajectory, elapsed)
+            if behind is not None:
+                return behind, elapsed
+        return None, trajectory.duration
+
+    def _arrive(self, arm: str, goal: FloatArray) -> Iterator[None]:
+        """Wait until the arm rests at `goal` (6,) rad. Raises PlanningError when it does not come there."""
+        yield from self._pause(SETTLE)
+        late = self._clock.now() + ARRIVAL
+        while np.max(np.abs(self.joints(arm) - goal)) > ARRIVED and self._clock.now() < late - 1e-9:
             yield
-        short = float(np.max(np.abs(self.joints(arm) - path[-1])))
+        short = float(np.max(np.abs(self.joints(arm) - goal)))
         if short > ARRIVED:
             message = f"the {arm} arm stopped {short:.2f} rad short of its goal, more than {ARRIVED:.2f}"
             raise PlanningError(CauseCode.MOTION_BLOCKED, message)
+
+    def _open_jaw(self, arm: str, gap: float) -> Iterator[None]:
+        """Open the jaw; done once the fingers read `gap` m. Told again when they do not, then given up."""
+        gripper = self.grippers[arm]
+        for _ in range(JAW_COMMANDS):
+            gripper.open(OPEN_GAP)
+            end = self._clock.now() + JAW_SECONDS
+            while self._clock.now() < end - 1e-9:
+                if gripper.reading().gap >= gap:
+                    return
+                yield
+        message = f"the {arm} jaw stands {1e3 * gripper.reading().gap:.1f} mm open, told {JAW_COMMANDS} times to open"
+        raise self.give_up(arm, CauseCode.GRIPPER_FAILED, f"{message} to {1e3 * OPEN_GAP:.0f} mm")
+
+    def _pause(self, seconds: float) -> Iterator[None]:
+        end = self._clock.now() + seconds
+        while self._clock.now() < end - 1e-9:
+            yield
 
     def _ways_to_grasp(
         self, arm: str, model: CollisionModel, world_from_connector: RigidTransform, shallow: float
@@ -220,14 +295,23 @@ class Motion(Bodies):
     ) -> FloatArray:
         """A path (k, 6) with the full margin, else, if `tight`, with a smaller one."""
         try:
-            return plan(model, start, goals, self._next_seed(), margin=margin)
+            return self.planner(model, start, goals, self._next_seed(), margin=margin)
         except PlanningError as error:
             if not tight or error.code is CauseCode.OUT_OF_REACH:
                 raise
-            return plan(model, start, goals, self._next_seed(), margin=TIGHT_MARGIN)
+            return self.planner(model, start, goals, self._next_seed(), margin=TIGHT_MARGIN)
 
     def _task(self, arm: str, steps: Iterator[None]) -> Task:
-        return Task(steps, self.arms[arm].stop)
+        def fit() -> Iterator[None]:
+            if arm in self._out_of_order:
+                raise self._out_of_order[arm]
+            yield from steps
+
+        return Task(fit(), lambda: self._halt(arm))
+
+    def _halt(self, arm: str) -> None:
+        self.arms[arm].stop()
+        self._watches[arm].leave(None)
 
     def _next_seed(self) -> int:
         self._seed += 1

@@ -16,6 +16,7 @@ class NotSeen(StrEnum):
 
     NO_COLOR = "no_color"  # no pixel of its colour
     TOO_SMALL = "too_small"  # its largest patch has too few pixels
+    NO_CAMERA = "no_camera"  # the camera is not to be trusted
     NO_DEPTH = "no_depth"  # the patch has too few depth readings
 
 

@@ -10,9 +10,11 @@ from scipy.spatial.transform import RigidTransform
 from interfaces.cell import KnownCell
 from interfaces.devices import Camera, Clock
 from interfaces.frame import RgbdFrame
+from perception.camera_health import CameraHealth
 from perception.depth_scale import panel_scale
 from perception.occupancy import ASSUMED_DEPTH, Occupancy, Spheres
 from perception.rgbd_pose import Estimate, NoEstimate, estimate
+from perception.segmentation import NotSeen
 from perception.track import ConnectorTrack
 
 # Where obstacles may matter: the space that the arms share with the cable.
@@ -37,6 +39,7 @@ class Perception:
         self._known, self._cameras, self._clock = known, cameras, clock
         self._pose_of, self._arm_spheres = pose_of, arm_spheres
         self._scale = dict.fromkeys(cameras, 1.0)
+        self._health = {name: CameraHealth(name) for name in cameras}
         self._results: dict[str, tuple[int, Estimate | NoEstimate]] = {}
         self.track = ConnectorTrack()
         self.hint: NDArray[np.float64] | None = None  # (3,) from cable to tip, as far as it is known: no view tells
@@ -50,10 +53,18 @@ class Perception:
         return replace(frame, depth=frame.depth * np.float32(self._scale[camera]))
 
     def look(self, camera: str) -> Estimate | NoEstimate | None:
-        """What the newest frame shows of the connector, None before the first; a new result enters the track."""
+        """What the newest frame shows of the connector, None before the first; a new result enters the track.
+
+        A camera in `trouble` shows nothing.
+        """
         newest = self._cameras[camera].latest()
         if newest is None:
             return None
+        trouble = self.trouble(camera)
+        if trouble is not None:
+            missed = NoEstimate(newest.stamp, camera, NotSeen.NO_CAMERA, trouble)
+            self.track.feed(missed)
+            return missed
         if camera in self._results and self._results[camera][0] == newest.number:
             return self._results[camera][1]
         frame = self.frame(camera)
@@ -62,6 +73,13 @@ class Perception:
         self._results[camera] = (newest.number, result)
         self.track.feed(result)
         return result
+
+    def trouble(self, camera: str) -> str | None:
+        """Why a camera is not to be trusted now, in a sentence; None when all is well."""
+        health, newest = self._health[camera], self._cameras[camera].latest()
+        if newest is not None:
+            health.feed(newest)
+        return health.trouble(self._clock.now())
 
     def correct_depth(self, camera: str) -> float:
         """Read the depth scale off the back panel in the newest frame; the factor in force from now on."""

@@ -59,15 +59,18 @@ class SimArm:
         }
         self.joints = [self.links[name] for name in JOINTS]
         self.offsets = self._draw_offsets(errors.arm_tool, rng)
+        self._speed_share = np.ones(6)  # of `SPEED`, joint by joint; less by a fault
+        self._slip = np.zeros(6)  # rad that the encoders read too much, by a fault
         self._trajectory: Trajectory | None = None
         self._started = 0.0
-        self._place(np.array(spec.sleep, float))
+        self._servo: FloatArray = np.array(spec.sleep, float)
+        self._place(self._servo)
         self.gripper = SimGripper(client, self.body, self.links, self.now, gripper, errors, rng)
 
     def reading(self) -> JointReading:
         """Encoder positions, quantised and short of the truth by the offsets; servo torques."""
         states = p.getJointStates(self.body, self.joints, physicsClientId=self.client)
-        positions = SIGN * np.array([s[0] for s in states]) - self.offsets
+        positions = SIGN * np.array([s[0] for s in states]) - self.offsets + self._slip
         return JointReading(
             self.now(),
             np.round(positions / ENCODER_STEP) * ENCODER_STEP,
@@ -93,6 +96,8 @@ class SimArm:
         if self._trajectory is None:
             return
         q, v = self._trajectory.sample(self.now() - self._started)
+        late = self._late(q)
+        q, v = np.where(late, self._servo, q), np.where(late, 0.0, v)
         seconds = float(np.max(np.abs(v))) / BRAKE
         if seconds < self._dt:
             self._trajectory = None
@@ -119,6 +124,14 @@ class SimArm:
         bar = p.getLinkState(self.body, self.links["gripper_link"], 0, 1, physicsClientId=self.client)
         return RigidTransform.from_components(middle, Rotation.from_quat(bar[5]))
 
+    def set_speed_share(self, joint: int, share: float) -> None:
+        """A fault: a joint, 0 to 5, that turns no faster than a share of `SPEED`; with 0 it stands."""
+        self._speed_share[joint] = share
+
+    def slip_encoder(self, joint: int, angle: float) -> None:
+        """A fault: a joint's encoder reads `angle` rad more from now on; its servo has a sensor of its own."""
+        self._slip[joint] += angle
+
     def step(self) -> None:
         """Set the servos for the next physics step."""
         if self._trajectory is not None:
@@ -130,16 +143,25 @@ class SimArm:
             wanted = q - self._target
             step = np.clip(wanted, -SPEED * self._dt, SPEED * self._dt)
             self._drive(self._target + step, np.where(step == wanted, v, step / self._dt))
+        elif self._late(self._target).any():
+            self._drive(self._target, np.zeros(6))
         self.gripper.step()
         self._steps += 1
 
     def _drive(self, q: FloatArray, v: FloatArray) -> None:
+        late = self._late(q)
+        if late.any():
+            reach = self._speed_share * SPEED * self._dt
+            self._servo = np.where(late, self._servo + np.clip(q - self._servo, -reach, reach), q)
+            v = np.where(late, 0.0, v)
+        else:
+            self._servo = q
         self._target = q
         p.setJointMotorControlArray(
             self.body,
             self.joints,
             p.POSITION_CONTROL,
-            targetPositions=(SIGN * (q + self.offsets)).tolist(),
+            targetPositions=(SIGN * (self._servo + self.offsets)).tolist(),
             targetVelocities=(SIGN * v).tolist(),
             positionGains=[0.3] * 6,
             velocityGains=[1.0] * 6,
@@ -147,8 +169,13 @@ class SimArm:
             physicsClientId=self.client,
         )
 
+    def _late(self, q: FloatArray) -> NDArray[np.bool_]:
+        """Which servos (6,) cannot be at `q` (6,) rad within a step: none, but by a fault."""
+        return np.abs(q - self._servo) > self._speed_share * SPEED * self._dt + 1e-9
+
     def _place(self, q: FloatArray) -> None:
         self._reset_joints(q + self.offsets)
+        self._servo = q
         self._drive(q, np.zeros(6))
 
     def _reset_joints(self, q: FloatArray) -> None:

@@ -2,7 +2,7 @@
 
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,8 @@ from sim.picture import LightState
 from sim.renderer import Renderer
 from sim.visuals import Visuals
 
+LEAK = 0.02  # share of the light that comes past a cover
+
 
 @dataclass(frozen=True, eq=False)
 class _Exposure:
@@ -25,6 +27,10 @@ class _Exposure:
     poses: NDArray[np.float32]
     world_from_camera: RigidTransform
     joints: NDArray[np.float64] | None
+    light: LightState
+    taken: int  # the number that keys the noise: an older one's when the picture is a repeated one
+    covered: bool
+    depthless: bool
 
 
 class SimCamera:
@@ -33,6 +39,9 @@ class SimCamera:
     `true_pose` gives world_from_camera with the calibration's error in it; `joints` the encoder readings (6,) of the
     arm that carries the camera, None for a fixed one; `now` the simulated seconds; `latency` is the seconds from an
     exposure until its frame can be read.
+
+    Faults, set from outside, count for the exposures to come: `drops` says of each whether it gets lost, `frozen`
+    repeats the last picture under new numbers, `covered` is a cap on the lens, `depthless` a depth imager that fails.
     """
 
     def __init__(
@@ -51,7 +60,9 @@ class SimCamera:
         self.spec = spec
         self._intrinsics = spec.intrinsics
         self._visuals = visuals
-        self._renderer, self._light, self._noise = renderer, light, noise
+        self._renderer, self.light, self._noise = renderer, light, noise
+        self.drops: Callable[[], bool] | None = None
+        self.frozen = self.covered = self.depthless = False
         self._true_pose, self._joints, self._now, self._latency = true_pose, joints, now, latency
         self._exposures: deque[_Exposure] = deque(maxlen=int(np.ceil(latency * spec.rate)) + 2)
         self._count = 0
@@ -63,7 +74,14 @@ class SimCamera:
         poses = self._visuals.snapshot() if poses is None else poses
         self._count += 1
         joints = None if self._joints is None else np.array(self._joints(), float)
-        self._exposures.append(_Exposure(self._count, self._now(), poses, self._true_pose(), joints))
+        if self.drops is not None and self.drops():
+            return
+        if self.frozen and self._exposures:
+            again = replace(self._exposures[-1], number=self._count, stamp=self._now(), joints=joints)
+        else:
+            seen = (poses, self._true_pose(), joints, self.light, self._count, self.covered, self.depthless)
+            again = _Exposure(self._count, self._now(), *seen)
+        self._exposures.append(again)
 
     def latest(self) -> RgbdFrame | None:
         """See `Camera.latest`. The picture is drawn when it is first asked for."""
@@ -78,11 +96,13 @@ class SimCamera:
         return self._ids
 
     def _draw(self, exposure: _Exposure) -> tuple[RgbdFrame, NDArray[np.int32]]:
-        image = self._renderer.render(exposure.poses, exposure.world_from_camera, self._intrinsics, self._light)
-        depth = self._noise.apply(image.depth, exposure.number)
-        frame = RgbdFrame(
-            self.name, exposure.number, exposure.stamp, image.rgb, depth, self._intrinsics, exposure.joints
-        )
+        image = self._renderer.render(exposure.poses, exposure.world_from_camera, self._intrinsics, exposure.light)
+        rgb, depth = image.rgb, self._noise.apply(image.depth, exposure.taken)
+        if exposure.covered:
+            rgb = (rgb * LEAK).astype(np.uint8)
+        if exposure.covered or exposure.depthless:
+            depth = np.zeros_like(depth)
+        frame = RgbdFrame(self.name, exposure.number, exposure.stamp, rgb, depth, self._intrinsics, exposure.joints)
         return frame, image.ids
 
 

@@ -37,7 +37,7 @@ class SimGripper:
         self._build(links["gripper_prop_link"])
         self._gap_command = CLOSED_GAP
         self._force: float | None = None
-        self._stuck_open_until = -1.0
+        self._forced_open, self._stuck, self._force_share = False, False, 1.0
         self._play = self.true_gap()
         self._samples = 0
         self._reading = self._sample(0)
@@ -57,9 +57,34 @@ class SimGripper:
         """The newest sample of the finger encoder, taken at the errors' `finger_rate`."""
         return self._reading
 
-    def fail_open(self, seconds: float) -> None:
-        """A fault: for so long the jaw drives open whatever it is told."""
-        self._stuck_open_until = self._now() + seconds
+    @property
+    def forced_open(self) -> bool:
+        """A fault: the jaw drives open whatever it is told."""
+        return self._forced_open
+
+    @forced_open.setter
+    def forced_open(self, on: bool) -> None:
+        self._forced_open = on
+        self._drive()
+
+    @property
+    def stuck(self) -> bool:
+        """A fault: the jaw goes on with what it was told last, and takes no new command until this ends."""
+        return self._stuck
+
+    @stuck.setter
+    def stuck(self, on: bool) -> None:
+        self._stuck = on
+        self._drive()
+
+    @property
+    def force_share(self) -> float:
+        """A fault: the share of the closing force that the jaw still makes."""
+        return self._force_share
+
+    @force_share.setter
+    def force_share(self, share: float) -> None:
+        self._force_share = share
         self._drive()
 
     def true_gap(self) -> float:
@@ -73,12 +98,8 @@ class SimGripper:
         self._reading = self._sample(0)
 
     def step(self) -> None:
-        """Sample the encoder when due; end a fault when its time is over."""
-        now = self._now()
-        if 0.0 <= self._stuck_open_until <= now:
-            self._stuck_open_until = -1.0
-            self._drive()
-        due = int(now * self._errors.finger_rate + 1e-6)
+        """Sample the encoder when due."""
+        due = int(self._now() * self._errors.finger_rate + 1e-6)
         if due > self._samples:
             self._samples = due
             self._reading = self._sample(due)
@@ -110,10 +131,12 @@ class SimGripper:
         p.resetJointState(body, right, -closed, physicsClientId=client)
 
     def _drive(self) -> None:
-        if self._stuck_open_until >= 0.0:
+        if self._stuck:
+            return
+        if self._forced_open:
             self._drive_at(self._spec.speed, self._spec.max_force)
         elif self._force is not None:
-            self._drive_at(-self._spec.speed, self._force)
+            self._drive_at(-self._spec.speed, self._force_share * self._force)
         else:
             self._drive_to(finger_position(self._gap_command, self._spec.pad_thickness))
 

@@ -12,14 +12,17 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from interfaces.cell import Cell, WristMount
-from interfaces.scene import Gravity, JawOpens, Obstacle
+from interfaces.fault import AnyFault
+from interfaces.scene import Gravity, Obstacle
 from sim.arm import SimArm
 from sim.build import build_boxes, configure, filter_collisions, lay_cable
 from sim.cable import CableBody, build_cable
 from sim.camera import SimCamera, camera_error
 from sim.depth_noise import DepthNoise
-from sim.faults import JawOpensFault
+from sim.fault_effects import effect_of
+from sim.faults import Fault, Moments
 from sim.fixtures import ClipHold, SocketHold
+from sim.phase import PhaseWatch
 from sim.renderer import LightState, RendererName, make_renderer
 from sim.visuals import Visuals
 
@@ -36,7 +39,7 @@ class World:
         gravity: Gravity,
         seed: int,
         obstacles: tuple[Obstacle, ...] = (),
-        faults: tuple[JawOpens, ...] = (),
+        faults: tuple[AnyFault, ...] = (),
         renderer: RendererName = "auto",
         gui: bool = False,
     ) -> None:
@@ -54,15 +57,21 @@ class World:
         )
         self.socket = self._plug()
         self.clip = self._build_clip()
-        self.faults = self._build_faults(faults)
         self.contact_peaks: dict[str, float] = {}
         self._connector, self._velocity, self._rate = self.cable.connector_state()
         self.visuals = Visuals(self.client)
         self.renderer = make_renderer(self.visuals, renderer)
         self.light = self._draw_light(light_rng)
         self.cameras = self._build_cameras(seed, errors_rng)
+        rngs = (np.random.default_rng(s) for s in np.random.SeedSequence([seed, 2]).spawn(len(faults)))
+        self.faults = [Fault(f, effect_of(f, self, rng)) for f, rng in zip(faults, rngs, strict=True)]
+        self._moments = Moments()
+        known = cell.known
+        self._start = known.socket(known.plugged_into).world_from_plug(known.connector.length).translation
+        self._phase = PhaseWatch(self._start)
         for arm in self.arms.values():
             arm.restart_clock()
+        self._watch_faults()
         self._expose()
 
     def now(self) -> float:
@@ -73,6 +82,16 @@ class World:
         """Let the world run for so long (rounded to whole physics steps)."""
         for _ in range(round(seconds / self.step_seconds)):
             self._step()
+
+    def notice(self, node: str) -> None:
+        """Take note that the node of this tree path was entered now: a fault may wait for it."""
+        self._moments.nodes.setdefault(node, self.now())
+
+    def set_light(self, light: LightState) -> None:
+        """Light the cell so from now on."""
+        self.light = light
+        for camera in self.cameras.values():
+            camera.light = light
 
     def close(self) -> None:
         """Free the client and the renderer."""
@@ -99,6 +118,8 @@ class World:
     def _step(self) -> None:
         for arm in self.arms.values():
             arm.step()
+        for fault in self.faults:
+            fault.step(self.now())
         self.cable.apply_springs()
         self.clip.step(self._connector, self._velocity, self._rate)
         p.stepSimulation(physicsClientId=self.client)
@@ -111,11 +132,21 @@ class World:
         self._expose()
 
     def _watch_faults(self) -> None:
-        if self.socket.holds or all(fault.fired_at is not None for fault in self.faults):
-            return
-        held = all(self.pads_touching("right"))
+        self._moments.now = self.now()
+        if any(fault.waiting for fault in self.faults):
+            self._look_at_moments()
         for fault in self.faults:
-            fault.step(self.now(), self._connector.translation, held)
+            fault.watch(self._moments)
+
+    def _look_at_moments(self) -> None:
+        position, plugged = self._connector.translation, self.socket.holds
+        pads = (False, False) if plugged else self.pads_touching("right")
+        speed = float(np.linalg.norm(self._velocity))
+        self._phase.step(self.now(), position, speed, pads, plugged, self.clip.holds)
+        way = self.cell.known.clip.world_from_seat.translation - self._start
+        held = all(pads) and not plugged
+        self._moments.carried = float((position - self._start) @ way) / float(way @ way) if held else None
+        self._moments.phases = self._phase.began
 
     def _expose(self) -> None:
         rate = self.cell.hidden.step_rate
@@ -180,12 +211,6 @@ class World:
             self.cable.connector_inertia,
             self.step_seconds,
         )
-
-    def _build_faults(self, faults: tuple[JawOpens, ...]) -> list[JawOpensFault]:
-        known = self.cell.known
-        start = known.socket(known.plugged_into).world_from_plug(known.connector.length).translation
-        goal = known.clip.world_from_seat.translation
-        return [JawOpensFault(f, self.arms["right"].gripper, start, goal) for f in faults]
 
     def _draw_light(self, rng: np.random.Generator) -> LightState:
         light = self.cell.hidden.light

@@ -4,8 +4,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.draw import draw_faults, draw_obstacles
-from app.fault_schema import JawOpensSpec
 from app.scenario_schema import ObstacleSpec, ScenarioFile
+from interfaces.fault import JawOpens, When
 from interfaces.scene import Gravity
 
 JITTER = (0.004, 0.006, 0.002)
@@ -22,7 +22,7 @@ def a_file(gravity: Gravity = "zero", bottom: float = 0.10) -> ScenarioFile:
         }
     )
     floor = piece.model_copy(update={"name": "flat", "jitter": (0.0, 0.0, 0.0)})
-    fault = JawOpensSpec(type="jaw_opens", carried=(0.3, 0.8), seconds=1.5)
+    fault = JawOpens(type="jaw_opens", when=When(carried=(0.3, 0.8)), seconds=1.5)
     return ScenarioFile(
         description="", cell="thesis", tree="recovery", gravity=gravity, obstacles=(piece, floor), faults=(fault,)
     )
@@ -50,7 +50,10 @@ def test_pieces_lie_within_their_jitter(seed: int) -> None:
 @given(st.integers(0, 10_000))
 def test_faults_lie_within_their_share_of_the_way(seed: int) -> None:
     [fault] = draw_faults(a_file(), np.random.default_rng(seed))
-    assert 0.3 <= fault.carried <= 0.8
+    assert isinstance(fault, JawOpens)
+    assert fault.when.carried is not None
+    least, most = fault.when.carried
+    assert 0.3 <= least == most <= 0.8
     assert fault.seconds == 1.5
 
 

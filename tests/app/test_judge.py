@@ -3,11 +3,12 @@ from typing import Any, cast
 
 import pytest
 
-from app.judge import STILL_SECONDS, Judge
+from app.judge import Judge
 from app.scenario_schema import Expect, PoseError
 from behaviors.services import Belief, Notice
 from interfaces.cause import CauseCode
 from sim.ground_truth import GroundTruth
+from sim.phase import STILL_SECONDS
 
 TICK = 0.05
 

@@ -15,6 +15,8 @@ from interfaces.cause import CauseCode
 
 ARMS = 1 + shipped("cell")["thesis"].read_text().splitlines().index("  arms:")  # the line of that key
 METRES = "expected a number in metres, such as 0.3"
+MOVES = "{type: obstacle_moves_in, obstacle: shrt, by: [0, 1, 0], when: {at: [1, 1]}}\n  - {type: jaw_opens"
+SOON = "  - soon\n  - {type: jaw_opens"
 SECOND = "  - {name: short, size: [1, 1, 1], position: {zero: [-2, 0, 0], earth: [-2, 0, 0]}}\n"
 
 
@@ -48,7 +50,7 @@ def test_a_scenario_brings_its_cell_and_tree(scenario: Path) -> None:
     loaded = load_scenario("mine.yaml")
     assert (loaded.name, loaded.tree) == ("mine", Path("tree.xml"))
     assert loaded.file.obstacles[0].position.zero == (0.30, 0.14, 0.16)
-    assert loaded.file.faults[0].carried == (0.3, 0.8)
+    assert loaded.file.faults[0].when.carried == (0.3, 0.8)
     assert loaded.cell.known.plugged_into == "back_4"
 
 
@@ -112,8 +114,18 @@ def test_shipped_cells_are_right(name: str) -> None:
         ("tries: 4", "tries: '{x}'", "mine.yaml:5: inputs.tries is '{x}'; expected"),
         ("hidden: true", "hidden: yep", "mine.yaml:19: expect.hidden is 'yep'; expected true or false"),
         ("slips: 1", "cause: slipped", "mine.yaml:16: expect: a run that ends stowed has no cause; write"),
-        ("[0.3, 0.8]", "[0.8, 0.3]", "mine.yaml:14: faults.0: carried runs backwards; put the smaller share first"),
+        ("[0.3, 0.8]", "[0.8, 0.3]", "mine.yaml:14: faults.0.when: carried runs backwards; put the smaller first"),
         ("jaw_opens", "jaw_open", "mine.yaml:14: faults.0.type: no 'jaw_open'; did you mean 'jaw_opens'?"),
+        ("type: jaw_opens, ", "", "mine.yaml:14: faults.0.type: it is missing; there are cable_snags, camera_dark"),
+        ("{type: jaw_opens, when", "{type: jaw_stuck, force_share: 1, when", "mine.yaml:14: unknown key 'force_share'"),
+        ("{carried: [0.3, 0.8]}", "{}", "mine.yaml:14: faults.0.when: nothing given; give one of at, carried, node"),
+        ("{carried: [0.3, 0.8]}", "{at: [1, 2], phase: lost}", "mine.yaml:14: faults.0.when: at and phase given; give"),
+        ("{carried: [0.3, 0.8]}", "{phase: los}", "mine.yaml:14: faults.0.when.phase: no 'los'; did you mean 'lost'?"),
+        ("{carried: [0.3, 0.8]}", "{node: setle}", "mine.yaml:14: no node 'setle' in tree.xml; did you mean 'settle'?"),
+        ("{carried: [0.3, 0.8]}", "{at: [1, 2], after: [1, 2]}", "mine.yaml:14: faults.0.when: after goes with node"),
+        ("seconds: 1.0}", "seconds: soon}", "mine.yaml:14: faults.0.seconds is 'soon'; expected a number in seconds"),
+        ("  - {type: jaw_opens", SOON, "mine.yaml:14: faults.0 is 'soon'; expected a mapping with type: one"),
+        ("{type: jaw_opens", MOVES, "mine.yaml:14: no obstacle 'shrt'; did you mean 'short'?"),
         ("cell: thesis", "cell: thesi", "mine.yaml:2: no cell named 'thesi'; did you mean 'thesis'?"),
         ("cell: thesis", "cell: gone.yaml", "mine.yaml:2: 'gone.yaml' does not exist; name a file"),
         ("cell: thesis", "cell: 3", "mine.yaml:2: cell is 3; expected text"),

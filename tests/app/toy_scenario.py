@@ -21,7 +21,7 @@ obstacles:
     yaw_deg: 0
     jitter: [0.01, 0.01, 0.0]
 faults:
-  - {type: jaw_opens, carried: [0.3, 0.8], seconds: 1.0}
+  - {type: jaw_opens, when: {carried: [0.3, 0.8]}, seconds: 1.0}
 limits: {sim_seconds: 600}
 expect:
   outcome: stowed

@@ -14,9 +14,11 @@ from scipy.spatial.transform import RigidTransform
 
 from behaviors import LEAVES
 from behaviors.services import Belief, Services
+from interfaces.cause import CauseCode
 from interfaces.cell import KnownCell
 from interfaces.frame import RgbdFrame
 from interfaces.reading import GripperReading
+from motion.failure import PlanningError
 from motion.task import Task
 from perception.rgbd_pose import Estimate, NoEstimate
 from perception.segmentation import NotSeen
@@ -93,6 +95,16 @@ class FakeMotion:
         self.shifts.append((arm, way))
         return Task(self._steps(), lambda: self.cancelled.append(arm))
 
+    def sees(self, world_from_camera: RigidTransform, points: Vector) -> bool:
+        return True
+
+    def release(self, arm: str) -> Task:
+        self.grippers[arm].open(0.05)
+        return Task(self._steps(), lambda: self.cancelled.append(arm))
+
+    def give_up(self, arm: str, code: CauseCode, message: str) -> PlanningError:
+        return PlanningError(code, message)
+
     def tool(self, arm: str) -> RigidTransform:
         return self.hand
 
@@ -127,6 +139,7 @@ class FakePerception:
         self.track = ConnectorTrack()
         self.hint: Vector | None = None
         self.looks: list[float] = []
+        self.troubles: dict[str, str] = {}
         self.occupancy = SimpleNamespace(occupied_points=lambda: np.empty((0, 3)), h=0.01)
 
     def look(self, camera: str) -> Seen:
@@ -138,6 +151,9 @@ class FakePerception:
 
     def frame(self, camera: str) -> RgbdFrame | None:
         return self.frames(np.floor(self.clock.t * 15 + 1e-6) / 15)
+
+    def trouble(self, camera: str) -> str | None:
+        return self.troubles.get(camera)
 
     def map_obstacles(self, camera: str) -> int:
         return 0

@@ -35,10 +35,11 @@ class FakeArm:
     _begun: float | None = None
 
     def reading(self) -> JointReading:
-        return JointReading(self.clock.t, self._now(), np.zeros(6), np.zeros(6))
+        return JointReading(self.clock.t, self._now(), self._rate(), np.zeros(6))
 
     def follow(self, trajectory: Trajectory) -> None:
         assert np.abs(trajectory.positions[0] - self._now()).max() < 1e-6, "a trajectory begins where the arm is"
+        self.at = self._now()
         self.followed.append((self.clock.t, trajectory))
         self._begun = self.clock.t
 
@@ -49,11 +50,19 @@ class FakeArm:
     def is_moving(self) -> bool:
         return self._begun is not None and self.clock.t < self._begun + self.followed[-1][1].duration - 1e-9
 
+    def _rate(self) -> NDArray[np.float64]:
+        if self._begun is None or not self.is_moving() or self.clock.t - self._begun > self._stuck_at():
+            return np.zeros(6)
+        return self.followed[-1][1].sample(self.clock.t - self._begun)[1]
+
+    def _stuck_at(self) -> float:
+        return self.stuck * self.followed[-1][1].duration
+
     def _now(self) -> NDArray[np.float64]:
         if self._begun is None:
             return self.at
         trajectory = self.followed[-1][1]
-        elapsed = min(self.clock.t - self._begun, self.stuck * trajectory.duration)
+        elapsed = min(self.clock.t - self._begun, self._stuck_at())
         return trajectory.sample(elapsed)[0]
 
 

@@ -2,7 +2,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from fake_devices import TICK, Rig
+from fake_devices import TICK, FakeGripper, Rig
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
@@ -12,6 +12,7 @@ from interfaces.frame import Intrinsics, RgbdFrame
 from motion.cable_path import natural_pose
 from motion.failure import PlanningError
 from motion.service import GRIP_OFFSETS, OPEN_GAP, TIGHT_MARGIN, Motion
+from motion.task import Task
 
 Points = NDArray[np.float64]
 READY = np.array([0.4, -0.6, 0.6, 0.0, 0.3, 0.0])
@@ -61,12 +62,71 @@ def test_the_nearest_to_hand_of_several_goals_is_reached(rig: Rig) -> None:
 
 
 @pytest.mark.parametrize("work", [lambda m: m.move("right", READY[None]), lambda m: m.shift("right", [0.0, 0.0, 0.05])])
-def test_an_arm_that_does_not_get_there_was_blocked(rig: Rig, work: Callable[[Motion], object]) -> None:
+def test_an_arm_that_does_not_follow_is_led_on_slower_and_then_given_up(
+    rig: Rig, work: Callable[[Motion], Task]
+) -> None:
     rig.arms["right"].at = ASIDE
+    rig.arms["right"].stuck = 0.0
+    remarks: list[str] = []
+    rig.motion.remark = remarks.append
+    with pytest.raises(PlanningError, match=r"off its trajectory, limit 0.08, 3 times") as error:
+        rig.run(work(rig.motion))
+    assert error.value.code is CauseCode.ARM_FAILED
+    assert rig.arms["right"].stops == 3
+    assert len(remarks) == 4
+    assert "out of order" in remarks[-1]
+    lengths = [trajectory.duration for _, trajectory in rig.arms["right"].followed]
+    assert lengths[1] == pytest.approx(2 * lengths[0], rel=0.1)
+    with pytest.raises(PlanningError) as again:
+        rig.motion.move("right", READY[None]).poll()
+    assert again.value is error.value
+    rig.run(rig.motion.move("left", READY[None]))  # the other arm is sound
+
+
+def test_an_arm_that_comes_free_ends_where_planned(rig: Rig) -> None:
     rig.arms["right"].stuck = 0.3
-    with pytest.raises(PlanningError, match="right arm stopped 0") as error:
-        rig.run(work(rig.motion))  # type: ignore[arg-type]
+    task = rig.motion.move("right", READY[None])
+    while not rig.arms["right"].stops:
+        assert not task.poll()
+        rig.clock.t += TICK
+    rig.arms["right"].at = rig.motion.joints("right")
+    rig.arms["right"].stuck = 1.0
+    rig.run(task)
+    assert rig.motion.joints("right") == pytest.approx(READY)
+
+
+def test_an_arm_that_stays_a_little_short_was_blocked(rig: Rig) -> None:
+    rig.arms["right"].at = ASIDE
+    goal = ASIDE + 0.07 * np.eye(6)[0]
+    rig.arms["right"].stuck = 0.0
+    with pytest.raises(PlanningError, match=r"right arm stopped 0.07 rad short") as error:
+        rig.run(rig.motion.move("right", goal[None]))
     assert error.value.code is CauseCode.MOTION_BLOCKED
+
+
+def test_an_encoder_that_jumps_while_the_arm_rests_is_noticed_before_it_moves(rig: Rig) -> None:
+    rig.run(rig.motion.move("right", ASIDE[None]))
+    rig.arms["right"].at = ASIDE + 0.3 * np.eye(6)[0]
+    rig.arms["right"]._begun = None
+    with pytest.raises(PlanningError, match=r"waist reads 0.30 rad from where it was left") as error:
+        rig.run(rig.motion.move("right", READY[None]))
+    assert error.value.code is CauseCode.ARM_FAILED
+    assert len(rig.arms["right"].followed) == 1
+
+
+class Deaf(FakeGripper):
+    """Stands at its gap whatever it is told."""
+
+    def open(self, gap: float) -> None:
+        self.told.append((self.clock.t, "open", gap))
+
+
+def test_a_jaw_that_does_not_open_is_told_three_times_and_then_given_up(rig: Rig) -> None:
+    rig.grippers["right"] = rig.motion.grippers["right"] = Deaf(rig.clock, gap=0.02)  # type: ignore[index]
+    with pytest.raises(PlanningError, match=r"right jaw stands 20.0 mm open, told 3 times to open to 50 mm") as error:
+        rig.run(rig.motion.release("right"))
+    assert error.value.code is CauseCode.GRIPPER_FAILED
+    assert len(rig.grippers["right"].told) == 3
 
 
 def test_cancel_stops_the_arm_where_it_is(rig: Rig) -> None:
