@@ -13,11 +13,14 @@ MAX_BYTES = 256 * 1024  # of a file that a person writes
 
 
 def shipped(kind: Kind) -> dict[str, Path]:
-    """Name to file of everything of this kind that comes with Regrasp, sorted by name."""
+    """Name to file of everything of this kind that comes with Regrasp, sorted by name; scenarios of faults last."""
     folders = {"scenario": ("scenarios",), "cell": ("scenarios", "cells"), "tree": ("trees",)}
     package, *below = folders[kind]
     folder = Path(str(files(package).joinpath(*below)))
-    return {path.stem: path for path in sorted(folder.glob("*" + _SUFFIX[kind]))}
+    names = {path.stem: path for path in sorted(folder.glob("*" + _SUFFIX[kind]))}
+    if kind == "scenario":
+        names |= {f"faults/{path.stem}": path for path in sorted((folder / "faults").glob("*" + _SUFFIX[kind]))}
+    return names
 
 
 def resolve(kind: Kind, name: str, beside: Path, where: tuple[str, int] | None = None) -> Path:
