@@ -11,17 +11,21 @@ _HEADER = "| field | type | unit | default | meaning | example |\n|---|---|---|-
 
 
 def markdown(root: Schema) -> str:
-    """The reference, objects inside one another by their dotted path; `[]` stands for an item's number."""
-    return "\n".join(_object(root, root, ""))
+    """The reference, objects inside one another by their dotted path; `[]` stands for an item's number.
+
+    What a union's members share is told once.
+    """
+    return "\n".join(dict.fromkeys(_object(root, root, "")))
 
 
 def _object(root: Schema, node: Schema, path: str) -> Iterator[str]:
+    """The object's section, then those of the objects in it."""
     kind = node["properties"].get("type", {}).get("const")
     title = (f"`{path}`" if path else "A scenario file") + (f" of type {kind}" if kind else "")
-    yield f"## {title}\n\n{_line(node.get('description', ''))}\n\n{_HEADER}"
-    for name, field in node["properties"].items():
-        yield _row(root, name, field, required=name in node.get("required", []))
-    yield ""
+    rows = [
+        _row(root, name, field, required=name in node.get("required", [])) for name, field in node["properties"].items()
+    ]
+    yield "\n".join([f"## {title}\n\n{_line(node.get('description', ''))}\n\n{_HEADER}", *rows, ""])
     for name, field in node["properties"].items():
         for below, step in _objects(root, field):
             yield from _object(root, below, f"{path}.{name}{step}".removeprefix("."))

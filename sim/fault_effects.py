@@ -35,13 +35,15 @@ class Effect:
 
 def effect_of(fault: f.AnyFault, world: "World", rng: np.random.Generator) -> Effect:
     """The effect of a drawn fault on a world; none for a fault of the robot's software. `rng` is the fault's own."""
+    jaw = world.arms["right"].gripper
     match fault:
         case f.JawOpens():
-            return _switch(world.arms["right"].gripper, "forced_open", True, False)
+            return Effect(lambda: jaw.set_fault(forced_open=True), lambda: jaw.set_fault(forced_open=False))
         case f.JawWeakens():
-            return _switch(world.arms["right"].gripper, "force_share", fault.force_share, 1.0)
+            share = fault.force_share
+            return Effect(lambda: jaw.set_fault(force_share=share), lambda: jaw.set_fault(force_share=1.0))
         case f.JawStuck():
-            return _switch(world.arms["right"].gripper, "stuck", True, False)
+            return Effect(lambda: jaw.set_fault(stuck=True), lambda: jaw.set_fault(stuck=False))
         case f.CameraFault():
             return _camera(fault, world, rng)
         case f.LightChanges():
@@ -57,21 +59,21 @@ def effect_of(fault: f.AnyFault, world: "World", rng: np.random.Generator) -> Ef
     return Effect()
 
 
-def _switch(part: object, name: str, on: object, off: object) -> Effect:
-    return Effect(lambda: setattr(part, name, on), lambda: setattr(part, name, off))
-
-
 def _camera(fault: f.CameraFault, world: "World", rng: np.random.Generator) -> Effect:
     camera = world.cameras[fault.camera]
+
+    def switch(name: str, on: object, off: object) -> Effect:
+        return Effect(lambda: setattr(camera, name, on), lambda: setattr(camera, name, off))
+
     match fault:
         case f.CameraDrops():
             share = fault.share
-            return _switch(camera, "drops", lambda: bool(rng.random() < share), None)
+            return switch("drops", lambda: bool(rng.random() < share), None)
         case f.CameraFreezes():
-            return _switch(camera, "frozen", True, False)
+            return switch("frozen", True, False)
         case f.CameraDark():
-            return _switch(camera, "covered", True, False)
-    return _switch(camera, "depthless", True, False)
+            return switch("covered", True, False)
+    return switch("depthless", True, False)
 
 
 def _light(fault: f.LightChanges, world: "World") -> Effect:

@@ -57,34 +57,17 @@ class SimGripper:
         """The newest sample of the finger encoder, taken at the errors' `finger_rate`."""
         return self._reading
 
-    @property
-    def forced_open(self) -> bool:
-        """A fault: the jaw drives open whatever it is told."""
-        return self._forced_open
+    def set_fault(
+        self, *, forced_open: bool | None = None, stuck: bool | None = None, force_share: float | None = None
+    ) -> None:
+        """Switch faults on and off; those that are not given stay.
 
-    @forced_open.setter
-    def forced_open(self, on: bool) -> None:
-        self._forced_open = on
-        self._drive()
-
-    @property
-    def stuck(self) -> bool:
-        """A fault: the jaw goes on with what it was told last, and takes no new command until this ends."""
-        return self._stuck
-
-    @stuck.setter
-    def stuck(self, on: bool) -> None:
-        self._stuck = on
-        self._drive()
-
-    @property
-    def force_share(self) -> float:
-        """A fault: the share of the closing force that the jaw still makes."""
-        return self._force_share
-
-    @force_share.setter
-    def force_share(self, share: float) -> None:
-        self._force_share = share
+        `forced_open`: it drives open whatever it is told. `stuck`: it goes on with what it was told last and takes no
+        new command. `force_share`: the share of the closing force that it still makes.
+        """
+        self._forced_open = self._forced_open if forced_open is None else forced_open
+        self._stuck = self._stuck if stuck is None else stuck
+        self._force_share = self._force_share if force_share is None else force_share
         self._drive()
 
     def true_gap(self) -> float:

@@ -151,12 +151,12 @@ def test_backlash_lags_behind_the_direction(cell: Cell, arm: SimArm) -> None:
 def test_forced_open_it_opens_whatever_it_is_told(arm: SimArm) -> None:
     arm.gripper.close(20.0)
     run(arm, 0.2)
-    arm.gripper.forced_open = True
+    arm.gripper.set_fault(forced_open=True)
     run(arm, 0.3)
     arm.gripper.close(20.0)
     run(arm, 0.19)
     assert arm.gripper.true_gap() > 0.06
-    arm.gripper.forced_open = False
+    arm.gripper.set_fault(forced_open=False)
     run(arm, 0.7)
     assert arm.gripper.true_gap() == pytest.approx(CLOSED_GAP, abs=GAP)
 
