@@ -11,7 +11,7 @@ from perception.stillness import Stillness
 
 LEAVE_SECONDS = 0.3  # for the end to swing out of the open jaw
 STILL = 0.25  # of the mean brightness: a cable that moves by about 1 mm; the jaw forgives 20
-BLIND_SECONDS = 10.0  # without the camera: a released cable rests within 8
+BLIND_SECONDS = 15.0  # without the camera: with it, 7 to 13 were waited
 FRAME_PERIOD = 0.2  # s between the frames that are compared
 
 
