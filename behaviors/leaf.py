@@ -93,13 +93,13 @@ class StepsLeaf(Leaf):
 
     def initialise(self) -> None:
         """Begin anew."""
-        self._steps, self._task = self.steps(), None
+        self._work, self._task = self.steps(), None
 
     def work(self) -> Status:
         """Poll the task under way; when it is done take the next step."""
         try:
             while self._task is None or self._task.poll():
-                self._task = next(self._steps)
+                self._task = next(self._work)
                 if self._task is None:
                     return Status.RUNNING
         except StopIteration:
@@ -113,7 +113,7 @@ class StepsLeaf(Leaf):
         if self.status is Status.RUNNING and new_status is Status.INVALID:
             if self._task is not None:
                 self._task.cancel()
-            self._steps.close()
+            self._work.close()
 
     def follow(self, task: Task) -> Steps:
         """Steps that do a task, for a leaf that handles its PlanningError itself; stopped with the leaf."""

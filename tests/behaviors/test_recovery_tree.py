@@ -42,13 +42,10 @@ class BusyMotion(FakeMotion):
 
         return Task(steps(), lambda: self.at_work.remove(arm) if arm in self.at_work else None)
 
-    carry = straight = pick = shift = move
+    carry = straight = pick = shift = release = move
 
     def model(self, arm: str, **_options: Any) -> Any:
         return super().model(arm)
-
-    def sees(self, *_view: Any) -> bool:
-        return True
 
     def keep_clear(self, points: Any) -> None:
         pass
@@ -120,7 +117,7 @@ def play(known: KnownCell, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> I
     # Geometry that takes long and that no motion here looks at.
     monkeypatch.setattr("behaviors.carry.Carry._goals", lambda *_arguments: [])
     monkeypatch.setattr("behaviors.carry.Insert._seated", lambda *_arguments: None)
-    monkeypatch.setattr("behaviors.look_closer.closer_views", lambda connector: [connector] * 2)
+    monkeypatch.setattr("behaviors.look.closer_views", lambda connector: [connector] * 2)
     yield lambda slip: Play(known, tmp_path, slip)
     Blackboard.clear()
 
