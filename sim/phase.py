@@ -17,6 +17,7 @@ class PhaseWatch:
     def __init__(self, start: NDArray[np.float64]) -> None:
         self._start = start
         self.began: dict[Phase, float] = {}
+        self._held = False
         self._untouched_since: float | None = None
         self._still_since: float | None = None
 
@@ -36,14 +37,15 @@ class PhaseWatch:
         if all(pads) and float(np.linalg.norm(position - self._start)) > AWAY:
             self._begin("carried", now)
         if "lost" not in self.began:
-            self._watch_loss(now, any(pads) or stowed)
+            self._held = self._held or all(pads)
+            self._watch_loss(now, any(pads) or stowed or not self._held)
         elif all(pads):
             self._begin("regrasped", now)
         elif "settled" not in self.began:
             self._watch_settling(now, speed)
 
     def _watch_loss(self, now: float, kept: bool) -> None:
-        if kept or "carried" not in self.began:
+        if kept:
             self._untouched_since = None
         elif self._untouched_since is None:
             self._untouched_since = now

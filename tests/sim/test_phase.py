@@ -37,5 +37,14 @@ def test_a_short_slip_of_one_pad_is_no_loss() -> None:
     assert "lost" not in told.go(1.0, away=0.2).watch.began
 
 
+def test_an_end_that_was_held_near_its_socket_may_be_lost_there() -> None:
+    began = Told().go(0.5, away=0.05).go(1.0, away=0.05, pads=NONE).watch.began
+    assert set(began) == {"unplugged", "lost"}
+
+
+def test_what_no_hand_held_is_not_lost() -> None:
+    assert "lost" not in Told().go(2.0, away=0.2, pads=NONE).watch.began
+
+
 def test_what_is_stowed_is_not_lost() -> None:
     assert "lost" not in Told().go(1.0, away=0.2).go(2.0, away=0.3, pads=NONE, stowed=True).watch.began
