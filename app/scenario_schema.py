@@ -192,7 +192,13 @@ class ScenarioFile(Model):
     light: Annotated[
         LightSpec, Field(description="The light in place of the cell's.", examples=[{"brightness": 0.5}])
     ] = LightSpec()
-    faults: Annotated[tuple[FaultSpec, ...], Field(description="What the world does to the robot.", examples=[[]])] = ()
+    faults: Annotated[
+        tuple[FaultSpec, ...],
+        Field(
+            description="What the world does to the robot.",
+            examples=[[{"type": "jaw_opens", "when": {"carried": [0.2, 0.65]}}]],
+        ),
+    ] = ()
     limits: Annotated[Limits, Field(description="When a run is cut short.", examples=[{"sim_seconds": 120.0}])] = (
         Limits()
     )

@@ -23,23 +23,23 @@ class When(Model):
     """When a fault begins: exactly one of `at`, `carried`, `node` and `phase`. Each fault begins once."""
 
     at: tuple[Second, Second] | None = Field(
-        default=None, description="simulated seconds; drawn between the two", examples=[[5.0, 8.0]]
+        default=None, description="Simulated seconds; drawn between the two.", examples=[[5.0, 8.0]]
     )
     carried: tuple[Fraction, Fraction] | None = Field(
         default=None,
-        description="share of the straight way from socket to clip that the held connector has come; drawn between",
+        description="Share of the straight way from socket to clip that the held connector has come; drawn between.",
         examples=[[0.3, 0.6]],
     )
     node: str | None = Field(
-        default=None, description="a node of the tree is entered: its path or the last name of it", examples=["insert"]
+        default=None, description="A node of the tree is entered: its path or the last name of it.", examples=["insert"]
     )
     after: tuple[Second, Second] | None = Field(
-        default=None, description="with `node`: seconds from its entering; drawn between", examples=[[0.5, 1.5]]
+        default=None, description="With `node`: seconds from its entering; drawn between.", examples=[[0.5, 1.5]]
     )
     phase: Phase | None = Field(
         default=None,
-        description="by the world's truth: the plug is out; the held end is 0.1 m from its socket; no pad has touched "
-        "it for 0.2 s; it rests then; both pads hold it again",
+        description="By the world's truth: the plug is out; the held end is 0.1 m from its socket; no pad has touched "
+        "it for 0.2 s; it rests then; both pads hold it again.",
         examples=["settled"],
     )
 
@@ -68,50 +68,50 @@ class When(Model):
 class Fault(Model):
     """What all faults share."""
 
-    when: When = Field(description="when it begins", examples=[{"at": [5.0, 8.0]}])
+    when: When = Field(description="When it begins.", examples=[{"at": [5.0, 8.0]}])
 
 
 class Lasting(Fault):
     """A fault that may end."""
 
     seconds: Annotated[float, Field(gt=0, le=600)] | None = Field(
-        default=None, description="seconds that it lasts; without it, to the run's end", examples=[2.0]
+        default=None, description="Seconds that it lasts; without it, to the run's end.", examples=[2.0]
     )
 
 
 class JawOpens(Lasting):
     """The right jaw drives open, whatever it is told."""
 
-    type: Literal["jaw_opens"] = Field(description="this fault", examples=["jaw_opens"])
+    type: Literal["jaw_opens"] = Field(description="This fault.", examples=["jaw_opens"])
     seconds: Annotated[float, Field(gt=0, le=600)] | None = Field(
-        default=1.0, description="seconds that it lasts; null for to the run's end", examples=[1.0]
+        default=1.0, description="Seconds that it lasts; null for to the run's end.", examples=[1.0]
     )
 
 
 class JawWeakens(Lasting):
     """The right jaw presses with a share of the force that it is told."""
 
-    type: Literal["jaw_weakens"] = Field(description="this fault", examples=["jaw_weakens"])
-    force_share: Fraction = Field(description="share of the force, 0 to 1", examples=[0.05])
+    type: Literal["jaw_weakens"] = Field(description="This fault.", examples=["jaw_weakens"])
+    force_share: Fraction = Field(description="Share of the force, 0 to 1.", examples=[0.05])
 
 
 class JawStuck(Lasting):
     """The right jaw goes on with its last command and takes no new one, as with a broken bus."""
 
-    type: Literal["jaw_stuck"] = Field(description="this fault", examples=["jaw_stuck"])
+    type: Literal["jaw_stuck"] = Field(description="This fault.", examples=["jaw_stuck"])
 
 
 class CameraFault(Lasting):
     """A fault of one camera."""
 
-    camera: Literal["rear", "wrist"] = Field(description="which camera", examples=["rear"])
+    camera: Literal["rear", "wrist"] = Field(description="Which camera.", examples=["rear"])
 
 
 class CameraDrops(CameraFault):
     """Frames get lost: nothing new comes in their place. With a share of 1 the stream stands still."""
 
-    type: Literal["camera_drops"] = Field(description="this fault", examples=["camera_drops"])
-    share: Some = Field(description="share of the frames that get lost, drawn frame by frame", examples=[0.7])
+    type: Literal["camera_drops"] = Field(description="This fault.", examples=["camera_drops"])
+    share: Some = Field(description="Share of the frames that get lost, drawn frame by frame.", examples=[0.7])
 
 
 class CameraFreezes(CameraFault):
@@ -120,31 +120,31 @@ class CameraFreezes(CameraFault):
     A stream whose stamps stand still too is `camera_drops` with a share of 1.
     """
 
-    type: Literal["camera_freezes"] = Field(description="this fault", examples=["camera_freezes"])
+    type: Literal["camera_freezes"] = Field(description="This fault.", examples=["camera_freezes"])
 
 
 class CameraDark(CameraFault):
     """The lens is covered: 2 % of the light comes through, and no depth is measured."""
 
-    type: Literal["camera_dark"] = Field(description="this fault", examples=["camera_dark"])
+    type: Literal["camera_dark"] = Field(description="This fault.", examples=["camera_dark"])
 
 
 class CameraLosesDepth(CameraFault):
     """The depth image holds no reading; the colour image is as ever."""
 
-    type: Literal["camera_loses_depth"] = Field(description="this fault", examples=["camera_loses_depth"])
+    type: Literal["camera_loses_depth"] = Field(description="This fault.", examples=["camera_loses_depth"])
 
 
 class LightChanges(Lasting):
     """The cell's light gets brighter or darker, or comes from elsewhere."""
 
-    type: Literal["light_changes"] = Field(description="this fault", examples=["light_changes"])
+    type: Literal["light_changes"] = Field(description="This fault.", examples=["light_changes"])
     factor: Annotated[float, Field(ge=0.02, le=3)] = Field(
-        default=1.0, description="factor on the brightness", examples=[0.5]
+        default=1.0, description="Factor on the brightness.", examples=[0.5]
     )
     direction: Direction | None = Field(
         default=None,
-        description="from the scene to the light, any length; without it, as before",
+        description="From the scene to the light, any length; without it, as before.",
         examples=[[0.5, -1.0, 1.0]],
     )
 
@@ -152,60 +152,60 @@ class LightChanges(Lasting):
 class JointFault(Fault):
     """A fault of one joint."""
 
-    arm: ArmName = Field(description="which arm", examples=["right"])
-    joint: JointName = Field(description="which joint", examples=["elbow"])
+    arm: ArmName = Field(description="Which arm.", examples=["right"])
+    joint: JointName = Field(description="Which joint.", examples=["elbow"])
 
 
 class JointStalls(JointFault, Lasting):
     """The joint's drive jams: it holds where it is, the encoder reads on."""
 
-    type: Literal["joint_stalls"] = Field(description="this fault", examples=["joint_stalls"])
+    type: Literal["joint_stalls"] = Field(description="This fault.", examples=["joint_stalls"])
 
 
 class JointLags(JointFault, Lasting):
     """The joint's drive is weak: it turns no faster than a share of the maker's pi rad/s."""
 
-    type: Literal["joint_lags"] = Field(description="this fault", examples=["joint_lags"])
-    speed_share: Some = Field(description="share of pi rad/s", examples=[0.15])
+    type: Literal["joint_lags"] = Field(description="This fault.", examples=["joint_lags"])
+    speed_share: Some = Field(description="Share of pi rad/s.", examples=[0.15])
 
 
 class EncoderJumps(JointFault):
     """The encoder slips on its shaft: readings are off from then on. The drive's own sensor does not notice."""
 
-    type: Literal["encoder_jumps"] = Field(description="this fault", examples=["encoder_jumps"])
+    type: Literal["encoder_jumps"] = Field(description="This fault.", examples=["encoder_jumps"])
     angle: Annotated[float, Field(ge=-3.2, le=3.2)] = Field(
-        description="rad by which it reads more from then on", examples=[0.3]
+        description="Rad by which it reads more from then on.", examples=[0.3]
     )
 
 
 class ObstacleMovesIn(Fault):
     """One of the scenario's obstacles slides, with its stand, along a line; it does not yield to what it meets."""
 
-    type: Literal["obstacle_moves_in"] = Field(description="this fault", examples=["obstacle_moves_in"])
-    obstacle: str = Field(description="name of one of the scenario's obstacles", examples=["short"])
-    by: Vector = Field(description="metres along x, y and z from where it stands", examples=[[0.0, -0.5, 0.0]])
-    speed: Annotated[float, Field(gt=0, le=2)] = Field(default=0.25, description="metres a second", examples=[0.25])
+    type: Literal["obstacle_moves_in"] = Field(description="This fault.", examples=["obstacle_moves_in"])
+    obstacle: str = Field(description="Name of one of the scenario's obstacles.", examples=["short"])
+    by: Vector = Field(description="Metres along x, y and z from where it stands.", examples=[[0.0, -0.5, 0.0]])
+    speed: Annotated[float, Field(gt=0, le=2)] = Field(default=0.25, description="Metres a second.", examples=[0.25])
 
 
 class ConnectorKnocked(Fault):
     """A push on the connector's centre, shared evenly over 20 ms."""
 
-    type: Literal["connector_knocked"] = Field(description="this fault", examples=["connector_knocked"])
-    impulse: Vector = Field(description="newton seconds along x, y and z, each at most 5", examples=[[0.0, 0.1, 0.05]])
+    type: Literal["connector_knocked"] = Field(description="This fault.", examples=["connector_knocked"])
+    impulse: Vector = Field(description="Newton seconds along x, y and z, each at most 5.", examples=[[0.0, 0.1, 0.05]])
 
 
 class CableSnags(Lasting):
     """The cable catches on something: a soft spring ties one of its links to where that link was."""
 
-    type: Literal["cable_snags"] = Field(description="this fault", examples=["cable_snags"])
+    type: Literal["cable_snags"] = Field(description="This fault.", examples=["cable_snags"])
     along: Fraction = Field(
-        default=0.6, description="share of the cable's length from its fixed end to the link", examples=[0.6]
+        default=0.6, description="Share of the cable's length from its fixed end to the link.", examples=[0.6]
     )
     stiffness: Annotated[float, Field(gt=0, le=2000)] = Field(
-        default=100.0, description="newtons a metre", examples=[100.0]
+        default=100.0, description="Newtons a metre.", examples=[100.0]
     )
     max_force: Annotated[float, Field(gt=0, le=200)] = Field(
-        default=20.0, description="newtons that the spring never exceeds", examples=[20.0]
+        default=20.0, description="Newtons that the spring never exceeds.", examples=[20.0]
     )
 
 
@@ -213,14 +213,14 @@ class ServiceFault(Lasting):
     """A fault of the robot's software: nothing in the world changes."""
 
     calls: Annotated[int, Field(ge=1, le=1000)] | None = Field(
-        default=None, description="ends after so many calls, if its seconds are not over before", examples=[1]
+        default=None, description="Ends after so many calls, if its seconds are not over before.", examples=[1]
     )
 
 
 class ServiceRaises(ServiceFault):
     """A service that the leaves call breaks off with an error."""
 
-    type: Literal["service_raises"] = Field(description="this fault", examples=["service_raises"])
+    type: Literal["service_raises"] = Field(description="This fault.", examples=["service_raises"])
     service: Literal[
         "perception.look",
         "perception.correct_depth",
@@ -230,13 +230,13 @@ class ServiceRaises(ServiceFault):
         "motion.straight",
         "motion.shift",
         "motion.pick",
-    ] = Field(description="the call that raises", examples=["perception.look"])
+    ] = Field(description="The call that raises.", examples=["perception.look"])
 
 
 class PlanningFindsNothing(ServiceFault):
     """The planner finds no way."""
 
-    type: Literal["planning_finds_nothing"] = Field(description="this fault", examples=["planning_finds_nothing"])
+    type: Literal["planning_finds_nothing"] = Field(description="This fault.", examples=["planning_finds_nothing"])
 
 
 AnyFault = (
