@@ -73,23 +73,23 @@ def replay(
 
 
 def diff(folder: Folder, other: Annotated[Path, typer.Argument(metavar="DIR", help="Another run's folder.")]) -> None:
-    """Say where two runs part: their scenario, seed, versions and outcome, the first tick and the first event.
+    """Say where two runs part: their outcome, the first tick, the first event; and what was run differently.
 
     \b
     Example:
       regrasp diff runs/short_obstacle-0-1 runs/short_obstacle-0-2
     \b
-    Exit code: 0 the same, 1 different, 2 bad input.
+    Exit code: 0 they went the same way, 1 they did not, 2 bad input.
     """
-    from app.record_diff import differences
+    from app.record_diff import beginnings, differences
 
-    lines = differences(*_read_both(folder, other))
-    if not lines:
-        typer.echo("the same")
-        return
-    typer.echo(f"{printable(str(folder))} | {printable(str(other))}")
-    typer.echo("\n".join(lines))
-    raise typer.Exit(EXIT_DIFFERENT)
+    first, second = _read_both(folder, other)
+    begun, parted = beginnings(first, second), differences(first, second)
+    if begun or parted:
+        typer.echo("\n".join([f"{printable(str(folder))} | {printable(str(other))}", *begun, *parted]))
+    if parted:
+        raise typer.Exit(EXIT_DIFFERENT)
+    typer.echo(f"the same {len(first.ticks)} changes of nodes and {len(first.events)} events")
 
 
 def _read(folder: Path) -> "RunRecord":

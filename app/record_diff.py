@@ -21,22 +21,22 @@ RUN = (
     "overrides",
     "renderer",
 )  # of the `begin` event
-RESULT = ("outcome", "succeeded", "cause", "versions")
+RESULT = ("outcome", "succeeded", "cause")
 LONGEST = 200  # characters of a value
 
 
+def beginnings(a: RunRecord, b: RunRecord) -> list[str]:
+    """Lines that say what was run differently: scenario, seed, versions."""
+    versions = [run.result.versions if run.result else {} for run in (a, b)]
+    found = [line for name in RUN for line in _differ(name, a.begin.get(name), b.begin.get(name))]
+    return [printable(line) for line in (*found, *_differ("versions", *versions))]
+
+
 def differences(a: RunRecord, b: RunRecord) -> list[str]:
-    """Lines that say what differs, [] for runs that went the same way; what the wall clock says does not count."""
-    found = [*_fields(a, b), *_first_tick(a.ticks, b.ticks), *_first_event(_course(a), _course(b))]
-    return [printable(line) for line in found]
-
-
-def _fields(a: RunRecord, b: RunRecord) -> Iterator[str]:
-    for name in RUN:
-        yield from _differ(name, a.begin.get(name), b.begin.get(name))
+    """Lines that say where the runs part, [] where they went the same way; what the wall clock says does not count."""
     values = [plain(asdict(run.result)) if run.result else {} for run in (a, b)]
-    for name in RESULT:
-        yield from _differ(name, *(value.get(name) for value in values))
+    ends = [line for name in RESULT for line in _differ(name, *(value.get(name) for value in values))]
+    return [printable(line) for line in (*ends, *_first_tick(a.ticks, b.ticks), *_first_event(_course(a), _course(b)))]
 
 
 def _differ(name: str, a: Any, b: Any) -> Iterator[str]:
