@@ -1,5 +1,6 @@
 import json
 from collections.abc import Iterator
+from importlib.resources import files
 from typing import Any, get_args
 
 import pytest
@@ -78,3 +79,9 @@ def test_the_command_prints_the_schema_and_a_reference_with_every_field() -> Non
         assert f"| `{info.alias or name.split('.')[1]}` |" in text
         assert str(info.description) in text
     assert "| `size` | 3 x number (above 0, at most 3) | metres | required |" in text
+
+
+def test_the_reference_that_ships_is_what_the_command_prints() -> None:
+    """Where this fails: `regrasp scenarios schema --markdown > scenarios/SCHEMA.md`."""
+    shipped = (files("scenarios") / "SCHEMA.md").read_text(encoding="utf-8")
+    assert CliRunner().invoke(app, ["scenarios", "schema", "--markdown"]).stdout == shipped
