@@ -1,5 +1,6 @@
 """Fixtures of all tests: the thesis's cell, arms, bare PyBullet clients. One file: mypy takes two for one module."""
 
+import signal
 from collections.abc import Iterator
 from importlib.resources import files
 from typing import Any
@@ -16,6 +17,8 @@ from motion.kinematics import ArmKinematics
 
 pytest_plugins = ["pytester", "app.pytest_plugin"]
 
+# A shell starts background jobs with Ctrl-C ignored, and what tests start would inherit that.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 settings.register_profile("without deadline", deadline=None)  # compilation and other workers take their time
 settings.load_profile("without deadline")
 
