@@ -33,7 +33,7 @@ class MakeRoom(HandLeaf):
 class WaitUntilStill(HandLeaf):
     """RUNNING while the rear camera sees anything move; FAILURE after `time_limit` seconds.
 
-    What stands in the cell is mapped anew then: a thing may have come in. Without a sound rear camera it waits as long
+    A thing that came into the cell meanwhile is mapped then. Without a sound rear camera it waits as long
     as the cable swings at most; without any sound camera FAILURE, for nobody could find the end.
     """
 
@@ -54,9 +54,10 @@ class WaitUntilStill(HandLeaf):
             perception.look("rear")
             frame = perception.frame("rear")
             if frame is not None and frame.stamp >= begin and stillness.feed(frame):
-                voxels = perception.map_obstacles("rear")
-                self.say("still", waited=round(self.services.clock.now() - begin, 2), occupied_voxels=voxels)
-                self.services.motion.set_obstacles(perception.occupancy.occupied_points(), perception.occupancy.h)
+                self.say("still", waited=round(self.services.clock.now() - begin, 2))
+                if voxels := perception.map_new_obstacle("rear"):
+                    self.say("a new thing stands in the cell", voxels=voxels)
+                    self.services.motion.set_obstacles(perception.occupancy.occupied_points(), perception.occupancy.h)
                 return
             yield from self.wait(FRAME_PERIOD)
         raise Failed(CauseCode.NOT_STILL, f"the scene still moved after {limit:.0f} s")

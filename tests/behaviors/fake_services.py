@@ -155,6 +155,9 @@ class FakePerception:
     def trouble(self, camera: str) -> str | None:
         return self.troubles.get(camera)
 
+    def map_new_obstacle(self, camera: str) -> int:
+        return 0
+
     def map_obstacles(self, camera: str) -> int:
         return 0
 

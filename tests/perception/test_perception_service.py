@@ -132,3 +132,18 @@ def test_an_obstacle_is_mapped_and_an_arm_is_not(known: KnownCell) -> None:
     middle = (FOAM.lower + FOAM.upper) / 2
     arm = perception(known, eye, [(middle[None], np.array([0.15]))])
     assert arm.map_obstacles("rear") < 0.05 * len(points)
+
+
+def test_a_second_look_changes_the_map_only_for_a_new_thing(known: KnownCell) -> None:
+    eye, sensor = Eye(), Sensor(scale=0.0)
+    eyes = perception(known, eye)
+    eye.show(seen(FOAM), number=1, stamp=0.0)
+    eyes.map_obstacles("rear")
+    mapped = eyes.occupancy.occupied_points()
+    eye.show(render([WALL, FLOOR, FOAM], REAR_POSE, REAR, sensor, 6), number=2, stamp=0.1)  # other noise
+    assert eyes.map_new_obstacle("rear") == 0
+    assert np.array_equal(eyes.occupancy.occupied_points(), mapped)
+    aside = np.array([0.0, 0.25, 0.0])
+    eye.show(seen(FOAM, Block(FOAM.lower + aside, FOAM.upper + aside)), number=3, stamp=0.2)
+    assert eyes.map_new_obstacle("rear") > 80
+    assert len(eyes.occupancy.occupied_points()) > len(mapped) + 80
