@@ -1,5 +1,6 @@
 """The command line: `regrasp`."""
 
+import errno
 import os
 import sys
 from importlib.metadata import version
@@ -10,7 +11,7 @@ import typer
 from typer.core import TyperGroup
 
 from app import output, record_commands, scenario_commands, study_commands, tree_commands
-from app.findings import Finding, Findings
+from app.findings import Finding, Findings, printable
 from app.options import MOST_SEED, Sets
 from app.progress import shown_progress
 from app.run_every import run_every
@@ -32,6 +33,12 @@ class _Group(TyperGroup):
         except Findings as error:
             for finding in error.items:
                 typer.echo(str(finding), err=True)
+            raise typer.Exit(EXIT_BAD_INPUT) from None
+        except OSError as error:  # a disk that is full, a name that is too long
+            if error.errno == errno.EPIPE:
+                raise  # typer's: the reader of a pipe has gone
+            where = str(error.filename or "output")
+            typer.echo(printable(f"{where[:200]}: {error.strerror}; write somewhere else"), err=True)
             raise typer.Exit(EXIT_BAD_INPUT) from None
         except KeyboardInterrupt:
             typer.echo("interrupted", err=True)

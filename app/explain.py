@@ -39,7 +39,9 @@ def _page(record: RunRecord, width: int) -> Iterator[str]:
     statuses = {tick.path: tick.status for tick in record.ticks}
     running = sorted((p for p, status in statuses.items() if status == "RUNNING"), key=lambda path: path.split("/"))
     # Whatever stands below a path comes right after it.
-    leaves = [path for path, after in zip(running, [*running[1:], ""], strict=True) if not after.startswith(path + "/")]
+    leaves = [
+        path for path, after in zip(running, [*running[1:], ""], strict=False) if not after.startswith(path + "/")
+    ]
     seconds = record.ticks[-1].t if record.ticks else 0.0
     yield from _section(f"What was running at {seconds:.2f} s, when the record ends", leaves)
     last = (f"{e.t:8.2f}  {e.node or '-'}  {event_text(e)}" for e in record.events[-LAST_EVENTS:])

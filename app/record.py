@@ -175,15 +175,28 @@ def plain(value: Any) -> Any:
 def write_whole(path: Path, content: str | bytes) -> None:
     """Write a file in one step: readers see the old one or the new one, never a half.
 
+    What a link names is written, not the link; a pipe or a device takes the content as it comes.
+
     Raises:
         OSError: the file cannot be written.
     """
+    data = content.encode() if isinstance(content, str) else content
+    if path.exists() and not path.is_file():
+        path.write_bytes(data)
+        return
+    path = path.resolve()
     part = path.with_name(path.name + ".part")
-    with part.open("wb") as file:
-        file.write(content.encode() if isinstance(content, str) else content)
-        file.flush()
-        os.fsync(file.fileno())
-    part.replace(path)
+    try:
+        with part.open("wb") as file:
+            if path.exists():
+                os.fchmod(file.fileno(), path.stat().st_mode)
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        part.replace(path)
+    except OSError:
+        part.unlink(missing_ok=True)
+        raise
 
 
 class Record:

@@ -1,6 +1,7 @@
 """`regrasp explain`, `replay` and `diff`: look at the records that runs left."""
 
 import json
+import os
 import shutil
 import sys
 from dataclasses import asdict
@@ -63,7 +64,7 @@ def replay(
     from app.replay import Replay
 
     run = Replay(_read(folder))
-    if sys.stdin.isatty() and sys.stdout.isatty():
+    if sys.stdin.isatty() and sys.stdout.isatty() and os.environ.get("TERM") != "dumb":
         from app.replay_screen import show
 
         show(run, part, begin or 0.0)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from app.findings import Finding, Findings, nearest, shown
+from app.output import FILES
 from app.record import write_whole
 from app.record_reader import RunRecord, read_record
 from app.resources import read_text, resolve
@@ -117,6 +118,8 @@ def _check_paths(path: Path, record: RunRecord, known: Collection[str]) -> None:
 def _write(out: Path, content: bytes, tree: Path) -> None:
     if out.exists() and out.samefile(tree):
         raise Findings([Finding(shown(out), 1, "is the tree itself; name another file")])
+    if out.is_file() and out.name in FILES and (out.parent / "events.jsonl").exists():
+        raise Findings([Finding(shown(out), 1, "belongs to a run's record; name another file")])
     try:
         write_whole(out, content)
     except OSError as error:

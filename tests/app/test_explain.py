@@ -91,6 +91,13 @@ def test_a_killed_run_is_told_as_far_as_it_is_known(tmp_path: Path) -> None:
     assert "slip: by=gap, value=0.0443" in told
 
 
+def test_a_run_that_was_killed_before_its_first_tick_has_a_page(tmp_path: Path) -> None:
+    folder = write_record(tmp_path / "run")
+    (folder / "result.json").unlink()
+    (folder / "ticks.jsonl").write_text("")
+    assert "no result" in explanation(read_record(folder), 80)
+
+
 @pytest.mark.parametrize("width", [80, 100, 120])
 def test_long_sentences_are_wrapped(tmp_path: Path, width: int) -> None:
     cause = Cause(CauseCode.SLIPPED, "the connector slipped away " * 20, "root")

@@ -16,6 +16,7 @@ from app.record import (
     Result,
     Sighting,
     Slip,
+    write_whole,
 )
 from interfaces.cause import Cause, CauseCode
 
@@ -128,3 +129,19 @@ def test_without_a_folder_all_stays_in_memory() -> None:
         record.finish(a_result())
     assert json.loads(record.events.getvalue())["event"] == "found"  # type: ignore[attr-defined]
     assert record.result == a_result()
+
+
+def test_a_link_is_written_through_and_a_mode_kept(tmp_path: Path) -> None:
+    (tmp_path / "real").write_text("old")
+    (tmp_path / "real").chmod(0o600)
+    (tmp_path / "link").symlink_to("real")
+    write_whole(tmp_path / "link", "new")
+    assert (tmp_path / "link").is_symlink()
+    assert (tmp_path / "real").read_text() == "new"
+    assert (tmp_path / "real").stat().st_mode & 0o777 == 0o600
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["link", "real"]
+
+
+def test_a_device_stays_a_device() -> None:
+    write_whole(Path("/dev/null"), "gone")
+    assert Path("/dev/null").is_char_device()
