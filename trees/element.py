@@ -95,6 +95,11 @@ def read_elements(path: Path) -> Element:
     def refuse_doctype(*_declaration: object) -> None:
         raise TreeSyntaxError(parser.CurrentLineNumber, "a document type is refused; remove <!DOCTYPE ...>")
 
+    def text(content: str) -> None:
+        if word := content.strip():
+            raise TreeSyntaxError(parser.CurrentLineNumber, f"stray text {word[:40]!r}; put it in a <!-- comment -->")
+
+    parser.CharacterDataHandler = text
     parser.StartElementHandler = start
     parser.EndElementHandler = end
     parser.StartDoctypeDeclHandler = refuse_doctype

@@ -170,6 +170,7 @@ CASES = {
     ),
     "not XML": ("</Inverter>", "", 17, "malformed XML: mismatched tag; close <Inverter> of line 15"),
     "entities": ("<root", '<!DOCTYPE root [<!ENTITY e SYSTEM "file:///etc/passwd">]>\n<root', 1, "document type"),
+    "stray text": ("</Inverter>", "stray</Inverter>", 15, "stray text 'stray'; put it in a <!-- comment -->"),
 }
 
 
