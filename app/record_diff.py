@@ -29,7 +29,14 @@ def beginnings(a: RunRecord, b: RunRecord) -> list[str]:
     """Lines that say what was run differently: scenario, seed, versions."""
     versions = [run.result.versions if run.result else {} for run in (a, b)]
     found = [line for name in RUN for line in _differ(name, a.begin.get(name), b.begin.get(name))]
+    if _tree(a) != _tree(b):
+        found.append("tree.xml: not the same tree")
     return [printable(line) for line in (*found, *_differ("versions", *versions))]
+
+
+def _tree(run: RunRecord) -> bytes | None:
+    file = run.folder / "tree.xml"
+    return file.read_bytes() if file.is_file() else None
 
 
 def differences(a: RunRecord, b: RunRecord) -> list[str]:
