@@ -24,18 +24,19 @@ def shipped(kind: Kind) -> dict[str, Path]:
 
 
 def resolve(kind: Kind, name: str, beside: Path, where: tuple[str, int] | None = None) -> Path:
-    """The file that `name` means: an existing file or what is written like one, from `beside`, else a shipped name.
+    """The file that `name` means: what is written like one, from `beside`, else a shipped one; nothing else is opened.
 
     Raises `Findings`, at the place `where` (source, line) that holds the name; without one, at the name itself.
     """
     path = beside / name
     known = shipped(kind)
-    if name.endswith(_SUFFIX[kind]) or os.path.isfile(path):
+    if name.endswith(_SUFFIX[kind]):
         return path
     if name in known:
         return known[name]
     name = name if len(name) <= 80 else name[:77] + "..."
-    wrong = f"{name!r} is a folder" if name and os.path.isdir(path) else f"no {kind} named {name!r}"
+    what = "a folder" if os.path.isdir(path) else f"no {_SUFFIX[kind]} file" if os.path.exists(path) else ""
+    wrong = f"{name!r} is {what}" if name and what else f"no {kind} named {name!r}"
     hint = nearest(name, known, "the shipped ones are")
     raise Findings([Finding(*(where or (name, 1)), f"{wrong}; {hint} (a path ends in {_SUFFIX[kind]})")])
 
