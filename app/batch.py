@@ -11,6 +11,7 @@ from typing import Any
 from app.processes import Done, run_each
 from app.record import Result
 from app.scenario_file import Scenario
+from app.summary import asked
 
 Episode = Callable[..., Result]
 
@@ -123,4 +124,4 @@ def row_of(run: Run, done: Done[Result]) -> Row:
 def failure(result: Result) -> str:
     """Why a run did not come out as expected, in words: its cause and every unmet expectation."""
     cause = [f"{result.cause.code}: {result.cause.message}"] if result.cause else []
-    return "; ".join([*cause, *(f"{e.name} is {e.value}, asked {e.limit}" for e in result.expectations if not e.met)])
+    return "; ".join([*cause, *(f"{e.name} is {e.value}, asked {asked(e)}" for e in result.expectations if not e.met)])

@@ -1,13 +1,40 @@
 """Whether a run came out as its scenario expects, by ground truth."""
 
+from collections import deque
 from collections.abc import Iterator
 from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
 
 from app.record import Expectation, Slip
 from app.scenario_schema import Expect
 from behaviors.services import Belief
 from sim.ground_truth import GroundTruth
 from sim.phase import LOST_SECONDS, STILL_SECONDS, STILL_SPEED
+
+SLIDE = 0.003  # m in the jaw ...
+SLIDE_SECONDS = (
+    0.5  # ... within so long: it slides. A squeezed end was seen to creep so for a second before it sprang out
+)
+
+
+class GripWatch:
+    """Whether the end slides in the jaw that holds it."""
+
+    def __init__(self) -> None:
+        self._offsets: deque[tuple[float, NDArray[np.float64]]] = deque()
+        self.slid_at: float | None = None  # since when it slides; None while it sits fast
+
+    def feed(self, now: float, offset: NDArray[np.float64]) -> None:
+        """Take the end's place (3,) m in the hand at second `now`."""
+        self._offsets.append((now, offset))
+        while self._offsets[0][0] < now - SLIDE_SECONDS:
+            self._offsets.popleft()
+        if float(np.linalg.norm(offset - self._offsets[0][1])) < SLIDE:
+            self.slid_at = None
+        elif self.slid_at is None:
+            self.slid_at = now
 
 
 class Judge:
@@ -17,7 +44,8 @@ class Judge:
         self._truth, self._expect = truth, expect
         self._now = 0.0
         self._was_held = False
-        self._unheld_at: float | None = None  # since when not both pads touch it
+        self._grip = GripWatch()
+        self._unheld_at: float | None = None  # since when not both pads touch it, or it slid before that
         self._untouched_at: float | None = None  # since when none does
         self._still_since: float | None = None
         self.takes = 0  # times that the hand took hold of it
@@ -31,22 +59,27 @@ class Judge:
         self.found_by = self.found_by or belief.found_by
         if self._truth.held():
             self.takes += not self._was_held
+            self._grip.feed(now, self._truth.connector_in_hand())
             self._was_held, self._unheld_at, self._untouched_at, self._still_since = True, None, None, None
             return
         if self._was_held and not self._truth.stowed():
-            self._unheld_at = now if self._unheld_at is None else self._unheld_at
+            if self._unheld_at is None:
+                self._unheld_at = now if self._grip.slid_at is None else self._grip.slid_at
             if self._truth.touched():
                 self._untouched_at = None
             else:
                 self._untouched_at = now if self._untouched_at is None else self._untouched_at
                 if now - self._untouched_at >= LOST_SECONDS:
                     self.losses.append(self._unheld_at)
-                    self._was_held = False
+                    self._was_held, self._grip = False, GripWatch()
         if self.losses and not self._was_held and self.settled_pixels is None:
             self._watch_settling(now)
 
     def slips(self, belief: Belief) -> tuple[Slip, ...]:
-        """Each real loss with the first notice that came after it and before the next."""
+        """Each real loss with the first notice that came after it and before the next.
+
+        A loss begins when the end slides in the jaw: a robot that sees this may notice it before the last pad lets go.
+        """
         slips = []
         for released, end in pairwise([*self.losses, float("inf")]):
             notice = next((n for n in belief.notices if released <= n.at < end), None)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from app.vary import DEFAULT
 
 if TYPE_CHECKING:
-    from app.record import Result
+    from app.record import Expectation, Result
 
 
 def summary(result: "Result", folder: Path) -> str:
@@ -38,7 +38,15 @@ def expectation_lines(result: "Result") -> Iterator[str]:
     """Each expectation with a mark: met or not, what came out, what was asked."""
     yes, no = marks()
     for e in result.expectations:
-        yield f"{yes if e.met else no} {e.name}: {_plain(e.value)} (asked: {_plain(e.limit)})"
+        yield f"{yes if e.met else no} {e.name}: {_plain(e.value)} (asked: {asked(e)})"
+
+
+def asked(expectation: "Expectation") -> str:
+    """What was asked for, and whether more or less of it is met too."""
+    limit = _plain(expectation.limit)
+    if expectation.name == "slips":
+        return f"at least {limit} noticed, none unseen"
+    return limit if expectation.name in ("outcome", "cause", "hidden") else f"at most {limit}"
 
 
 def slip_lines(result: "Result") -> Iterator[str]:

@@ -1,6 +1,7 @@
 """The truth of a world, for the judge of expectations, studies and tests. The robot's software never reads it."""
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
 from sim.world import World
@@ -29,6 +30,11 @@ class GroundTruth:
     def touched(self) -> bool:
         """Whether any pad of the right hand touches the connector."""
         return any(self._world.pads_touching("right"))
+
+    def connector_in_hand(self) -> NDArray[np.float64]:
+        """The connector's centre (3,) m in the frame between the pads of the right hand."""
+        center = self._world.connector_pose().translation
+        return np.asarray(self._world.arms["right"].tool_pose().inv().apply(center))
 
     def plugged(self) -> bool:
         """Whether the connector sits in its socket."""

@@ -62,7 +62,7 @@ def test_the_page_of_a_run_that_stopped_safely(tmp_path: Path) -> None:
         "",
         "What was expected",
         "  ✗ outcome: safe_stop (asked: stowed)",
-        "  ✓ slips: 1 (asked: 1)",
+        "  ✓ slips: 1 (asked: at least 1 noticed, none unseen)",
     ]
 
 

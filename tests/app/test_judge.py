@@ -1,7 +1,9 @@
 from dataclasses import dataclass, field
 from typing import Any, cast
 
+import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from app.judge import Judge
 from app.scenario_schema import Expect, PoseError
@@ -23,6 +25,7 @@ class Truth:
     pixels: int = 0
     peaks: dict[str, float] = field(default_factory=dict)
     seat: tuple[float, float] = (0.002, 1.5)  # m and degrees from the clip's
+    in_hand: float = 0.0  # m along the jaw
 
     def held(self) -> bool:
         return self.fingers == 2
@@ -32,6 +35,9 @@ class Truth:
 
     def stowed(self) -> bool:
         return self.in_clip
+
+    def connector_in_hand(self) -> NDArray[np.float64]:
+        return np.array([0.0, 0.0, self.in_hand])
 
     def connector_speed(self) -> float:
         return self.speed
@@ -92,6 +98,33 @@ def test_a_loss_is_dated_from_the_first_pad_s_letting_go() -> None:
     slides = run.go(0.5, fingers=1)
     run.go(1.0, fingers=0)
     assert run.judge.losses == [pytest.approx(slides)]
+
+
+def test_an_end_that_slides_out_of_the_jaw_is_being_lost_before_the_pads_let_go() -> None:
+    run = Run(Expect(slips=1, detection_delay=0.5))
+    run.go(1.0, fingers=2)
+    slides = run.go(0.2, in_hand=0.01)
+    run.go(1.0, fingers=0)
+    assert run.judge.losses == [pytest.approx(slides)]
+    run.belief.notices.append(Notice(slides + 0.1, "gap"))
+    assert run.verdict("slips") == (True, 1)
+    assert run.verdict("detection_delay") == (True, pytest.approx(0.1))
+
+
+def test_what_slid_and_was_held_fast_again_is_lost_only_later() -> None:
+    run = Run()
+    run.go(1.0, fingers=2)
+    run.go(2.0, in_hand=0.01)
+    released = run.go(1.0, fingers=0)
+    assert run.judge.losses == [pytest.approx(released)]
+
+
+def test_a_false_alarm_is_no_notice_of_the_loss_that_it_brings_about() -> None:
+    run = Run(Expect(slips=1))
+    alarm = run.go(0.2, fingers=2)
+    run.belief.notices.append(Notice(alarm + 0.1, "gap"))
+    run.go(1.0, fingers=0)  # the robot opens its jaw
+    assert run.verdict("slips") == (False, 0)
 
 
 @pytest.mark.parametrize(("gap", "losses"), [(0.15, 0), (0.30, 1)])
