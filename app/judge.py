@@ -15,7 +15,7 @@ from sim.phase import LOST_SECONDS, STILL_SECONDS, STILL_SPEED
 
 SLIDE = 0.003  # m in the jaw ...
 SLIDE_SECONDS = (
-    0.5  # ... within so long: it slides. A squeezed end was seen to creep so for a second before it sprang out
+    0.5  # ... within so long: a squeezed end crept so for a second before it sprang out
 )
 
 
