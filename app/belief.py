@@ -4,7 +4,7 @@ from scipy.spatial.transform import RigidTransform
 
 from app.record import ArmState, BeliefState, Pose, Sighting
 from behaviors.services import Services
-from perception.rgbd_pose import Estimate
+from perception.estimate import Estimate
 
 
 def belief_state(services: Services) -> BeliefState:

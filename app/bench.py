@@ -19,7 +19,8 @@ from app.scenario_file import load_scenario
 from app.table import print_table
 from app.tick_log import TickLog
 from behaviors import LEAVES
-from perception.rgbd_pose import NoEstimate, estimate
+from perception.estimate import NoEstimate
+from perception.rgbd_pose import estimate
 from perception.segmentation import SegmentationParameters
 from sim.cable import spring_torques
 from sim.renderer import make_renderer

@@ -14,9 +14,7 @@ from sim.ground_truth import GroundTruth
 from sim.phase import LOST_SECONDS, STILL_SECONDS, STILL_SPEED
 
 SLIDE = 0.003  # m in the jaw ...
-SLIDE_SECONDS = (
-    0.5  # ... within so long: a squeezed end crept so for a second before it sprang out
-)
+SLIDE_SECONDS = 0.5  # ... within so long: a squeezed end crept so for a second before it sprang out
 
 
 class GripWatch:

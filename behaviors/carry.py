@@ -11,8 +11,9 @@ from motion.collision import CollisionModel
 from motion.failure import PlanningError
 from motion.kinematics import ArmKinematics
 from motion.straight import straight_line
+from perception.estimate import Estimate
 from perception.mean_pose import mean_pose
-from perception.rgbd_pose import WHOLE_SHARE, Estimate
+from perception.rgbd_pose import WHOLE_SHARE
 
 # m before the clip along the hand's own axis, from where it goes straight in; more would press the cable
 BEFORE = 0.025

@@ -4,8 +4,8 @@ from typing import Any, ClassVar
 
 from behaviors.leaf import Failed, Port, Steps, StepsLeaf
 from interfaces.cause import CauseCode
+from perception.estimate import Estimate
 from perception.mean_pose import mean_pose
-from perception.rgbd_pose import Estimate
 
 
 class CheckCameras(StepsLeaf):

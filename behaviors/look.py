@@ -12,7 +12,7 @@ from interfaces.cause import CauseCode
 from interfaces.cell import WristMount
 from motion.failure import PlanningError
 from motion.viewpoints import closer_views
-from perception.rgbd_pose import Estimate
+from perception.estimate import Estimate
 
 LOOK_MARGIN = 0.02  # m: the searching arm moves among things that it has seen from one side only
 OTHER_SIDE = 0.77  # cosine of the 40 degrees between two lines of sight from different sides

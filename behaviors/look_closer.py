@@ -7,8 +7,8 @@ from behaviors.hand import EYE
 from behaviors.leaf import Steps
 from behaviors.look import LookLeaf
 from motion.failure import PlanningError
+from perception.estimate import Estimate
 from perception.mean_pose import mean_pose
-from perception.rgbd_pose import Estimate
 
 LOOK_SECONDS = 0.8
 LOOKS = 2  # from two sides: what one look takes for an obstacle's inside, the other looks through

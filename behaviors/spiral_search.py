@@ -14,8 +14,8 @@ from interfaces.cause import CauseCode
 from interfaces.cell import FixedMount
 from motion.failure import PlanningError
 from motion.viewpoints import Stop, spiral
+from perception.estimate import Estimate
 from perception.mean_pose import mean_pose
-from perception.rgbd_pose import Estimate
 
 DISTANCE = (
     0.25  # m from the plane through the start: at 0.30 the left arm reaches fewer of the first stops (6 of 9, not 9)

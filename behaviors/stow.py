@@ -10,7 +10,7 @@ from interfaces.cause import CauseCode
 from motion.bodies import NO_POINTS
 from motion.failure import PlanningError
 from perception.cable_shape import cable_course
-from perception.rgbd_pose import Estimate
+from perception.estimate import Estimate
 from perception.slip import seen_at
 
 OPEN_SECONDS = 0.6

@@ -31,7 +31,7 @@ class RgbdFrame:
     `rgb` is (H, W, 3) uint8; `depth` is (H, W) float32 metres along the optical axis, 0 where there is no reading;
     `stamp` is the simulated second of the exposure; `number` counts exposures of this camera since the start.
     `joints` are the encoder readings (6,) rad, at the exposure, of the arm that carries the camera; None for a fixed
-    one.
+    one. Raises ValueError for images of another shape or type.
     """
 
     camera: str
@@ -41,3 +41,14 @@ class RgbdFrame:
     depth: NDArray[np.float32]
     intrinsics: Intrinsics
     joints: NDArray[np.float64] | None = None
+
+    def __post_init__(self) -> None:
+        shape = (self.intrinsics.height, self.intrinsics.width)
+        _expect("rgb", self.rgb, (*shape, 3), np.uint8)
+        _expect("depth", self.depth, shape, np.float32)
+
+
+def _expect(name: str, image: NDArray[np.generic], shape: tuple[int, ...], dtype: type[np.generic]) -> None:
+    if image.shape != shape or image.dtype != dtype:
+        wanted = f"{shape} {np.dtype(dtype)}"
+        raise ValueError(f"{name} is {image.shape} {image.dtype}, the intrinsics and the format ask for {wanted}")

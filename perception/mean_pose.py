@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform
 
 from interfaces.cell import pose_along
-from perception.rgbd_pose import Estimate
+from perception.estimate import Estimate
 
 LONG_SHARE = 0.9  # estimates that show less than this of the longest visible part do not count
 

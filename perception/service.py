@@ -13,8 +13,9 @@ from interfaces.devices import Camera, Clock
 from interfaces.frame import RgbdFrame
 from perception.camera_health import CameraHealth
 from perception.depth_scale import panel_scale
+from perception.estimate import Estimate, NoEstimate
 from perception.occupancy import ASSUMED_DEPTH, Occupancy, Spheres
-from perception.rgbd_pose import Estimate, NoEstimate, estimate
+from perception.rgbd_pose import estimate
 from perception.segmentation import NotSeen
 from perception.track import ConnectorTrack
 

@@ -20,7 +20,7 @@ from interfaces.frame import RgbdFrame
 from interfaces.reading import GripperReading
 from motion.failure import PlanningError
 from motion.task import Task
-from perception.rgbd_pose import Estimate, NoEstimate
+from perception.estimate import Estimate, NoEstimate, pose_covariance
 from perception.segmentation import NotSeen
 from perception.track import ConnectorTrack
 from trees import load_tree
@@ -201,7 +201,9 @@ def seen(stamp: float, position: Vector, camera: str = "rear", whole: bool = Tru
     """An estimate with a little of the noise that shows that a camera lives."""
     place = position + 1e-4 * np.sin(50.0 * stamp) * np.ones(3)
     pose = RigidTransform.from_translation(place)
-    return Estimate(stamp, camera, place, LEFT, pose, 500, 600, 0.09 if whole else 0.04, whole)
+    return Estimate(
+        stamp, camera, place, LEFT, pose, pose_covariance(LEFT, 0.002, 0.02), 500, 600, 0.09 if whole else 0.04, whole
+    )
 
 
 def unseen(stamp: float, camera: str = "rear") -> NoEstimate:

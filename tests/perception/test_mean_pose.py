@@ -5,8 +5,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
+from perception.estimate import Estimate
 from perception.mean_pose import mean_pose
-from perception.rgbd_pose import Estimate
 
 PLACE, LEFT = np.array([0.4, 0.1, 0.3]), np.array([0.0, 1.0, 0.0])
 
@@ -14,7 +14,9 @@ PLACE, LEFT = np.array([0.4, 0.1, 0.3]), np.array([0.0, 1.0, 0.0])
 def estimate(
     position: NDArray[np.float64] = PLACE, axis: NDArray[np.float64] = LEFT, extent: float = 0.09, whole: bool = True
 ) -> Estimate:
-    return Estimate(0.0, "rear", position, axis, RigidTransform.from_translation(position), 500, 600, extent, whole)
+    return Estimate(
+        0.0, "rear", position, axis, RigidTransform.from_translation(position), np.eye(6), 500, 600, extent, whole
+    )
 
 
 def test_one_false_look_moves_nothing() -> None:

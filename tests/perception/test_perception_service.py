@@ -7,8 +7,8 @@ from scipy.spatial.transform import RigidTransform
 
 from interfaces.cell import KnownCell
 from interfaces.frame import Intrinsics, RgbdFrame
+from perception.estimate import Estimate, NoEstimate
 from perception.occupancy import Spheres
-from perception.rgbd_pose import Estimate, NoEstimate
 from perception.service import Perception
 
 PLACE = np.array([0.36, 0.02, 0.30])

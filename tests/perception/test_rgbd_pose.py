@@ -7,7 +7,8 @@ from raycast import CONNECTOR, IDEAL, MIDDLE_THIRD, PURPLE, REAR_POSE, WOOD, Blo
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from interfaces.frame import Intrinsics, RgbdFrame
-from perception.rgbd_pose import Estimate, NoEstimate, estimate, min_max_axis, n_mean, refine_axis_and_center
+from perception.estimate import Estimate, NoEstimate
+from perception.rgbd_pose import estimate, min_max_axis, n_mean, refine_axis_and_center
 from perception.segmentation import NotSeen
 
 Vector = NDArray[np.float64]

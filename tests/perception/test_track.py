@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform
 
-from perception.rgbd_pose import Estimate, NoEstimate
+from perception.estimate import Estimate, NoEstimate
 from perception.segmentation import NotSeen
 from perception.track import ConnectorTrack, TrackState
 
@@ -12,7 +12,7 @@ RATE = 15
 
 def estimate(stamp: float, position: np.ndarray = PLACE, camera: str = "rear") -> Estimate:
     pose = RigidTransform.from_translation(position)
-    return Estimate(stamp, camera, position, np.array([0.0, 1.0, 0.0]), pose, 1000, 1200, 0.09, True)
+    return Estimate(stamp, camera, position, np.array([0.0, 1.0, 0.0]), pose, np.eye(6), 1000, 1200, 0.09, True)
 
 
 def watched(seconds: float, noise: float = 1e-4, velocity: float = 0.0) -> ConnectorTrack:
