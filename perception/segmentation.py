@@ -18,6 +18,7 @@ class NotSeen(StrEnum):
     TOO_SMALL = "too_small"  # its largest patch has too few pixels
     NO_CAMERA = "no_camera"  # the camera is not to be trusted
     NO_DEPTH = "no_depth"  # the patch has too few depth readings
+    NOT_ITS_SHAPE = "not_its_shape"  # its colour, but not a cylinder of its size
 
 
 @dataclass(frozen=True)

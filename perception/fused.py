@@ -1,0 +1,281 @@
+"""All the evidence at once: colour, outline, depth, the connector's size, its cable, and the cell's known faces.
+
+A cylinder of the known size is fitted to the depth readings and to the outline of the coloured patch together, each
+weighed by its noise. So a half-hidden connector is not drawn towards its visible part, and what has the colour but not
+the shape is refused.
+"""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import RigidTransform
+
+from interfaces.cell import Connector, KnownCell, WristMount, pose_along
+from interfaces.frame import Intrinsics, RgbdFrame
+from perception.cable_end import cable_leaves
+from perception.camera_model import project
+from perception.cylinder import COARSE, FINE, Fit, Sight, fit, nearest_on_rays, surface_misses, thinned
+from perception.estimate import ROLL_VARIANCE, Estimate, NoEstimate
+from perception.outline import outline
+from perception.registration import CARRIED, FIXED, Registration, register
+from perception.rgbd_pose import LEFT, pca_axis
+from perception.segmentation import NotSeen, SegmentationParameters, color_mask
+
+FloatArray = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+MIN_AREA = 40  # pixels; choice: 3 % of the connector at 0.75 m; less tells no shape
+MIN_READINGS, MIN_EDGES = 12, 8
+PATCHES = 4  # the largest patches of the colour are tried
+MARGIN = 40  # pixels round a patch that are looked at: what is beyond its ends tells too
+DEPTH_NOISE = 0.0055  # 1/m: a reading's deviation over its square; subpixel 0.2, focal length 666 px, baseline 0.055 m
+INDEPENDENT_AREA = 50.0  # pixels an independent reading; choice: a stereo matching window of some 8 pixels
+EDGE_WIDTH = 0.5  # pixels: deviation of an outline point
+EDGE_SHARE = 0.25  # of the outline's points count as independent: neighbours are rounded alike
+POINTS, EDGES = 300, 160  # at most, for speed
+SIDE_SEEN = 2.0  # choice: a patch so many times longer than wide shows which way the axis runs in the image
+TILTS = np.deg2rad([-80.0, -65.0, -40.0, 0.0, 40.0, 65.0, 80.0])  # of the starts, out of the image: noise tilts a stub
+ROUGH_COUNT, ROUGH_STEPS = 50, 6  # points and outline points of rough fits, and their steps
+PROMISING = (6, 2)  # starts that are fitted roughly, rough fits that are fitted in full
+MISSING_COST = 100.0  # of a whole axis that should show: what is not there weighs like twenty points off
+END = 0.004  # m: outline points so near to an end belong to it
+END_EDGES = 4  # of them show that the end is in sight
+# Refused is what does not fit; choices, on renders of the connector and of look-alikes.
+MAX_EDGE_MISS = 1.2  # pixels, median over the outline
+MAX_DEPTH_MISS = 2.5  # deviations, root mean square
+MAX_STRAY = 0.12  # share of the patch's outline that lies more than 3 pixels off
+MAX_MISSING = 0.25  # share of the axis that should show and does not
+
+
+@dataclass(frozen=True, eq=False)
+class _Patch:
+    """A patch of the colour in the camera's frame: what to fit, and what is seen around it."""
+
+    mask: Mask  # (h, w) of the window
+    depth: NDArray[np.float32]  # (h, w) m, scale corrected
+    intrinsics: Intrinsics  # of the window
+    sight: Sight
+    area: int
+
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """A fit that holds, in the camera's frame; `sign` is +1 where the axis points from cable to tip, 0 if not seen."""
+
+    patch: _Patch
+    fit: Fit
+    whole: bool
+    sign: float
+
+
+class Fused:
+    """A `perception.technique.Technique`. It knows the connector's colour and size, and the cell's floor and panels."""
+
+    def __init__(self, known: KnownCell) -> None:
+        self._connector, self._boxes = known.connector, known.boxes
+        self._carried = {c.name for c in known.cameras if isinstance(c.mount, WristMount)}
+        self._color = SegmentationParameters.for_color(known.connector.color)
+
+    def estimate(
+        self,
+        frame: RgbdFrame,
+        world_from_camera: RigidTransform,
+        *,
+        axis: FloatArray | None = None,
+        near: FloatArray | None = None,
+    ) -> Estimate | NoEstimate:
+        """See `Technique.estimate`."""
+        masks = _patches(color_mask(frame.rgb, self._color))
+        if not masks:
+            message = f"no patch of {MIN_AREA} pixels has the connector's colour"
+            return NoEstimate(frame.stamp, frame.camera, NotSeen.NO_COLOR, message)
+        errors = CARRIED if frame.camera in self._carried else FIXED
+        camera = register(frame, world_from_camera, self._boxes, errors)
+        results = [self._find(frame, mask, camera.scale) for mask in masks]
+        found = [r for r in results if isinstance(r, _Found)]
+        if not found:
+            reason, message = next(r for r in results if not isinstance(r, _Found))
+            return NoEstimate(frame.stamp, frame.camera, reason, message)
+        return _estimate(frame, camera, _choose(found, camera, near), axis)
+
+    def _find(self, frame: RgbdFrame, mask: Mask, scale: float) -> _Found | tuple[NotSeen, str]:
+        patch = _look(frame, mask, scale)
+        readings, edges = len(patch.sight.points), int(np.count_nonzero(~patch.sight.inside))
+        if readings < MIN_READINGS:
+            return NotSeen.NO_DEPTH, f"{readings} depth readings on {patch.area} pixels, {MIN_READINGS} are needed"
+        if edges < MIN_EDGES:
+            return NotSeen.TOO_SMALL, f"{edges} points of its outline are in sight, {MIN_EDGES} are needed"
+        best = _fit(patch, self._connector)
+        refusal = _refusal(patch, best, self._connector)
+        if refusal is not None:
+            return NotSeen.NOT_ITS_SHAPE, refusal
+        return _Found(patch, best, *_ends(patch, best, self._connector))
+
+
+def _patches(binary: NDArray[np.uint8]) -> list[Mask]:
+    """The largest patches of a colour mask (H, W), each as a mask of its own, largest first."""
+    contours, _ = cv2.findContours(binary, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    masks = []
+    for contour in sorted(contours, key=cv2.contourArea, reverse=True)[:PATCHES]:
+        filled = np.zeros_like(binary)
+        cv2.drawContours(filled, [contour], -1, 255, cv2.FILLED)
+        cv2.bitwise_and(filled, binary, dst=filled)
+        if cv2.countNonZero(filled) >= MIN_AREA:
+            masks.append(filled > 0)
+    return masks
+
+
+def _look(frame: RgbdFrame, mask: Mask, scale: float) -> _Patch:
+    """Cut out the patch's window, and gather its readings and outline."""
+    k = frame.intrinsics
+    columns, rows = np.flatnonzero(mask.any(axis=0)), np.flatnonzero(mask.any(axis=1))
+    u0, v0 = max(0, int(columns[0]) - MARGIN), max(0, int(rows[0]) - MARGIN)
+    window = np.s_[v0 : int(rows[-1]) + MARGIN + 1, u0 : int(columns[-1]) + MARGIN + 1]
+    mask = mask[window]
+    depth = np.nan_to_num(frame.depth[window], posinf=0.0, neginf=0.0) * np.float32(scale)
+    here = Intrinsics(mask.shape[1], mask.shape[0], k.fx, k.fy, k.cx - u0, k.cy - v0)
+    core = cv2.erode(mask.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+    v, u = np.nonzero(core & (depth > 0))
+    chosen = np.s_[:: 1 + len(u) // POINTS]
+    z = depth[v, u][chosen].astype(float)
+    points = _directions(np.column_stack([u, v])[chosen], here) * z[:, None]
+    edge = outline(mask, depth)
+    some = np.s_[:: 1 + len(edge.pixels) // EDGES]
+    rays = _directions(edge.pixels[some], here)
+    rays /= np.linalg.norm(rays, axis=1)[:, None]
+    independent = len(u) / INDEPENDENT_AREA / max(1, len(points))
+    sight = Sight(
+        points,
+        DEPTH_NOISE * z**2,
+        rays,
+        np.full(len(rays), EDGE_WIDTH / k.fx),
+        edge.covered[some],
+        min(1.0, independent),
+        min(1.0, EDGE_SHARE * len(edge.pixels) / max(1, len(rays))),
+    )
+    return _Patch(mask, depth, here, sight, int(np.count_nonzero(mask)))
+
+
+def _directions(pixels: NDArray[np.generic], k: Intrinsics) -> FloatArray:
+    """Points (n, 3) at depth 1 on the rays of `pixels` (n, 2)."""
+    u, v = np.asarray(pixels, float).T
+    return np.column_stack([(u - k.cx) / k.fx, (v - k.cy) / k.fy, np.ones(len(u))])
+
+
+def _fit(patch: _Patch, connector: Connector) -> Fit:
+    """The best fit of all starts: roughly from each, then in full from the most promising ones."""
+
+    def burden(found: Fit) -> float:
+        return found.cost + MISSING_COST * _missing(patch, found, connector)
+
+    size, few = (connector.radius, connector.length), thinned(patch.sight, ROUGH_COUNT)
+    starts = [fit(few, *start, *size, COARSE, 0) for start in _starts(patch.sight, connector)]
+    best_starts = sorted(starts, key=lambda f: f.cost)[: PROMISING[0]]
+    rough = [fit(few, f.center, f.axis, *size, COARSE, ROUGH_STEPS) for f in best_starts]
+    full = [fit(patch.sight, f.center, f.axis, *size, COARSE) for f in sorted(rough, key=burden)[: PROMISING[1]]]
+    best = min(full, key=burden)
+    return fit(patch.sight, best.center, best.axis, *size, FINE)
+
+
+def _starts(sight: Sight, connector: Connector) -> list[tuple[FloatArray, FloatArray]]:
+    """Centres (3,) and axes (3,) to start a fit from: along the patch, tilted in depth, along the line of sight."""
+    middle = np.median(sight.points, axis=0)
+    view = middle / np.linalg.norm(middle)
+    offsets = sight.points - middle
+    flat = offsets - np.outer(offsets @ view, view)
+    values, vectors = np.linalg.eigh(flat.T @ flat)
+    ways = [vectors[:, -1]] if values[-1] > SIDE_SEEN**2 * values[-2] else [vectors[:, -1], vectors[:, -2]]
+    axes = [pca_axis(sight.points)]
+    axes += [np.cos(tilt) * way + np.sin(tilt) * view for way in ways for tilt in TILTS]
+    starts = []
+    for axis in axes:
+        low, high = np.percentile(offsets @ axis, [2, 98])
+        behind = middle + np.pi / 4 * connector.radius * (view - (view @ axis) * axis)
+        shifts = (low + connector.length / 2, high - connector.length / 2)
+        starts += [(behind + shift * axis, axis) for shift in shifts]
+    return starts
+
+
+def _missing(patch: _Patch, found: Fit, connector: Connector) -> float:
+    """Share of the axis that should show, nothing being before it, and does not show the patch."""
+    along = np.linspace(-0.45, 0.45, 19) * connector.length
+    points = found.center + along[:, None] * found.axis
+    pixels = np.nan_to_num(np.rint(project(points, patch.intrinsics)), nan=-1.0).astype(int)
+    inside = np.all((pixels >= 0) & (pixels < [patch.mask.shape[1], patch.mask.shape[0]]), axis=1)
+    u, v = pixels[inside].T
+    reading = patch.depth[v, u]
+    open_to_view = reading > points[inside, 2]
+    return float(np.count_nonzero(open_to_view & ~patch.mask[v, u])) / len(along)
+
+
+def _refusal(patch: _Patch, found: Fit, connector: Connector) -> str | None:
+    """Why the patch is not the connector, in a sentence; None when it may be."""
+    sight, size = patch.sight, (connector.radius, connector.length)
+    misses, far = nearest_on_rays(sight.rays, found.center, found.axis, *size)
+    pixels = misses / far * patch.intrinsics.fx
+    pixels = np.where(sight.inside, np.maximum(pixels, 0.0), np.abs(pixels))
+    edge = float(np.median(pixels[~sight.inside]))
+    if edge > MAX_EDGE_MISS:
+        return f"its outline is {edge:.1f} pixels off the connector's, at most {MAX_EDGE_MISS} may be"
+    stray = float(np.mean(pixels > 3.0))
+    if stray > MAX_STRAY:
+        return f"{stray:.0%} of its outline is not the connector's, at most {MAX_STRAY:.0%} may be"
+    off = surface_misses(sight.points, sight.deviations, found.center, found.axis, *size)
+    miss = float(np.median(np.abs(off))) * 1.48  # of a normal spread's deviation
+    if miss > MAX_DEPTH_MISS:
+        return f"its surface is {miss:.1f} deviations off the connector's, at most {MAX_DEPTH_MISS} may be"
+    missing = _missing(patch, found, connector)
+    if missing > MAX_MISSING:
+        return f"{missing:.0%} of its length should show and does not, at most {MAX_MISSING:.0%} may be"
+    return None
+
+
+def _ends(patch: _Patch, found: Fit, connector: Connector) -> tuple[bool, float]:
+    """Whether an end is in sight, so that the length gives the centre, and which way the axis points."""
+    rays = patch.sight.rays[~patch.sight.inside]
+    _, far = nearest_on_rays(rays, found.center, found.axis, connector.radius, connector.length)
+    along = (far[:, None] * rays - found.center) @ found.axis
+    seen, leaves = [], []
+    for side in (-1.0, 1.0):
+        near = np.abs(side * along - connector.length / 2) < END
+        seen.append(int(np.count_nonzero(near)) >= END_EDGES)
+        end = found.center + side * connector.length / 2 * found.axis
+        leaves.append(seen[-1] and cable_leaves(patch.depth, end, side * found.axis, patch.intrinsics))
+    return any(seen), float(leaves[0]) - float(leaves[1])
+
+
+def _choose(found: list[_Found], camera: Registration, near: FloatArray | None) -> _Found:
+    """The one nearest to where it was, else the largest."""
+    if near is None:
+        return max(found, key=lambda f: f.patch.area)
+    place = camera.world_from_camera.inv().apply(near)
+    return min(found, key=lambda f: float(np.linalg.norm(f.fit.center - place)))
+
+
+def _estimate(frame: RgbdFrame, camera: Registration, found: _Found, hint: FloatArray | None) -> Estimate:
+    """The find in the world."""
+    turn = camera.world_from_camera.rotation
+    position, axis = camera.world_from_camera.apply(found.fit.center), turn.apply(found.fit.axis)
+    sign = found.sign or (1.0 if axis @ (LEFT if hint is None else hint) >= 0 else -1.0)
+    spread = np.zeros((6, 5))
+    spread[:3, :3] = turn.as_matrix()
+    spread[3:, 3:] = turn.apply(found.fit.tilts).T
+    covariance = spread @ found.fit.covariance @ spread.T + camera.point_covariance(position)
+    covariance[3:, 3:] += ROLL_VARIANCE * np.outer(axis, axis)
+    x, y, z = position.tolist()
+    ax, ay, az = (sign * axis).tolist()
+    along = (found.patch.sight.points - found.fit.center) @ found.fit.axis
+    return Estimate(
+        frame.stamp,
+        frame.camera,
+        position,
+        sign * axis,
+        pose_along((x, y, z), (ax, ay, az)),
+        covariance,
+        len(found.patch.sight.points),
+        found.patch.area,
+        float(np.ptp(np.percentile(along, [1, 99]))),
+        found.whole,
+    )
