@@ -1,8 +1,14 @@
 """Entry point of `regrasp` and of `python -m app`."""
 
+import os
 import signal
 import sys
 from types import FrameType
+
+EXIT_BAD_INPUT, EXIT_INTERRUPTED = 2, 130
+# What a shell reports of cat or git when the reader of their pipe has gone. Not 0, for not all was told; not 1, which
+# says that a run did not come out. SIGPIPE itself stays ignored: it would kill us, too, when a child process dies.
+EXIT_NO_READER = 141
 
 
 def _interrupt(_signal: int, _frame: FrameType | None) -> None:
@@ -11,14 +17,42 @@ def _interrupt(_signal: int, _frame: FrameType | None) -> None:
 
 def main() -> None:
     """Run the command line; SIGTERM ends it as Ctrl-C does, with the record kept."""
+    _open_streams()
     signal.signal(signal.SIGTERM, _interrupt)
     try:
-        from app.cli import app  # takes a moment, in which Ctrl-C may come
+        try:
+            from app.cli import app  # takes a moment, in which Ctrl-C may come
 
-        app()
+            app()
+        finally:
+            sys.stdout.flush()  # what `print` left; the interpreter's own flush could not be caught
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
-        sys.exit(130)
+        sys.exit(EXIT_INTERRUPTED)
+    except (BrokenPipeError, SystemExit) as end:
+        # Typer makes exit code 1 of a broken pipe.
+        if isinstance(end, SystemExit) and not isinstance(end.__context__, BrokenPipeError):
+            raise
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # for what is still to be written
+        sys.exit(EXIT_NO_READER)
+
+
+def _open_streams() -> None:
+    """Fill in for standard streams that were closed from the start, as by `<&-`; nothing can be done without stdout.
+
+    Python has None for such a stream, and the next file that is opened would get its number, and with it what some
+    library prints.
+    """
+    if sys.stdin is None:
+        sys.stdin = open(os.devnull)  # noqa: SIM115 - to the end
+    closed = sys.stdout is None
+    if closed:
+        sys.stdout = open(os.devnull, "w")  # noqa: SIM115
+    if sys.stderr is None:
+        sys.stderr = open(os.devnull, "w")  # noqa: SIM115
+    if closed:
+        print("standard output is closed; open it, or write > /dev/null", file=sys.stderr)
+        sys.exit(EXIT_BAD_INPUT)
 
 
 if __name__ == "__main__":
