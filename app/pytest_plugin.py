@@ -39,7 +39,6 @@ if TYPE_CHECKING:
     from trees.scripted import ScriptedTree
 
 SCENARIO, TREE = ".scenario.yaml", ".tree.xml"
-WIDTH = 100  # columns of an explanation
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -169,10 +168,10 @@ def _run(scenario: Scenario, folder: Path) -> Result:
 
 
 def _explained(folder: Path) -> str:
-    from app.explain import explanation
+    from app.explain import REPORT_WIDTH, explanation
     from app.record_reader import read_record
 
-    return f"{explanation(read_record(folder), WIDTH)}\nrecord  {folder}"
+    return f"{explanation(read_record(folder), REPORT_WIDTH)}\nrecord  {folder}"
 
 
 class TreeFile(pytest.File):
