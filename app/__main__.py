@@ -5,7 +5,6 @@ import signal
 import sys
 from types import FrameType
 
-EXIT_BAD_INPUT, EXIT_INTERRUPTED = 2, 130
 # What a shell reports of cat or git when the reader of their pipe has gone. Not 0, for not all was told; not 1, which
 # says that a run did not come out. SIGPIPE itself stays ignored: it would kill us, too, when a child process dies.
 EXIT_NO_READER = 141
@@ -28,7 +27,7 @@ def main() -> None:
             sys.stdout.flush()  # what `print` left; the interpreter's own flush could not be caught
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
-        sys.exit(EXIT_INTERRUPTED)
+        sys.exit(130)
     except (BrokenPipeError, SystemExit) as end:
         # Typer makes exit code 1 of a broken pipe.
         if isinstance(end, SystemExit) and not isinstance(end.__context__, BrokenPipeError):
@@ -52,7 +51,7 @@ def _open_streams() -> None:
         sys.stderr = open(os.devnull, "w")  # noqa: SIM115
     if closed:
         print("standard output is closed; open it, or write > /dev/null", file=sys.stderr)
-        sys.exit(EXIT_BAD_INPUT)
+        sys.exit(2)
 
 
 if __name__ == "__main__":
