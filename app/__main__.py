@@ -1,5 +1,6 @@
 """Entry point of `regrasp` and of `python -m app`."""
 
+import io
 import os
 import signal
 import sys
@@ -42,13 +43,12 @@ def _open_streams() -> None:
     Python has None for such a stream, and the next file that is opened would get its number, and with it what some
     library prints.
     """
-    if sys.stdin is None:
-        sys.stdin = open(os.devnull)  # noqa: SIM115 - to the end
     closed = sys.stdout is None
-    if closed:
-        sys.stdout = open(os.devnull, "w")  # noqa: SIM115
-    if sys.stderr is None:
-        sys.stderr = open(os.devnull, "w")  # noqa: SIM115
+    for name, mode in {"stdin": "r", "stdout": "w", "stderr": "w"}.items():
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, mode, errors="ignore"))  # noqa: SIM115 - to the end
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="replace")  # a question mark for what an old terminal's encoding does not have
     if closed:
         print("standard output is closed; open it, or write > /dev/null", file=sys.stderr)
         sys.exit(2)

@@ -1,4 +1,4 @@
-"""The command as a shell runs it, with standard streams that are closed or whose reader has gone."""
+"""The command as a shell runs it, with standard streams that are closed, poor, or without a reader."""
 
 import contextlib
 import os
@@ -83,3 +83,9 @@ def test_a_run_that_nobody_watches_ends_as_by_ctrl_c(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr("sys.stderr", no_reader)
     with shown_progress(quiet=False) as progress, pytest.raises(KeyboardInterrupt):
         progress(0.0, "carry")
+
+
+def test_an_encoding_without_a_sign_shows_a_question_mark() -> None:
+    told = shell("PYTHONIOENCODING=latin-1 regrasp trees show recovery > told")
+    assert (told.returncode, told.stderr) == (0, "")
+    assert Path("told").read_text(encoding="latin-1").splitlines()[-1] == "?? safe_stop  SafeStop"
