@@ -1,8 +1,14 @@
 """Entry point of `regrasp` and of `python -m app`."""
 
+import io
+import os
 import signal
 import sys
 from types import FrameType
+
+# What a shell reports of cat or git when the reader of their pipe has gone. Not 0, for not all was told; not 1, which
+# says that a run did not come out. SIGPIPE itself stays ignored: it would kill us, too, when a child process dies.
+EXIT_NO_READER = 141
 
 
 def _interrupt(_signal: int, _frame: FrameType | None) -> None:
@@ -11,14 +17,41 @@ def _interrupt(_signal: int, _frame: FrameType | None) -> None:
 
 def main() -> None:
     """Run the command line; SIGTERM ends it as Ctrl-C does, with the record kept."""
+    _open_streams()
     signal.signal(signal.SIGTERM, _interrupt)
     try:
-        from app.cli import app  # takes a moment, in which Ctrl-C may come
+        try:
+            from app.cli import app  # takes a moment, in which Ctrl-C may come
 
-        app()
+            app()
+        finally:
+            sys.stdout.flush()  # what `print` left; the interpreter's own flush could not be caught
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
         sys.exit(130)
+    except (BrokenPipeError, SystemExit) as end:
+        # Typer makes exit code 1 of a broken pipe.
+        if isinstance(end, SystemExit) and not isinstance(end.__context__, BrokenPipeError):
+            raise
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # for what is still to be written
+        sys.exit(EXIT_NO_READER)
+
+
+def _open_streams() -> None:
+    """Fill in for standard streams that were closed from the start, as by `<&-`; nothing can be done without stdout.
+
+    Python has None for such a stream, and the next file that is opened would get its number, and with it what some
+    library prints.
+    """
+    closed = sys.stdout is None
+    for name, mode in {"stdin": "r", "stdout": "w", "stderr": "w"}.items():
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, mode, errors="ignore"))  # noqa: SIM115 - to the end
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="replace")  # a question mark for what an old terminal's encoding does not have
+    if closed:
+        print("standard output is closed; open it, or write > /dev/null", file=sys.stderr)
+        sys.exit(2)
 
 
 if __name__ == "__main__":

@@ -8,6 +8,7 @@ from app.record_reader import RunRecord
 from app.summary import expectation_lines, headline, slip_lines
 from app.timeline import event_text, timeline, wrapped
 
+REPORT_WIDTH = 100  # columns of a page in a test report
 LAST_EVENTS = 8  # shown of a run without a result
 
 

@@ -5,12 +5,12 @@ from pathlib import Path
 from xml.etree import ElementTree as ET
 
 from app.batch import Row, Run
-from app.findings import printable
+from app.findings import Findings, printable
 from app.record import write_whole
 
 
 def write_junit(path: Path, name: str, runs: Sequence[Run], rows: Mapping[int, Row]) -> None:
-    """One testcase a run: time on the wall, the cause and the unmet expectations of a failure, the record's folder.
+    """One testcase a run: time on the wall, why it failed in a sentence and in full, the record's folder.
 
     `rows` by the runs' numbers; a run without one was interrupted and counts as skipped.
 
@@ -44,6 +44,18 @@ def _testcase(suite: ET.Element, run: Run, row: Row | None) -> None:
     elif not row.succeeded:
         tag = "error" if row.outcome == "internal_error" else "failure"
         code = row.cause["code"] if row.cause else row.outcome
-        ET.SubElement(case, tag, {"type": str(code), "message": printable(row.why)}).text = printable(row.why)
+        why = printable(row.why)
+        ET.SubElement(case, tag, {"type": str(code), "message": why}).text = _in_full(run.folder) or why
     if run.folder is not None:
         ET.SubElement(case, "system-out").text = printable(str(run.folder))
+
+
+def _in_full(folder: Path | None) -> str:
+    """The page that `regrasp explain` shows of a record; '' where the run did not come to have one."""
+    from app.explain import REPORT_WIDTH, explanation  # late: the command line starts with this module
+    from app.record_reader import read_record
+
+    try:
+        return explanation(read_record(folder), REPORT_WIDTH) if folder else ""
+    except Findings:
+        return ""

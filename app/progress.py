@@ -1,6 +1,7 @@
 """What a running episode shows on stderr, and how Ctrl-C reaches it."""
 
 import signal
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
@@ -49,7 +50,10 @@ class _Lines:
     def show(self, time: float, leaf: str) -> None:
         if time - self.time >= (QUIET_SECONDS if leaf == self.leaf else 1.0):
             self.time, self.leaf = time, leaf
-            Console(stderr=True, highlight=False, markup=False, soft_wrap=True).print(f"{time:7.1f} s  {leaf}")
+            try:
+                print(f"{time:7.1f} s  {leaf}", file=sys.stderr, flush=True)
+            except BrokenPipeError:  # who watched has gone: as Ctrl-C, with the record kept
+                raise KeyboardInterrupt from None
 
 
 @contextmanager

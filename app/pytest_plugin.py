@@ -7,9 +7,9 @@ marks `slow`. Each case runs in a process of its own, hence `-n 2` is fine.
 
     pytest --scenario-seed 0:5 --scenario-records runs     # every case with five seeds; the records are kept
 
-Try a tree out: `*.tree.xml` files are collected, and every tree file that the command line names:
-`pytest trees/*.xml`. Each gives two tests on scripted leaves: that the tree ends, and that a stop at any tick leaves
-nothing at work.
+Try a tree out: put tree files into a folder `trees` beside pytest's configuration, or name them `*.tree.xml`, and call
+pytest; or name the files or their folder: `pytest my/tree.xml`, `pytest my`. Each gives two tests on scripted leaves:
+that the tree ends, and that a stop at any tick leaves nothing at work.
 
 Test a tree's logic: the fixture `scripted_tree` (see `trees.scripted`) takes a tree file, or a shipped tree's name.
 
@@ -23,11 +23,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
-from contextlib import closing
+from contextlib import closing, suppress
 from functools import partial
 from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from xml.etree import ElementTree
 
 import pytest
 
@@ -38,7 +39,6 @@ if TYPE_CHECKING:
     from trees.scripted import ScriptedTree
 
 SCENARIO, TREE = ".scenario.yaml", ".tree.xml"
-WIDTH = 100  # columns of an explanation
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -65,12 +65,29 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Collector | None:
-    """Scenario files by their names, tree files by name or because they were asked for."""
+    """Scenario files by their names, tree files by name, by place, or because they were asked for."""
     if file_path.name.endswith(SCENARIO):
         return ScenarioSuite.from_parent(parent, path=file_path)
-    if file_path.name.endswith(TREE) or (file_path.suffix == ".xml" and parent.session.isinitpath(file_path)):
+    if file_path.suffix == ".xml" and _is_tree(file_path, parent.session):
         return TreeFile.from_parent(parent, path=file_path)
     return None
+
+
+def _is_tree(path: Path, session: pytest.Session) -> bool:
+    """Other XML is left alone unless it is named: trees lie in the root's `trees`, or right in a folder asked for."""
+    if path.name.endswith(TREE) or session.isinitpath(path):
+        return True
+    likely = session.config.rootpath / "trees" in path.parents or session.isinitpath(path.parent)
+    return likely and _begins_as_tree(path)
+
+
+def _begins_as_tree(path: Path) -> bool:
+    """Whether the outermost element is a tree file's, and not BehaviorTree.CPP's, which looks like it."""
+    with suppress(OSError, ElementTree.ParseError, LookupError), path.open("rb") as stream:
+        for _, element in ElementTree.iterparse(stream, ["start"]):
+            given = element.attrib
+            return element.tag == "root" and "main_tree_to_execute" in given and "BTCPP_format" not in given
+    return False
 
 
 class ScenarioSuite(pytest.File):
@@ -151,10 +168,10 @@ def _run(scenario: Scenario, folder: Path) -> Result:
 
 
 def _explained(folder: Path) -> str:
-    from app.explain import explanation
+    from app.explain import REPORT_WIDTH, explanation
     from app.record_reader import read_record
 
-    return f"{explanation(read_record(folder), WIDTH)}\nrecord  {folder}"
+    return f"{explanation(read_record(folder), REPORT_WIDTH)}\nrecord  {folder}"
 
 
 class TreeFile(pytest.File):

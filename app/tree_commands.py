@@ -45,10 +45,11 @@ def export(
         typer.Option("--format", help="dot, mermaid, svg, png, ascii, json or groot; by default as FILE's name ends."),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option("-o", "--out", metavar="FILE", help="Write here, not to standard output.")
+        Path | None, typer.Option("-o", "--out", metavar="FILE", help="Write here; - is standard output, the default.")
     ] = None,
     depth: Annotated[
-        int | None, typer.Option(min=0, metavar="N", help="Leave out what is more than N levels below the top.")
+        int | None,
+        typer.Option(min=0, metavar="N", help="Open SubTrees N deep; at 0 each in the main tree is a single node."),
     ] = None,
     theme: Annotated[str, typer.Option(help="Of dot, svg and png: light or dark.")] = "light",
     run: Annotated[
@@ -60,7 +61,7 @@ def export(
     \b
     Examples:
       regrasp trees export recovery -o recovery.svg --theme dark
-      regrasp trees export recovery --format mermaid --depth 4
+      regrasp trees export recovery --format mermaid --depth 0
       regrasp trees export --run runs/short_obstacle-0-1 -o what_happened.png
 
     ascii is what `trees show` draws; groot is BehaviorTree.CPP v4 XML, which Groot2 opens.
@@ -71,6 +72,7 @@ def export(
     """
     from app.tree_export import Request, exported  # late, like all that only this command needs
 
+    out = None if out == Path("-") else out
     content = exported(Request(tree, form, out, depth, theme, run))
     if out is None:
         typer.echo(content, nl=False)

@@ -1,7 +1,7 @@
 """What `regrasp trees export` asks for, checked, and written."""
 
 import sys
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -43,16 +43,10 @@ def exported(request: Request) -> bytes:
 
 def _form(request: Request) -> str:
     """The format's name, when all that can be seen without a tree is right."""
-    out, found = request.out, []
-    form = request.form or (SUFFIXES.get(out.suffix.lower(), "") if out else "ascii")
-    if request.form and request.form not in FORMATS:
-        found.append(Finding("--format", 1, f"no format {request.form!r}; {nearest(request.form, FORMATS)}"))
-    if out and not form:
-        endings = ", ".join(SUFFIXES)
-        found.append(Finding(shown(out), 1, f"the name ends in none of {endings}; rename it, or name a --format"))
-    if out and (out.is_dir() or not out.absolute().parent.is_dir()):
-        wrong = "is a folder" if out.is_dir() else f"there is no folder {shown(out.absolute().parent)!r}"
-        found.append(Finding(shown(out), 1, f"{wrong}; name a file in a folder that exists"))
+    out = request.out
+    form = request.form or (_named(out) if out else "ascii")
+    found = [*_wrong_form(request.form, out)] if request.form else []
+    found += [*_wrong_out(out, form)] if out else []
     if request.theme not in THEMES:
         found.append(Finding("--theme", 1, f"no theme {request.theme!r}; {nearest(request.theme, THEMES)}"))
     if form == "groot" and request.depth is not None:
@@ -66,6 +60,28 @@ def _form(request: Request) -> str:
     if found:
         raise Findings(found)
     return form
+
+
+def _named(out: Path) -> str:
+    """The format that a file's name ends like, '' for none."""
+    return SUFFIXES.get(out.suffix.lower(), "")
+
+
+def _wrong_form(form: str, out: Path | None) -> Iterator[Finding]:
+    if form not in FORMATS:
+        yield Finding("--format", 1, f"no format {form!r}; {nearest(form, FORMATS)}")
+    elif out and _named(out) not in ("", form):
+        other = out.with_suffix(next(suffix for suffix, name in SUFFIXES.items() if name == form))
+        wrong = f"is a name of {_named(out)}, not of {form}; write {shown(other)}, or leave --format out"
+        yield Finding(shown(out), 1, wrong)
+
+
+def _wrong_out(out: Path, form: str) -> Iterator[Finding]:
+    if not form:
+        yield Finding(shown(out), 1, f"the name ends in none of {', '.join(SUFFIXES)}; rename it, or name a --format")
+    if out.is_dir() or not out.absolute().parent.is_dir():
+        wrong = "is a folder" if out.is_dir() else f"there is no folder {shown(out.absolute().parent)!r}"
+        yield Finding(shown(out), 1, f"{wrong}; name a file in a folder that exists")
 
 
 def _tree_file(request: Request, record: RunRecord | None) -> Path:

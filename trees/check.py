@@ -11,7 +11,7 @@ from pathlib import Path
 
 from trees.element import Element, TreeSyntaxError, key_of, read_elements
 from trees.flow import check_flow
-from trees.vocabulary import Kind, Names, kinds, nearest
+from trees.vocabulary import COUNTERPARTS, Kind, Names, kinds, nearest
 from trees.wiring import Filled, TooLarge
 
 Finding = tuple[int, str]  # line from 1 (0: the file itself), "what is wrong; what would be right"
@@ -45,9 +45,9 @@ def check_tree(path: Path, leaves: Mapping[str, type] | None = None, names: Name
 
 def _findings(root: Element, known: Mapping[str, Kind]) -> Iterator[Finding]:
     given = [tree for tree in root.children if tree.tag == "BehaviorTree"]
-    trees = {tree.attributes.get("ID", ""): tree for tree in given}
+    trees = {tree.attributes["ID"]: tree for tree in given if tree.attributes.get("ID")}
     keys = {identifier: _keys_used(tree) for identifier, tree in trees.items()}
-    yield from _check_document(root, trees, keys)
+    yield from _check_document(root, trees)
     for tree in given:
         yield from _check_names(tree)
         for element in tree.walk():
@@ -77,16 +77,17 @@ def unknown(what: str, word: str, known: Collection[str]) -> str:
     return f"unknown {what} {word[:MOST_SHOWN]!r}; {nearest(word, known)}"
 
 
-def _check_document(root: Element, trees: Mapping[str, Element], keys: Mapping[str, set[str]]) -> Iterator[Finding]:
+def _check_document(root: Element, trees: Mapping[str, Element]) -> Iterator[Finding]:
     if root.tag != "root":
         yield root.line, f"the outermost element is <{root.tag}>; write <root>"
     for attribute in root.attributes.keys() - {"main_tree_to_execute"}:
         yield root.line, unknown("attribute of root", attribute, ["main_tree_to_execute"])
     main = root.attributes.get("main_tree_to_execute")
-    if main is None:
+    if not main:
         yield root.line, "root does not state main_tree_to_execute; write the ID of the tree to run"
     elif main not in trees:
-        yield root.line, unknown("main tree", main, trees)
+        right = nearest(main, trees) if trees else "write a BehaviorTree with this ID"
+        yield root.line, f"unknown main tree {main[:MOST_SHOWN]!r}; {right}"
     for tree in root.children:
         if tree.tag in ("Include", "Import"):
             yield tree.line, f"{tree.tag} is refused, a tree is one file; copy the BehaviorTree into this one"
@@ -95,7 +96,10 @@ def _check_document(root: Element, trees: Mapping[str, Element], keys: Mapping[s
             yield tree.line, unknown("element under root", tree.tag, ["BehaviorTree"])
             continue
         if not tree.attributes.get("ID"):
-            yield tree.line, "BehaviorTree has no ID; give it one"
+            yield (
+                tree.line,
+                'BehaviorTree has no ID; write ID="..."',
+            )
         elif trees[tree.attributes["ID"]] is not tree:  # the mapping keeps the last
             yield tree.line, f"BehaviorTree ID {tree.attributes['ID']!r} is given twice; rename one"
         if len(tree.children) != 1:
@@ -103,7 +107,7 @@ def _check_document(root: Element, trees: Mapping[str, Element], keys: Mapping[s
         for attribute, value in tree.attributes.items():
             if attribute != "ID":
                 yield from _check_key(tree, attribute, value)
-                if attribute not in (used := keys[tree.attributes.get("ID", "")]):
+                if attribute not in (used := _keys_used(tree)):
                     yield tree.line, unknown("default of a key", attribute, used)
 
 
@@ -132,7 +136,10 @@ def _check_element(element: Element, known: Mapping[str, Kind], keys: Mapping[st
         yield from _check_subtree(element, keys)
         return
     if element.tag not in known:
-        yield element.line, unknown("element", element.tag, [*known, "SubTree"])
+        if right := COUNTERPARTS.get(element.tag):
+            yield element.line, f"unknown element {element.tag!r}; write {right}"
+        else:
+            yield element.line, unknown("element", element.tag, [*known, "SubTree"])
         return
     kind = known[element.tag]
     if len(element.children) < kind.min_children:
@@ -168,6 +175,9 @@ def _check_subtree(element: Element, keys: Mapping[str, set[str]]) -> Iterator[F
     if element.children:
         yield element.line, f"{element.label} takes no children and has {len(element.children)}; move them out of it"
     identifier = element.attributes.get("ID", "")
+    if not identifier:
+        yield element.line, f'{element.label} has no ID; write ID="..." of the BehaviorTree to put here'
+        return
     if identifier not in keys:
         yield element.line, unknown("subtree", identifier, keys)
         return

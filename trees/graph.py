@@ -111,10 +111,12 @@ def read_graph(path: Path, leaves: Mapping[str, type] | None = None, inputs: Map
 
 
 def collapsed(node: Node, depth: int) -> Node:
-    """The tree without what is more than `depth` levels below its top."""
-    if depth > 0 or not node.children:
-        return replace(node, children=tuple(collapsed(child, depth - 1) for child in node.children))
-    return replace(node, children=(), hidden=sum(n.kind != "subtree" for n in node.walk() if n is not node))
+    """The tree with its SubTrees open `depth` deep: at 0 each that stands in the main tree is closed, a single node."""
+    if node.kind == "subtree" and node.children:
+        if depth == 0:
+            return replace(node, children=(), hidden=sum(n.kind != "subtree" for n in node.walk()))
+        depth -= 1
+    return replace(node, children=tuple(collapsed(child, depth) for child in node.children))
 
 
 def recorded(node: Node, stats: Mapping[str, NodeStats], failed: Collection[str] = ()) -> Node:

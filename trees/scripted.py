@@ -207,10 +207,17 @@ class ScriptedTree:
         self.tree.tick()
         return self.status
 
-    def run(self, until: int = MOST_TICKS) -> Status:
-        """Tick until the tree ends, or until tick number `until`; the root's status."""
-        while self.ticks < until and self.tick() is Status.RUNNING:
+    def run(self, until: int | None = None) -> Status:
+        """Tick until the tree ends, or until tick number `until`; the root's status.
+
+        Raises:
+            RuntimeError: without `until`, the tree has not ended after `MOST_TICKS`; the message says what still runs.
+        """
+        while self.ticks < (until or MOST_TICKS) and self.tick() is Status.RUNNING:
             pass
+        if until is None and self.status is Status.RUNNING:
+            where = ", ".join(self.running)
+            raise RuntimeError(f"the tree still runs after {self.ticks} ticks, in {where}; script how that ends")
         return self.status
 
     def cancel_at(self, tick: int) -> None:

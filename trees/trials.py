@@ -63,7 +63,7 @@ def never_ends(path: Path, leaves: Mapping[str, type] | None = None) -> Iterator
     """A paragraph for each trial in which the tree does not end, or leaves a leaf at work when it does."""
     for trial in trials(path, leaves):
         tree = trial.tree()
-        if tree.run() is Status.RUNNING:
+        if tree.run(MOST_TICKS) is Status.RUNNING:
             yield f"{trial.name}: the tree still runs after {MOST_TICKS} ticks, in {', '.join(tree.running)}"
         elif tree.running:
             yield f"{trial.name}: the tree ended, but {', '.join(tree.running)} still runs\n{tree.table()}"

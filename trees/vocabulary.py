@@ -114,6 +114,14 @@ BUILT_IN = {
     **{tag: Kind({}, 1, 1, about) for tag, about in _DECORATORS.items()},
 }
 
+COUNTERPARTS = {  # of BehaviorTree.CPP's words
+    "ForceFailure": "<SuccessIsFailure>",
+    "ForceSuccess": "<FailureIsSuccess>",
+    "ReactiveFallback": '<Fallback memory="false">',
+    "ReactiveSequence": '<Sequence memory="false">',
+    "RetryUntilSuccessful": '<Retry num_failures="...">',
+}
+
 
 def nearest(word: str, known: Collection[str]) -> str:
     """The words that help after an unknown one: the nearest known one, else all that there are."""

@@ -138,13 +138,44 @@ def test_ctrl_c_lets_the_run_end_and_leaves_no_process(suite: pytest.Pytester) -
         os.kill(int((folder / "pid").read_text()), 0)
 
 
-def test_trees_are_collected_by_name_or_because_they_are_asked_for(pytester: pytest.Pytester) -> None:
-    (pytester.path / "plain.xml").write_text(TREE.format('<StartUp name="start_up"/>'))
-    (pytester.path / "sound.tree.xml").write_text(TREE.format('<StartUp name="start_up"/>'))
+def test_a_tree_is_collected_by_name_by_place_or_because_it_is_asked_for(pytester: pytest.Pytester) -> None:
+    places = ["sound.tree.xml", "trees/deep/a.xml", "my/b.xml", "my/deep/c.xml"]
+    for place in places:
+        (pytester.path / place).parent.mkdir(parents=True, exist_ok=True)
+        (pytester.path / place).write_text(TREE.format('<StartUp name="start_up"/>'))
     result = run(pytester, "-v")
-    result.assert_outcomes(passed=2)
+    result.assert_outcomes(passed=4)
     result.stdout.fnmatch_lines(["sound.tree.xml::ends PASSED*", "sound.tree.xml::stops at every tick PASSED*"])
-    run(pytester, "plain.xml").assert_outcomes(passed=2)
+    result.stdout.fnmatch_lines(["trees/deep/a.xml::ends PASSED*", "trees/deep/a.xml::stops at every tick PASSED*"])
+    run(pytester, "trees", "sound.tree.xml").assert_outcomes(passed=4)
+    run(pytester, "trees/deep").assert_outcomes(passed=2)
+    run(pytester, "my").assert_outcomes(passed=2)
+    run(pytester, "my/b.xml", "my/deep/c.xml").assert_outcomes(passed=4)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "<root",
+        "\x00",
+        "<?xml version='1.0' encoding='no-such'?><root/>",
+        "<project/>",
+        "<root><BehaviorTree ID='M'/></root>",
+        "<root BTCPP_format='4' main_tree_to_execute='M'/>",
+        "<!DOCTYPE a [<!ENTITY b 'b'>]><a main_tree_to_execute='M'>&b;</a>",
+    ],
+)
+def test_other_xml_is_left_alone(pytester: pytest.Pytester, text: str) -> None:
+    (pytester.mkdir("trees") / "other.xml").write_text(text)
+    assert run(pytester, "trees").ret == pytest.ExitCode.NO_TESTS_COLLECTED
+
+
+def test_a_tree_that_breaks_off_is_not_passed_over(pytester: pytest.Pytester) -> None:
+    (pytester.mkdir("trees") / "cut.xml").write_text("<root main_tree_to_execute='M'><BehaviorTree")
+    result = run(pytester)
+    result.assert_outcomes(errors=1)
+    result.stdout.fnmatch_lines(["trees/cut.xml:1: malformed XML*"])
 
 
 def test_a_tree_that_never_ends_fails_and_one_with_findings_is_a_short_collection_error(

@@ -5,12 +5,14 @@ from xml.etree import ElementTree as ET
 
 import pytest
 from toy_scenario import SCENARIO, write_scenario
+from typer.testing import CliRunner
 
 from app.batch import Row, Run, row_of
+from app.cli import app
 from app.findings import Findings
 from app.junit import write_junit
 from app.processes import Done
-from app.record import Expectation, Result
+from app.record import Expectation, Record, Result
 from app.run_every import run_every
 from app.scenario_file import Scenario, cases, load_scenario
 from interfaces.cause import Cause, CauseCode
@@ -28,10 +30,8 @@ def episode(scenario: Scenario, out: Path | None, *, seed: int, video: bool) -> 
     if seed == 2:
         os._exit(7)
     assert out is not None
-    out.mkdir(parents=True)
-    (out / "result.json").write_text("{}")
     met = seed == 0
-    return Result(
+    result = Result(
         scenario=scenario.name,
         seed=seed,
         outcome="stowed" if met else "safe_stop",
@@ -44,13 +44,19 @@ def episode(scenario: Scenario, out: Path | None, *, seed: int, video: bool) -> 
         sim_seconds=80.0,
         wall_seconds=12.5,
     )
+    with Record(out, scenario.name, seed, scenario.case) as record:
+        record.finish(result)
+    return result
 
 
 def good(*args: Any, seed: int, video: bool) -> Result:
     return Result(args[0].name, seed, "stowed", succeeded=True)
 
 
-def test_every_case_leaves_a_line_a_record_and_a_testcase(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_every_case_leaves_a_line_a_record_and_a_testcase(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", "100")
     assert run_every("mine.yaml", [], 2, Path("out"), Path("reports/mine.xml"), episode=episode) == 1
     out, err = capfd.readouterr()
     lines = [line.split() for line in out.splitlines()]
@@ -79,7 +85,13 @@ def test_every_case_leaves_a_line_a_record_and_a_testcase(tmp_path: Path, capfd:
         "type": "search_exhausted",
         "message": "search_exhausted: 18 stops; slips is 0, asked at least 1 noticed, none unseen",
     }
+    page = suite[1][0].text or ""
+    assert page == CliRunner().invoke(app, ["explain", "out/seed=1"]).stdout
+    assert page.startswith("mine seed=1, seed 1: safe_stop, 0 of 1 expectations met, 80.0 simulated seconds\n")
+    assert "Why it ended so\n  search_exhausted: 18 stops\n" in page
+    assert suite[2][0].text == suite[2][0].attrib["message"]  # it left no record
     assert suite[2][0].attrib["message"] == "internal_error: the process died with exit code 7"
+    assert "  search_exhausted: nothing <seen> \\x1b[31m\n" in (suite[3][0].text or "")
     assert suite[3][0].attrib["message"].startswith("search_exhausted: nothing <seen> \\x1b[31m; ")
 
 

@@ -30,19 +30,30 @@ def test_every_format_comes_out_on_standard_output(form: str) -> None:
 def test_a_file_s_ending_says_the_format_and_nothing_else_is_left(here: Path) -> None:
     assert export("recovery", "-o", "tree.svg", "--theme", "dark").exit_code == 0
     assert ET.parse("tree.svg").getroot().tag.endswith("svg")
-    assert export("recovery", "-o", "tree.svg", "--format", "ascii").stdout == ""
-    assert (here / "tree.svg").read_text(encoding="utf-8").startswith("recovery  Fallback")
-    assert [path.name for path in here.iterdir()] == ["tree.svg"]
+    assert export("recovery", "-o", "tree.svg", "--format", "svg").stdout == ""
+    assert export("recovery", "-o", "tree.md", "--format", "mermaid").exit_code == 0
+    assert (here / "tree.md").read_text(encoding="utf-8").startswith("flowchart")
+    assert sorted(path.name for path in here.iterdir()) == ["tree.md", "tree.svg"]
+
+
+def test_a_dash_is_standard_output(here: Path) -> None:
+    told = export("recovery", "-o", "-", "--format", "svg")
+    assert told.stdout_bytes == export("recovery", "--format", "svg").stdout_bytes != b""
+    assert export("recovery", "-o", "-").stdout == export("recovery").stdout
+    assert not [*here.iterdir()]
 
 
 def test_without_a_format_it_is_what_show_draws() -> None:
     assert export("recovery").stdout == CliRunner().invoke(app, ["trees", "show", "recovery"]).stdout
 
 
-def test_depth_counts_levels_below_the_top() -> None:
-    lines = export("recovery", "--depth", "1").stdout.splitlines()
-    assert [line.split()[:2] for line in lines[1:]] == [["├─", "mission"], ["└─", "safe_stop"]]
-    assert lines[1].endswith("  +25 nodes")
+def test_depth_says_how_deep_subtrees_are_open() -> None:
+    lines = export("recovery", "--depth", "0").stdout.splitlines()
+    assert [line for line in lines if "SubTree" in line] == [
+        "│        │  └─ recovery  SubTree Recover  +8 nodes",
+        "│        └─ delivery  SubTree Deliver  +11 nodes",
+    ]
+    assert export("recovery", "--depth", "1").stdout == export("recovery").stdout
 
 
 WRONG = {
@@ -50,6 +61,7 @@ WRONG = {
     "unknown tree": (["recovry"], "recovry:1: no tree named 'recovry'; did you mean 'recovery'?"),
     "unknown format": (["recovery", "--format", "svgg"], "--format:1: no format 'svgg'; did you mean 'svg'?"),
     "unknown ending": (["recovery", "-o", "x.gif"], "x.gif:1: the name ends in none of .txt"),
+    "two formats": (["recovery", "-o", "x.svg", "--format", "png"], "x.svg:1: is a name of svg, not of png; write"),
     "unknown theme": (["recovery", "--theme", "drak"], "--theme:1: no theme 'drak'; did you mean 'dark'?"),
     "no folder": (["recovery", "-o", "no/x.svg"], "no/x.svg:1: there is no folder 'no'"),
     "a folder": (["recovery", "-o", ".", "--format", "svg"], ":1: is a folder"),

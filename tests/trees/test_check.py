@@ -121,6 +121,15 @@ CASES = {
         "BehaviorTree has 2 children; give it one",
     ),
     "tree given twice": ('ID="Search" camera', 'ID="Main" camera', 2, "BehaviorTree ID 'Main' is given twice"),
+    "tree without ID": ('ID="Search" camera', 'ID="" camera', 12, 'BehaviorTree has no ID; write ID="..."'),
+    "subtree without ID": ('ID="Search" name', "name", 4, "SubTree 'search' has no ID; write ID=\"...\" of the Behav"),
+    "empty main tree": ('execute="Main"', 'execute=""', 1, "does not state main_tree_to_execute"),
+    "reactive fallback of BehaviorTree.CPP": (
+        "<Go ",
+        '<ReactiveFallback name="r"><Fail name="f"/></ReactiveFallback><Go ',
+        9,
+        "unknown element 'ReactiveFallback'; write <Fallback memory=\"false\">",
+    ),
     "include": ("</root>", '<Include file="/etc/passwd"/></root>', 20, "Include is refused"),
     "import": ("</root>", '<Import src="other.xml"/></root>', 20, "Import is refused, a tree is one file; copy the"),
     "tree that nothing includes": (

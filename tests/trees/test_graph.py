@@ -1,7 +1,9 @@
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from hypothesis import given
+from hypothesis import strategies as st
 from random_nodes import nodes
 from test_golden import CHAIN, FEATURES, features, features_with_run
 from toy_leaves import LEAVES
@@ -38,16 +40,15 @@ def test_a_leaf_that_answers_at_once_is_a_condition() -> None:
     assert {node.name for node in features().walk() if node.kind == "condition"} == {"seen"}
 
 
-@given(nodes)
-def test_what_is_collapsed_is_counted(node: Node) -> None:
-    plain = by_path(node)
-    for depth in (0, 1, 3):
-        cut = by_path(collapsed(node, depth))
-        assert all(path.count("/") <= depth for path in cut)
-        for path, kept in cut.items():
-            missing = [n for n in plain[path].walk() if n.path not in cut and n.kind != "subtree"]
-            if plain[path].children and not kept.children:
-                assert kept.hidden == len(missing)
+@given(nodes, st.integers(0, 3))
+def test_subtrees_below_the_depth_are_closed_and_what_is_in_them_is_counted(node: Node, depth: int) -> None:
+    plain, cut = by_path(node), by_path(collapsed(node, depth))
+    subtrees = {path for path, n in plain.items() if n.kind == "subtree"}
+    for path, n in plain.items():
+        around = [s for s in subtrees if path.startswith(f"{s}/")]
+        assert (path in cut) == (len(around) <= depth)
+        if path in subtrees and len(around) == depth:
+            assert cut[path] == replace(n, children=(), hidden=sum(m.kind != "subtree" for m in n.walk()))
 
 
 def test_a_run_s_stats_and_failed_path_are_on_the_nodes_and_on_the_subtrees_round_them() -> None:
