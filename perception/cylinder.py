@@ -16,6 +16,7 @@ Mask = NDArray[np.bool_]
 STEPS = 20  # Levenberg-Marquardt steps at most
 CONVERGED = 1e-4  # share of the cost that a step must save to be worth another
 COARSE, FINE = 12.0, 2.0  # deviations; choice: what is further off counts less (Cauchy), little while the way is sought
+GRAZING = 0.1  # choice: cosine under which a surface that the ray grazes counts as no flatter
 SURFACE = 0.0005  # m; choice: what depth readings deviate where the surface runs along the ray
 SEARCH_STEPS = 12  # of the golden section: 0.1 m shrinks to 0.3 mm, where the distance is off by micrometres
 _GOLD = 0.6180339887498949
@@ -115,30 +116,71 @@ def _nearest_on_rays(
     return misses, far
 
 
-def surface_misses(
+def depth_misses(
     points: FloatArray, deviations: FloatArray, center: FloatArray, axis: FloatArray, radius: float, length: float
 ) -> FloatArray:
-    """How many of their `deviations` (n,) m along their rays the `points` (n, 3) are off the cylinder's surface; (n,)."""
-    return _surface_misses(points, deviations, center, axis, radius, length / 2)
+    """How many of their `deviations` (n,) m the `points` (n, 3) lie behind the cylinder on their rays; (n,)."""
+    return _depth_misses(points, deviations, center, axis, radius, length / 2)
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _surface_misses(
+def _depth_misses(
     points: FloatArray, deviations: FloatArray, center: FloatArray, axis: FloatArray, radius: float, half: float
 ) -> FloatArray:
-    out = np.empty(len(points))
+    out, gradient = np.empty(len(points)), np.empty(3)
     for i in range(len(points)):
-        x, y, z = points[i, 0], points[i, 1], points[i, 2]
-        off, gx, gy, gz = distance(x, y, z, center, axis, radius, half)
-        out[i] = off / _deviation(x, y, z, gx, gy, gz, deviations[i])
+        off, deviation = _point_miss(points[i], deviations[i], center, axis, radius, half, gradient)
+        out[i] = off / deviation
     return out
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _deviation(x: float, y: float, z: float, gx: float, gy: float, gz: float, along_ray: float) -> float:
-    """Deviation (m) of the signed distance of a point, gradient g, whose deviation along its ray is given."""
-    facing = (gx * x + gy * y + gz * z) / np.sqrt(x * x + y * y + z * z)
-    return np.sqrt((along_ray * facing) ** 2 + SURFACE * SURFACE)
+def _point_miss(
+    point: FloatArray,
+    along_ray: float,
+    center: FloatArray,
+    axis: FloatArray,
+    radius: float,
+    half: float,
+    gradient: FloatArray,
+) -> tuple[float, float]:
+    """How far (m) a reading lies behind the body on its ray, and the deviation of that; `gradient` (3,) becomes minus
+    its derivative by the body's place. A ray that misses the body has its reading's distance from it instead.
+    """
+    out = np.sqrt(point[0] ** 2 + point[1] ** 2 + point[2] ** 2)
+    x, y, z = point[0] / out, point[1] / out, point[2] / out
+    hit, nx, ny, nz = _first_hit(x, y, z, center, axis, radius, half)
+    if hit > 0:
+        facing = min(nx * x + ny * y + nz * z, -GRAZING)
+        gradient[0], gradient[1], gradient[2] = nx / facing, ny / facing, nz / facing
+        return out - hit, np.sqrt(along_ray * along_ray + (SURFACE / facing) ** 2)
+    off, nx, ny, nz = distance(point[0], point[1], point[2], center, axis, radius, half)
+    gradient[0], gradient[1], gradient[2] = nx, ny, nz
+    return off, np.sqrt((along_ray * (nx * x + ny * y + nz * z)) ** 2 + SURFACE**2)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _first_hit(
+    x: float, y: float, z: float, center: FloatArray, axis: FloatArray, radius: float, half: float
+) -> tuple[float, float, float, float]:
+    """How far out (m) a unit ray from the camera meets the body, and the outward normal there; 0 if it misses."""
+    slope = x * axis[0] + y * axis[1] + z * axis[2]
+    start = center[0] * axis[0] + center[1] * axis[1] + center[2] * axis[2]
+    px, py, pz = x - slope * axis[0], y - slope * axis[1], z - slope * axis[2]
+    cx, cy, cz = center[0] - start * axis[0], center[1] - start * axis[1], center[2] - start * axis[2]
+    a, b = px * px + py * py + pz * pz, px * cx + py * cy + pz * cz
+    inside = b * b - a * (cx * cx + cy * cy + cz * cz - radius * radius)
+    if inside > 0 and a > 1e-12:
+        t = (b - np.sqrt(inside)) / a
+        if abs(t * slope - start) <= half:
+            return t, (t * px - cx) / radius, (t * py - cy) / radius, (t * pz - cz) / radius
+    if abs(slope) > 1e-9:
+        side = -1.0 if slope > 0 else 1.0  # the cap that faces the camera
+        t = (start + side * half) / slope
+        qx, qy, qz = t * px - cx, t * py - cy, t * pz - cz
+        if t > 0 and qx * qx + qy * qy + qz * qz <= radius * radius:
+            return t, side * axis[0], side * axis[1], side * axis[2]
+    return 0.0, 0.0, 0.0, 0.0
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -250,13 +292,12 @@ def _equations(
     fade: float,
 ) -> tuple[FloatArray, FloatArray, float]:
     """Normal equations (5, 5), (5,) at a pose, and the cost."""
-    hessian, gradient, row, cost = np.zeros((5, 5)), np.zeros(5), np.zeros(5), 0.0
+    hessian, gradient, row, normal = np.zeros((5, 5)), np.zeros(5), np.zeros(5), np.zeros(3)
+    cost = 0.0
     for i in range(len(points)):
-        x, y, z = points[i, 0], points[i, 1], points[i, 2]
-        out, gx, gy, gz = distance(x, y, z, center, axis, radius, half)
-        deviation = _deviation(x, y, z, gx, gy, gz, deviations[i])
-        _row(row, x, y, z, gx, gy, gz, center, tilts)
-        cost += _add(hessian, gradient, row, out, deviation, fade, point_share)
+        off, deviation = _point_miss(points[i], deviations[i], center, axis, radius, half, normal)
+        _row(row, points[i, 0], points[i, 1], points[i, 2], normal[0], normal[1], normal[2], center, tilts)
+        cost += _add(hessian, gradient, row, off, deviation, fade, point_share)
     for i in range(len(rays)):
         out, far = _nearest_on_ray(rays[i], center, axis, radius, half)
         if inside[i] and out <= 0:

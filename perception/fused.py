@@ -5,7 +5,7 @@ weighed by its noise. So a half-hidden connector is not drawn towards its visibl
 the shape is refused.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -16,7 +16,7 @@ from interfaces.cell import Connector, KnownCell, WristMount, pose_along
 from interfaces.frame import Intrinsics, RgbdFrame
 from perception.cable_end import cable_leaves
 from perception.camera_model import project
-from perception.cylinder import COARSE, FINE, Fit, Sight, fit, nearest_on_rays, surface_misses, thinned
+from perception.cylinder import COARSE, FINE, Fit, Sight, fit, nearest_on_rays, depth_misses, thinned
 from perception.estimate import ROLL_VARIANCE, Estimate, NoEstimate
 from perception.outline import outline
 from perception.registration import CARRIED, FIXED, Registration, register
@@ -38,8 +38,10 @@ POINTS, EDGES = 300, 160  # at most, for speed
 SIDE_SEEN = 2.0  # choice: a patch so many times longer than wide shows which way the axis runs in the image
 TILTS = np.deg2rad([-80.0, -65.0, -40.0, 0.0, 40.0, 65.0, 80.0])  # of the starts, out of the image: noise tilts a stub
 ROUGH_COUNT, ROUGH_STEPS = 50, 6  # points and outline points of rough fits, and their steps
-PROMISING = (6, 2)  # starts that are fitted roughly, rough fits that are fitted in full
+PROMISING = (8, 3)  # starts that are fitted roughly, rough fits that are fitted in full
+ALIKE, ALIKE_COSINE = 0.02, 0.94  # m, and of 20 degrees: fits so near to each other end alike
 MISSING_COST = 100.0  # of a whole axis that should show: what is not there weighs like twenty points off
+DOUBT = 3.0  # of cost that makes another fit e times less likely; 1 by theory, whose noise has no outliers
 END = 0.004  # m: outline points so near to an end belong to it
 END_EDGES = 4  # of them show that the end is in sight
 # Refused is what does not fit; choices, on renders of the connector and of look-alikes.
@@ -107,11 +109,11 @@ class Fused:
             return NotSeen.NO_DEPTH, f"{readings} depth readings on {patch.area} pixels, {MIN_READINGS} are needed"
         if edges < MIN_EDGES:
             return NotSeen.TOO_SMALL, f"{edges} points of its outline are in sight, {MIN_EDGES} are needed"
-        best = _fit(patch, self._connector)
+        best, *others = _fits(patch, self._connector)
         refusal = _refusal(patch, best, self._connector)
         if refusal is not None:
             return NotSeen.NOT_ITS_SHAPE, refusal
-        return _Found(patch, best, *_ends(patch, best, self._connector))
+        return _Found(patch, _doubted(best, others), *_ends(patch, best, self._connector))
 
 
 def _patches(binary: NDArray[np.uint8]) -> list[Mask]:
@@ -164,19 +166,44 @@ def _directions(pixels: NDArray[np.generic], k: Intrinsics) -> FloatArray:
     return np.column_stack([(u - k.cx) / k.fx, (v - k.cy) / k.fy, np.ones(len(u))])
 
 
-def _fit(patch: _Patch, connector: Connector) -> Fit:
-    """The best fit of all starts: roughly from each, then in full from the most promising ones."""
+def _fits(patch: _Patch, connector: Connector) -> list[Fit]:
+    """The best fits of all starts, best first: roughly from each, then in full from the most promising ones."""
 
     def burden(found: Fit) -> float:
         return found.cost + MISSING_COST * _missing(patch, found, connector)
 
     size, few = (connector.radius, connector.length), thinned(patch.sight, ROUGH_COUNT)
     starts = [fit(few, *start, *size, COARSE, 0) for start in _starts(patch.sight, connector)]
-    best_starts = sorted(starts, key=lambda f: f.cost)[: PROMISING[0]]
-    rough = [fit(few, f.center, f.axis, *size, COARSE, ROUGH_STEPS) for f in best_starts]
-    full = [fit(patch.sight, f.center, f.axis, *size, COARSE) for f in sorted(rough, key=burden)[: PROMISING[1]]]
-    best = min(full, key=burden)
-    return fit(patch.sight, best.center, best.axis, *size, FINE)
+    starts.sort(key=lambda f: f.cost)
+    rough = [fit(few, f.center, f.axis, *size, COARSE, ROUGH_STEPS) for f in _distinct(starts, PROMISING[0])]
+    rough.sort(key=burden)
+    full = [fit(patch.sight, f.center, f.axis, *size, COARSE) for f in _distinct(rough, PROMISING[1])]
+    full.sort(key=burden)
+    return [fit(patch.sight, f.center, f.axis, *size, FINE) for f in full]
+
+
+def _distinct(fits: list[Fit], count: int) -> list[Fit]:
+    """The first `count` of them that are not nearly alike."""
+    kept: list[Fit] = []
+    for f in fits:
+        if not any(
+            abs(f.axis @ k.axis) > ALIKE_COSINE and float(np.linalg.norm(f.center - k.center)) < ALIKE for k in kept
+        ):
+            kept.append(f)
+        if len(kept) == count:
+            break
+    return kept
+
+
+def _doubted(best: Fit, others: list[Fit]) -> Fit:
+    """The best fit, its covariance widened by those that explain the patch nearly as well."""
+    covariance = best.covariance.copy()
+    for other in others:
+        doubt = float(np.exp(min(0.0, (best.cost - other.cost) / DOUBT)))
+        turn = np.cross(best.axis, other.axis * (1.0 if best.axis @ other.axis >= 0 else -1.0))
+        apart = np.concatenate([other.center - best.center, best.tilts @ turn])
+        covariance += doubt * np.outer(apart, apart)
+    return replace(best, covariance=covariance)
 
 
 def _starts(sight: Sight, connector: Connector) -> list[tuple[FloatArray, FloatArray]]:
@@ -222,7 +249,7 @@ def _refusal(patch: _Patch, found: Fit, connector: Connector) -> str | None:
     stray = float(np.mean(pixels > 3.0))
     if stray > MAX_STRAY:
         return f"{stray:.0%} of its outline is not the connector's, at most {MAX_STRAY:.0%} may be"
-    off = surface_misses(sight.points, sight.deviations, found.center, found.axis, *size)
+    off = depth_misses(sight.points, sight.deviations, found.center, found.axis, *size)
     miss = float(np.median(np.abs(off))) * 1.48  # of a normal spread's deviation
     if miss > MAX_DEPTH_MISS:
         return f"its surface is {miss:.1f} deviations off the connector's, at most {MAX_DEPTH_MISS} may be"

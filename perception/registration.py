@@ -87,7 +87,7 @@ def register(
         moved = moved + step
         turn, place, scale = _turn(step[3:6]) @ turn, place + step[:3], scale * (1.0 + float(step[6]))
     pose = RigidTransform.from_components(place, Rotation.from_matrix(turn))
-    return Registration(pose, scale, np.linalg.inv(information))
+    return Registration(pose, scale, np.asarray(np.linalg.inv(information), float))
 
 
 @numba.njit(cache=True, error_model="numpy")
