@@ -5,6 +5,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
+from interfaces.quote import cut, quoted
+
 
 @dataclass(frozen=True, order=True)
 class Finding:
@@ -34,10 +36,14 @@ def printable(text: str) -> str:
 def nearest(name: str, names: Iterable[str], what: str = "there are") -> str:
     """The words that help after an unknown name: the nearest known one, else all that exist."""
     known = sorted(names)
-    close = difflib.get_close_matches(name, known, n=1)
-    if close:
-        return f"did you mean {close[0]!r}?"
-    return f"{what} {', '.join(known)}" if known else "there are none"
+    if close := closest(name, known):
+        return f"did you mean {quoted(close)}?"
+    return f"{what} {', '.join(map(cut, known))}" if known else "there are none"
+
+
+def closest(name: str, names: Iterable[str]) -> str | None:
+    """The name that this one seems to mean."""
+    return next(iter(difflib.get_close_matches(name, sorted(names), n=1)), None)
 
 
 def shown(path: Path) -> str:

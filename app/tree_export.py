@@ -10,7 +10,8 @@ from app.output import FILES
 from app.record import write_whole
 from app.record_reader import RunRecord, read_record
 from app.resources import read_text, resolve
-from app.scenario_file import check_tree_file, tree_text
+from app.scenario_file import check_tree_file
+from app.scenario_parts import tree_text
 from trees import Node, TreeSyntaxError, collapsed, read_graph, recorded, run_stats
 from trees.export import FORMATS, SUFFIXES, THEMES, export_tree
 

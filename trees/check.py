@@ -57,14 +57,17 @@ def _findings(root: Element, known: Mapping[str, Kind]) -> Iterator[Finding]:
     loops = [*_loops(trees)]
     yield from loops
     try:
-        yield from _check_runs(root, trees, known)
+        yield from check_runs(root, trees, known)
     except TooLarge as error:
         if not loops:  # filling one in has no end
             yield root.line, str(error)
 
 
-def _check_runs(root: Element, trees: Mapping[str, Element], known: Mapping[str, Kind]) -> list[Finding]:
-    """What shows only in the tree that will run, its subtrees filled in. Raises TooLarge."""
+def check_runs(root: Element, trees: Mapping[str, Element], known: Mapping[str, Kind]) -> list[Finding]:
+    """What shows only in the tree that will run, its subtrees filled in. Raises TooLarge.
+
+    `trees` are those under `root` by their ID, `known` the kinds of elements by tag.
+    """
     main = trees.get(root.attributes.get("main_tree_to_execute", ""))
     if main is None:
         return []
