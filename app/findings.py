@@ -5,7 +5,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from interfaces.quote import cut, quoted
+from interfaces.quote import MOST, cut, quoted
+
+MOST_LISTED = 50  # known names after an unknown one
 
 
 @dataclass(frozen=True, order=True)
@@ -38,12 +40,13 @@ def nearest(name: str, names: Iterable[str], what: str = "there are") -> str:
     known = sorted(names)
     if close := closest(name, known):
         return f"did you mean {quoted(close)}?"
-    return f"{what} {', '.join(map(cut, known))}" if known else "there are none"
+    more = ["..."] if known[MOST_LISTED:] else []
+    return f"{what} {', '.join([*map(cut, known[:MOST_LISTED]), *more])}" if known else "there are none"
 
 
 def closest(name: str, names: Iterable[str]) -> str | None:
     """The name that this one seems to mean."""
-    return next(iter(difflib.get_close_matches(name, sorted(names), n=1)), None)
+    return next(iter(difflib.get_close_matches(name[:MOST], sorted(names), n=1)), None)
 
 
 def shown(path: Path) -> str:

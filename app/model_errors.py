@@ -48,7 +48,7 @@ def model_errors(value: Value, model: type[BaseModel], root: Schema) -> list[Mod
 
 def misspelt(value: Value, model: type[BaseModel], root: Schema) -> Iterator[tuple[Path, str]]:
     """Keys that no model has, each with the one that it seems to mean and that is not there."""
-    errors = first_errors(value, model)
+    errors = model_errors(value, model, root)
     for path, details in errors if len(errors) <= MOST_LOOKED_INTO else []:
         parent = at(value, path[:-1])
         if not isinstance(parent, dict):

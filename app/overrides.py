@@ -28,7 +28,11 @@ class Assignment:
 
 def path_of(key: str) -> Path:
     """The path that a dotted key means."""
-    return tuple(int(step) if step.isdecimal() else step for step in key.split("."))
+    return tuple(int(step) if _is_index(step) else step for step in key.split("."))
+
+
+def _is_index(step: str) -> bool:
+    return step.isdecimal() and len(step) < 10
 
 
 def read(overrides: Sequence[str]) -> tuple[list[Assignment], list[Finding]]:
@@ -100,7 +104,7 @@ def _put(document: Document, keys: list[str], value: Value) -> Path:
             if last:
                 spot[key] = value
             elif spot.get(key) is None:
-                if keys[i + 1].isdecimal():
+                if _is_index(keys[i + 1]):
                     raise LookupError(_no_items(path))
                 spot[key] = {}
             spot = spot[key]
@@ -112,7 +116,7 @@ def _put(document: Document, keys: list[str], value: Value) -> Path:
 def _index(items: list[Value], key: str, path: Path) -> int:
     if not items:
         raise LookupError(_no_items(path))
-    if not key.isdecimal() or int(key) >= len(items):
+    if not _is_index(key) or int(key) >= len(items):
         raise LookupError(f"no item {quoted(key)} in {_dotted(path)}; give a number from 0 to {len(items) - 1}")
     return int(key)
 

@@ -13,7 +13,7 @@ from app.scenario_schema import Jitter, ObstacleSize, Yaw
 from app.schema import part
 from app.yaml_lines import Document, Path
 from interfaces.cell import ArmSpec, FixedMount, KnownCell, Size, Vector, pose_along
-from interfaces.quote import quoted
+from interfaces.quote import cut, quoted
 
 FloatArray = NDArray[np.float64]
 # The ViperX 300 S's base, rtb-data's mesh VXSA-300-M-1-Base: centre from the arm's base, and full size, metres.
@@ -44,10 +44,10 @@ def _misplaced(document: Document, cell: KnownCell | None) -> Iterator[Finding]:
         seen.add(name)
         size = part(document, (*here, "size"), _SIZE)
         yaw_deg = part(document, (*here, "yaw_deg"), _YAW, 0.0)
-        jitter = part(document, (*here, "jitter"), _JITTER, (0.0, 0.0, 0.0))
+        jitter = part(document, (*here, "jitter"), _JITTER) or (0.0, 0.0, 0.0)  # of a wrong one nobody knows
         for gravity in ("zero", "earth"):
             path = (*here, "position", gravity)
-            if (spot := part(document, path, _POINT)) is None or jitter is None:
+            if (spot := part(document, path, _POINT)) is None:
                 continue
             who = "obstacle" + (f" {quoted(name)}" if name is not None else "")
             place = document.place(path)
@@ -57,7 +57,7 @@ def _misplaced(document: Document, cell: KnownCell | None) -> Iterator[Finding]:
                 continue
             center = np.array([*spot[:2], spot[2] + 0.5 * size[2]])
             for piece, depth in overlaps(cell, center, size, yaw_deg, jitter):
-                yield Finding(*place, f"{who} reaches {depth:.3f} m into {piece}; move it, or jitter it less")
+                yield Finding(*place, f"{who} reaches {depth:.3f} m into {cut(piece)}; move it, or jitter it less")
 
 
 def overlaps(

@@ -18,10 +18,15 @@ from app.schema_nodes import at
 from app.yaml_lines import Document, Place, parse
 from app.yaml_lines import Path as KeyPath
 from interfaces.cell import Cell
-from interfaces.quote import cut, quoted
+from interfaces.quote import MOST, cut, quoted
 
 P = ParamSpec("P")
 T = TypeVar("T")
+_REQUIRED = {
+    name: field.examples[0]
+    for name, field in ScenarioFile.model_fields.items()
+    if field.is_required() and field.examples
+}
 
 
 @dataclass(frozen=True)
@@ -97,6 +102,7 @@ class _Source:
 
     def __init__(self, name_or_path: str, overrides: Sequence[str]) -> None:
         self.found: dict[Finding, dict[str, None]] = {}  # with the cases that show it, '' for the file itself
+        self._wrong: list[KeyPath] = []  # where the file itself is wrong
         self._done: dict[Hashable, tuple[Any, list[Finding]]] = {}
         self.overrides = tuple(overrides)
         assignments, wrong = read(overrides)
@@ -126,11 +132,11 @@ class _Source:
 
     def checked(self, chosen: Sequence[tuple[str, list[Assignment]]]) -> list[Scenario]:
         """The scenarios of these cases. Raises `Findings`; one that only some of them show names the first."""
-        _, wrong = self._scenario("", [a for a in self._fixed if not any(_holds(k, a.path) for k in self._varied)])
-        made = []
+        self._scenario("", [a for a in self._fixed if not any(_holds(k, a.path) for k in self._varied)])
+        wrong, made = self._wrong, []
         for name, given in chosen:
             placed = [a for a in given if not any(_holds(path, a.path) and path != a.path for path in wrong)]
-            made.append(self._scenario(name, [*placed, *self._fixed])[0])
+            made.append(self._scenario(name, [*placed, *self._fixed]))
         if self.found:
             raise Findings(_of_cases(finding, list(where), len(chosen)) for finding, where in self.found.items())
         return [scenario for scenario in made if scenario]
@@ -144,24 +150,34 @@ class _Source:
         self.note(findings, case)
         return done
 
-    def _scenario(self, case: str, assignments: Sequence[Assignment]) -> tuple[Scenario | None, list[KeyPath]]:
-        """The file with values laid over it, as a scenario if all is right, and where in it something is wrong."""
+    def _scenario(self, case: str, assignments: Sequence[Assignment]) -> Scenario | None:
+        """The file with values laid over it; None where it is wrong."""
         given = self._document
         document = Document(deepcopy(given.value), dict(given.places), unread=set(given.unread))
         of_cell = [replace(a, key=a.key[5:]) for a in assignments if a.key.startswith("cell.")]
         self.note(_attempt(apply, document, [a for a in assignments if not a.key.startswith("cell.")])[1], case)
-        file, errors = read_as(document, ScenarioFile)
-        errors = [error for error in errors if not self._is_for_cases(case, error)]
-        self.note((error.finding for error in errors), case)
+        file = self._read(case, document, {a.path[0] for a in assignments})
         cell, tree = self._cell_and_tree(case, document, of_cell)
         inputs, obstacles, faults = (repr(at(document.value, (key,))) for key in ("inputs", "obstacles", "faults"))
         self._once(case, check_inputs, (tree, inputs, id(cell)), document, tree, cell)
         self._once(case, check_names, (tree, obstacles, faults), document, tree)
         self._once(case, misplaced, (obstacles, id(cell)), document, cell.known if cell else None)
         if not (file and cell and tree):
-            return None, [error.path for error in errors]
+            return None
         name = self.path.name.removesuffix(".yaml").removesuffix(".scenario")
-        return Scenario(name, self.path, file, cell, tree, self.overrides, case), []
+        return Scenario(name, self.path, file, cell, tree, self.overrides, case)
+
+    def _read(self, case: str, document: Document, changed: Collection[str | int]) -> ScenarioFile | None:
+        """The file by itself. Of one that is wrong already the cases look again only at what they change."""
+        if self._wrong and isinstance(document.value, dict):
+            value = _REQUIRED | {key: value for key, value in document.value.items() if key in changed}
+            document = replace(document, value=value)
+        file, errors = read_as(document, ScenarioFile)
+        errors = [error for error in errors if not self._is_for_cases(case, error)]
+        self.note((self._told(error) for error in errors), case)
+        if not case:
+            self._wrong = [error.path for error in errors]
+        return None if self._wrong else file
 
     def _cell_and_tree(
         self, case: str, document: Document, of_cell: Sequence[Assignment]
@@ -178,6 +194,11 @@ class _Source:
                 case, check_tree_file, (tree, tree_at, id(cell)), tree, tree_at, names_of(cell) if cell else None
             )
         return cell, tree
+
+    def _told(self, error: Error) -> Finding:
+        if error.is_missing and error.path in self._varied:
+            return replace(error.finding, message=f"{error.finding.message}; vary changes only what is there")
+        return error.finding
 
     def _is_for_cases(self, case: str, error: Error) -> bool:
         """Whether the cases say more of it: of a key that stands in `vary` alone, of values that `vary` changes."""
@@ -204,7 +225,7 @@ def _of_cases(finding: Finding, cases: Sequence[str], of: int) -> Finding:
     if "" in cases or len(cases) == of:
         return finding
     more = f" and {len(cases) - 1} more" if cases[1:] else ""
-    return replace(finding, message=f"{finding.message} (case {cut(cases[0], 200)}{more})")
+    return replace(finding, message=f"{finding.message} (case {cut(cases[0], 3 * MOST)}{more})")
 
 
 def _named(document: Document, key: Literal["cell", "tree"], folder: Path) -> Path | None:
@@ -239,15 +260,15 @@ def _inconsistent(document: Document, cell: Cell) -> Iterator[Finding]:
     known = cell.known
     sockets = [s.name for s in known.sockets]
     if known.plugged_into not in sockets:
-        message = f"no socket {known.plugged_into!r}; {nearest(known.plugged_into, sockets)}"
+        message = f"no socket {quoted(known.plugged_into)}; {nearest(known.plugged_into, sockets)}"
         yield Finding(*document.place(("known", "plugged_into")), message)
     arms: list[str] = [a.name for a in known.arms]
     cameras: list[str] = [c.name for c in known.cameras]
     groups = {"sockets": (sockets, sockets), "arms": (arms, ["left", "right"]), "cameras": (cameras, ["rear", "wrist"])}
     for key, (names, needed) in groups.items():
         if sorted(names) != sorted(set(needed)):
-            message = f"{key} are {', '.join(names)}; give one each of {', '.join(sorted(set(needed)))}"
-            yield Finding(*document.place(("known", key)), message)
+            given, right = (cut(", ".join(group), 3 * MOST) for group in (names, sorted(set(needed))))
+            yield Finding(*document.place(("known", key)), f"{key} are {given}; give one each of {right}")
 
 
 def check_tree_file(path: Path, where: Place | None = None, names: Mapping[str, Collection[str]] | None = None) -> None:

@@ -74,7 +74,8 @@ def _nodes(document: Document, tree: Path | None) -> Iterator[Finding]:
     for i, _ in _faults(document):
         name = at(document.value, ("faults", i, "when", "node"))
         if tree and isinstance(name, str) and (names := _node_names(tree)) and name not in names:
-            message = f"no node {quoted(name)} in {tree.name}; {nearest(name, names)}"
+            alike = [other for other in names if ("/" in other) == ("/" in name)]
+            message = f"no node {quoted(name)} in {tree.name}; {nearest(name, alike)}"
             yield Finding(*document.place(("faults", i, "when", "node")), message)
 
 

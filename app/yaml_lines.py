@@ -18,7 +18,7 @@ MAX_DEPTH = 20
 MAX_VALUES = 20_000  # after aliases are expanded
 # What YAML 1.1 and 1.2 both read as a number, so not 010, 1_000, 1:30 or 1e3.
 _NUMBER = re.compile(r"[-+]?(0|[1-9]\d{0,18}|(0|[1-9]\d{0,18})?\.\d{0,30}([eE][-+]\d{1,3})?)")
-_LOOKS_LIKE_NUMBER = re.compile(r"([-+]?)(\d+\.?\d*|\.\d+)[eE]([-+]?)(\d+)")
+_LOOKS_LIKE_NUMBER = re.compile(r"([-+]?)(\d+(?:\.\d*)?|\.\d+)[eE]([-+]?)(\d+)")
 _TAG = "tag:yaml.org,2002:"
 _REMEDIES = {  # by a word of PyYAML's own message
     "'\\t'": "indent with spaces, not with tabs",

@@ -131,3 +131,50 @@ def test_names_are_as_many_as_combinations_and_make_folders_of_their_own(lists: 
     folders = {folder_name(name) for name in set(names)}
     assert len(folders) == len(set(names))
     assert all("/" not in f and f not in (".", "..", "") and len(f) <= 120 for f in folders)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "text", "expected"),
+    [
+        ("gravity: zero", "gravity: mars", "gravity: [zero]", ["4: gravity: no 'mars'; there are earth, zero"]),
+        ("gravity: zero", "", "gravity: [zero]", []),
+        ("gravity: zero", "", "gravity: []", ["22: vary.gravity is []; expected"]),
+        ("gravity: zero", "", "seed: [1]", ["1: key 'gravity' is missing; expected one of zero, earth"]),
+        ("tries: 4", "tries: many", "inputs.tries: [1]", ["5: inputs.tries: Retry 'again': num_failures={tries} is 'many'"]),
+        ("slips: 1", "cause: slippd", "expect.outcome: [safe_stop]", ["18: expect.cause: no 'slippd'"]),
+        ("slips: 1", "cause: arm_failed", "expect.outcome: [safe_stop]", []),
+        ("limits: {sim_seconds: 600}", "limits: 3", "limits.sim_seconds: [1]", ["15: limits is 3; expected a mapping"]),
+        ("type: jaw_opens,", "type: camera_dark,", "faults.0.camera: [rear]", ["14: key 'camera' is missing in faults.0; e"]),
+        ("gravity: zero", "gravity: 1", "seed: [1, 1e9, 2.5]", ["4: gravity is 1", "22: '1e9' is text", "22: seed is 2.5"]),
+    ],
+)  # fmt: skip
+def test_the_file_is_right_without_vary_too_but_for_keys_that_only_vary_gives(
+    scenario: Path, old: str, new: str, text: str, expected: list[str]
+) -> None:
+    vary(scenario, f"  {text}\n")
+    scenario.write_text(scenario.read_text().replace(old, new))
+    found = findings() if expected else [str(len(cases("mine.yaml")))]
+    for line, start in zip(found, expected or ["1"], strict=True):
+        assert line.removeprefix("mine.yaml:").startswith(start)
+
+
+def test_too_many_cases_hide_no_value_that_is_wrong(scenario: Path) -> None:
+    vary(scenario, "  seed: '0:9999999999'\n  gravity: [zero, mars]\n  expect.tries: [1, 200]\n")
+    assert [line.split(" (case ")[0].split("; ")[0] for line in findings()] == [
+        "mine.yaml:21: vary makes more than 10000 cases",
+        "mine.yaml:22: seed is 9999999998",
+        "mine.yaml:23: gravity: no 'mars'",
+        "mine.yaml:24: expect.tries is 200",
+    ]
+
+
+def test_a_finding_stands_at_its_own_value_and_names_the_case(scenario: Path) -> None:
+    vary(scenario, "  inputs.tries:\n    - 2\n    - three\n  seed: [1, 2]\n")
+    [finding] = findings()
+    assert finding.startswith("mine.yaml:24: inputs.tries: Retry 'again': num_failures={tries} is 'three' here")
+    assert finding.endswith("(case inputs.tries=three,seed=1 and 1 more)")
+
+
+def test_the_command_line_and_the_file_are_told_of_together(scenario: Path) -> None:
+    scenario.write_text("a: [")
+    assert [line.split(" ")[0] for line in findings("nonsense")] == ["--set:1:", "mine.yaml:1:"]
