@@ -218,8 +218,8 @@ class ScenarioFile(Model):
         Field(
             description=(
                 "Dotted keys of this file, or with cell. of the cell, each with a list of values, whole numbers 'A:B' "
-                "(B left out) or evenly spaced numbers. Every combination is a case; the first values make the default. "
-                "The file must be right without them, too; only keys at its top may stand here alone."
+                "(B left out) or evenly spaced numbers. Every combination is a case; the first values make the default."
+                " The file must be right without them, too; only keys at its top may stand here alone."
             ),
             examples=[
                 {

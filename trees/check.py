@@ -90,7 +90,7 @@ def _check_document(root: Element, trees: Mapping[str, Element]) -> Iterator[Fin
         yield root.line, "root does not state main_tree_to_execute; write the ID of the tree to run"
     elif main not in trees:
         right = nearest(main, trees) if trees else "write a BehaviorTree with this ID"
-        yield root.line, f"unknown main tree {main[:MOST_SHOWN]!r}; {right}"
+        yield root.line, f"unknown main tree {quoted(main)}; {right}"
     for tree in root.children:
         if tree.tag in ("Include", "Import"):
             yield tree.line, f"{tree.tag} is refused, a tree is one file; copy the BehaviorTree into this one"
@@ -140,7 +140,7 @@ def _check_element(element: Element, known: Mapping[str, Kind], keys: Mapping[st
         return
     if element.tag not in known:
         if right := COUNTERPARTS.get(element.tag):
-            yield element.line, f"unknown element {element.tag!r}; write {right}"
+            yield element.line, f"unknown element {quoted(element.tag)}; write {right}"
         else:
             yield element.line, unknown("element", element.tag, [*known, "SubTree"])
         return

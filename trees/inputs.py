@@ -25,7 +25,7 @@ def check_inputs(
         root = read_elements(path)
     except (OSError, TreeSyntaxError):
         return
-    trees = {tree.attributes.get("ID", ""): tree for tree in root.children}
+    trees = {tree.attributes.get("ID", ""): tree for tree in root.children if tree.tag == "BehaviorTree"}
     main = trees.get(root.attributes.get("main_tree_to_execute", ""))
     if main is None:
         return

@@ -33,10 +33,9 @@ def test_findings_in_scenarios_are_short(tmp_path: Path, monkeypatch: pytest.Mon
     scenario = write_scenario(tmp_path, monkeypatch)
     for text in replaced(SCENARIO + VARY, new)[::3]:
         scenario.write_text(text)
-        try:
+        with pytest.raises(Findings) as raised:
             cases("mine.yaml", [f"inputs.{new}=1", f"{new}=3", f"seed={new}", new])
-        except Findings as error:
-            assert [m for m in said(error) if len(m) > MOST_OF_A_MESSAGE] == []
+        assert [m for m in said(raised.value) if len(m) > MOST_OF_A_MESSAGE] == []
 
 
 @pytest.mark.parametrize("new", LONG, ids=lambda new: new[:3])
