@@ -22,7 +22,7 @@ from interfaces.quote import MOST, cut, quoted
 
 P = ParamSpec("P")
 T = TypeVar("T")
-_REQUIRED = {
+_REQUIRED = {  # right values, for a look at other keys alone
     name: field.examples[0]
     for name, field in ScenarioFile.model_fields.items()
     if field.is_required() and field.examples
