@@ -17,6 +17,7 @@ from app.progress import shown_progress
 from app.run_every import run_every
 from app.scenario_file import load_scenario
 from app.summary import summary
+from interfaces.quote import MOST, cut
 
 if TYPE_CHECKING:
     from app.record import Result
@@ -34,6 +35,9 @@ class _Group(TyperGroup):
             for finding in error.items:
                 typer.echo(str(finding), err=True)
             raise typer.Exit(EXIT_BAD_INPUT) from None
+        except typer.BadParameter as error:  # quotes all that was typed
+            error.message = cut(error.message, 3 * MOST)
+            raise
         except OSError as error:  # a disk that is full, a name that is too long
             if error.errno == errno.EPIPE:
                 raise  # typer's: the reader of a pipe has gone

@@ -5,6 +5,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
+from interfaces.quote import MOST, cut, quoted
+
+MOST_LISTED = 50  # known names after an unknown one
+
 
 @dataclass(frozen=True, order=True)
 class Finding:
@@ -34,10 +38,15 @@ def printable(text: str) -> str:
 def nearest(name: str, names: Iterable[str], what: str = "there are") -> str:
     """The words that help after an unknown name: the nearest known one, else all that exist."""
     known = sorted(names)
-    close = difflib.get_close_matches(name, known, n=1)
-    if close:
-        return f"did you mean {close[0]!r}?"
-    return f"{what} {', '.join(known)}" if known else "there are none"
+    if close := closest(name, known):
+        return f"did you mean {quoted(close)}?"
+    more = ["..."] if known[MOST_LISTED:] else []
+    return f"{what} {', '.join([*map(cut, known[:MOST_LISTED]), *more])}" if known else "there are none"
+
+
+def closest(name: str, names: Iterable[str]) -> str | None:
+    """The name that this one seems to mean."""
+    return next(iter(difflib.get_close_matches(name[:MOST], sorted(names), n=1)), None)
 
 
 def shown(path: Path) -> str:

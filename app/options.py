@@ -5,6 +5,7 @@ from typing import Annotated
 import typer
 
 from app.findings import Finding, Findings
+from interfaces.quote import quoted
 
 MOST_SEED = 2**31 - 1
 MOST_SEEDS = 10_000  # of one study
@@ -21,8 +22,8 @@ def parse_seeds(text: str) -> range:
     """The seeds of "A:B", B left out. Raises `Findings` for anything else."""
     first, _, after = text.partition(":")
     if not (first.isdecimal() and after.isdecimal() and int(first) < int(after) <= MOST_SEED):
-        message = f"{text!r} is no range of seeds; write A:B with A below B and B at most {MOST_SEED}, such as 0:20"
-        raise Findings([Finding("--seeds", 1, message)])
+        right = f"write A:B with A below B and B at most {MOST_SEED}, such as 0:20"
+        raise Findings([Finding("--seeds", 1, f"{quoted(text)} is no range of seeds; {right}")])
     seeds = range(int(first), int(after))
     if len(seeds) > MOST_SEEDS:
         raise Findings([Finding("--seeds", 1, f"{len(seeds)} seeds; ask for at most {MOST_SEEDS} in one study")])

@@ -8,6 +8,7 @@ from itertools import count
 from pathlib import Path
 
 from app.findings import Finding, shown
+from interfaces.quote import quoted
 
 FILES = ("result.json", "events.jsonl", "ticks.jsonl", "scenario.yaml", "cell.yaml", "tree.xml")  # of a run's folder
 
@@ -43,9 +44,9 @@ def unwritable(out: Path) -> list[Finding]:
     while not os.path.lexists(spot) and spot != spot.parent:
         spot = spot.parent
     if not os.path.isdir(spot):
-        return [Finding(shown(out), 1, f"{shown(spot)!r} is no folder; name another place")]
+        return [Finding(shown(out), 1, f"{quoted(shown(spot))} is no folder; name another place")]
     try:
         with tempfile.TemporaryFile(dir=spot):
             return []
     except OSError as error:
-        return [Finding(shown(out), 1, f"cannot write in {shown(spot)!r} ({error.strerror}); name another place")]
+        return [Finding(shown(out), 1, f"cannot write in {quoted(shown(spot))} ({error.strerror}); name another place")]

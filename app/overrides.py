@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from app.findings import Finding, Findings
 from app.yaml_lines import Document, Path, Place, Value, parse
+from interfaces.quote import cut, quoted
 
 SOURCE = "--set"  # the file name of a finding in an override; its line is the override's number, from 1
 
@@ -19,6 +20,20 @@ class Assignment:
     told: str
     place: Place
 
+    @property
+    def path(self) -> Path:
+        """Where in the file the value goes."""
+        return path_of(self.key)
+
+
+def path_of(key: str) -> Path:
+    """The path that a dotted key means."""
+    return tuple(int(step) if _is_index(step) else step for step in key.split("."))
+
+
+def _is_index(step: str) -> bool:
+    return step.isdecimal() and len(step) < 10
+
 
 def read(overrides: Sequence[str]) -> tuple[list[Assignment], list[Finding]]:
     """The assignments of "key.path=value" texts, values in YAML, and the findings of those that are none."""
@@ -26,7 +41,7 @@ def read(overrides: Sequence[str]) -> tuple[list[Assignment], list[Finding]]:
     for number, text in enumerate(overrides, 1):
         key, equals, value = text.partition("=")
         if not equals or not all(key.strip().split(".")):
-            message = f"{text!r}: no key with a value; write key.path=value, such as gravity=earth"
+            message = f"{quoted(text)}: no key with a value; write key.path=value, such as gravity=earth"
             findings.append(Finding(SOURCE, number, message))
             continue
         try:
@@ -36,7 +51,7 @@ def read(overrides: Sequence[str]) -> tuple[list[Assignment], list[Finding]]:
             continue
         findings += new.findings
         if not new.findings:
-            assignments.append(Assignment(key.strip(), new, repr(text), (SOURCE, number)))
+            assignments.append(Assignment(key.strip(), new, quoted(text), (SOURCE, number)))
     return assignments, findings
 
 
@@ -63,6 +78,7 @@ def _apply_one(document: Document, assignment: Assignment) -> None:
     for length in range(1, len(path)):
         document.places.setdefault(path[:length], assignment.place)  # a mapping made on the way
     document.places.update({path + below: place for below, place in assignment.new.places.items()})
+    document.unread |= {path + below for below in assignment.new.unread}
 
 
 def _steps(key: str) -> list[str]:
@@ -88,20 +104,20 @@ def _put(document: Document, keys: list[str], value: Value) -> Path:
             if last:
                 spot[key] = value
             elif spot.get(key) is None:
-                if keys[i + 1].isdecimal():
+                if _is_index(keys[i + 1]):
                     raise LookupError(_no_items(path))
                 spot[key] = {}
             spot = spot[key]
         else:
-            raise LookupError(f"{_dotted(path)} is a single value; it has no {key!r}")
+            raise LookupError(f"{_dotted(path)} is a single value; it has no {quoted(key)}")
     return path
 
 
 def _index(items: list[Value], key: str, path: Path) -> int:
     if not items:
         raise LookupError(_no_items(path))
-    if not key.isdecimal() or int(key) >= len(items):
-        raise LookupError(f"no item {key!r} in {_dotted(path)}; give a number from 0 to {len(items) - 1}")
+    if not _is_index(key) or int(key) >= len(items):
+        raise LookupError(f"no item {quoted(key)} in {_dotted(path)}; give a number from 0 to {len(items) - 1}")
     return int(key)
 
 
@@ -110,4 +126,4 @@ def _no_items(path: Path) -> str:
 
 
 def _dotted(path: Path) -> str:
-    return ".".join(map(str, path)) or "the file"
+    return cut(".".join(map(str, path))) or "the file"

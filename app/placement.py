@@ -1,43 +1,63 @@
 """Whether an obstacle, wherever its jitter puts it, stands in something else."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import TypeAdapter
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from app.findings import Finding, Findings
-from app.scenario_schema import ObstacleSpec
-from app.yaml_lines import Document
+from app.scenario_schema import Jitter, ObstacleSize, Yaw
+from app.schema import part
+from app.yaml_lines import Document, Path
 from interfaces.cell import ArmSpec, FixedMount, KnownCell, Size, Vector, pose_along
+from interfaces.quote import cut, quoted
 
 FloatArray = NDArray[np.float64]
 # The ViperX 300 S's base, rtb-data's mesh VXSA-300-M-1-Base: centre from the arm's base, and full size, metres.
 _BASE_CENTER = np.array([-0.0475, 0.0, 0.0394])
 _BASE_SIZE = (0.300, 0.204, 0.0787)
 TOUCHING = 1e-6  # metres of overlap that are rounding
+_LIST, _TEXT, _YAW = TypeAdapter(list[Any]), TypeAdapter(str), TypeAdapter[float](Yaw)
+_SIZE, _JITTER, _POINT = TypeAdapter[Size](ObstacleSize), TypeAdapter[Vector](Jitter), TypeAdapter[Vector](Vector)
 
 
-def misplaced(document: Document, obstacles: Sequence[ObstacleSpec], cell: KnownCell) -> None:
-    """Raises `Findings`: obstacles that share a name, reach below the floor or stand in a piece of the cell."""
-    if found := list(_misplaced(document, obstacles, cell)):
+def misplaced(document: Document, cell: KnownCell | None) -> None:
+    """Raises `Findings`: obstacles that share a name, reach below the floor or stand in a piece of the cell.
+
+    Of an obstacle of which some value is wrong, which is a finding elsewhere, only what the others show.
+    """
+    if found := list(_misplaced(document, cell)):
         raise Findings(found)
 
 
-def _misplaced(document: Document, obstacles: Sequence[ObstacleSpec], cell: KnownCell) -> Iterator[Finding]:
-    names = [o.name for o in obstacles]
-    for i, obstacle in enumerate(obstacles):
-        if names.index(obstacle.name) < i:
-            yield Finding(*document.place(("obstacles", i, "name")), f"two obstacles {obstacle.name!r}; rename one")
-        for gravity, (x, y, bottom) in (("zero", obstacle.position.zero), ("earth", obstacle.position.earth)):
-            place = document.place(("obstacles", i, "position", gravity))
-            if bottom - obstacle.jitter[2] < -TOUCHING:
-                deep = obstacle.jitter[2] - bottom
-                yield Finding(*place, f"obstacle {obstacle.name!r} reaches {deep:.3f} m below the floor; raise it to 0")
-            center = np.array([x, y, bottom + 0.5 * obstacle.size[2]])
-            for name, depth in overlaps(cell, center, obstacle.size, obstacle.yaw_deg, obstacle.jitter):
-                message = f"obstacle {obstacle.name!r} reaches {depth:.3f} m into {name}; move it, or jitter it less"
-                yield Finding(*place, message)
+def _misplaced(document: Document, cell: KnownCell | None) -> Iterator[Finding]:
+    obstacles = part(document, ("obstacles",), _LIST)
+    seen = set()
+    for i in range(len(obstacles or [])):
+        here: Path = ("obstacles", i)
+        name = part(document, (*here, "name"), _TEXT)
+        if name is not None and name in seen:
+            yield Finding(*document.place((*here, "name")), f"two obstacles {quoted(name)}; rename one")
+        seen.add(name)
+        size = part(document, (*here, "size"), _SIZE)
+        yaw_deg = part(document, (*here, "yaw_deg"), _YAW, 0.0)
+        jitter = part(document, (*here, "jitter"), _JITTER) or (0.0, 0.0, 0.0)  # of a wrong one nobody knows
+        for gravity in ("zero", "earth"):
+            path = (*here, "position", gravity)
+            if (spot := part(document, path, _POINT)) is None:
+                continue
+            who = "obstacle" + (f" {quoted(name)}" if name is not None else "")
+            place = document.place(path)
+            if (deep := jitter[2] - spot[2]) > TOUCHING:
+                yield Finding(*place, f"{who} reaches {deep:.3f} m below the floor; raise it to 0")
+            if size is None or yaw_deg is None or cell is None:
+                continue
+            center = np.array([*spot[:2], spot[2] + 0.5 * size[2]])
+            for piece, depth in overlaps(cell, center, size, yaw_deg, jitter):
+                yield Finding(*place, f"{who} reaches {depth:.3f} m into {cut(piece)}; move it, or jitter it less")
 
 
 def overlaps(

@@ -56,7 +56,11 @@ def pytest_configure(config: pytest.Config) -> None:
     """Refuse wrong options before anything is collected."""
     seed, records = config.getoption("--scenario-seed"), config.getoption("--scenario-records")
     if seed is not None and not re.fullmatch(r"\d+(:\d+)?", seed):
-        raise pytest.UsageError(f"--scenario-seed {seed!r} is no seed; write a whole number, or a range such as 0:5")
+        from interfaces.quote import quoted
+
+        raise pytest.UsageError(
+            f"--scenario-seed {quoted(seed)} is no seed; write a whole number, or a range such as 0:5"
+        )
     if records is not None:
         from app.output import findings
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Literal
 
 from app.findings import Finding, Findings, nearest, shown
+from interfaces.quote import cut, quoted
 
 Kind = Literal["scenario", "cell", "tree"]
 _SUFFIX: dict[Kind, str] = {"scenario": ".yaml", "cell": ".yaml", "tree": ".xml"}
@@ -34,9 +35,9 @@ def resolve(kind: Kind, name: str, beside: Path, where: tuple[str, int] | None =
         return path
     if name in known:
         return known[name]
-    name = name if len(name) <= 80 else name[:77] + "..."
+    name = cut(name)
     what = "a folder" if os.path.isdir(path) else f"no {_SUFFIX[kind]} file" if os.path.exists(path) else ""
-    wrong = f"{name!r} is {what}" if name and what else f"no {kind} named {name!r}"
+    wrong = f"{quoted(name)} is {what}" if name and what else f"no {kind} named {quoted(name)}"
     hint = nearest(name, known, "the shipped ones are")
     raise Findings([Finding(*(where or (name, 1)), f"{wrong}; {hint} (a path ends in {_SUFFIX[kind]})")])
 
@@ -46,12 +47,12 @@ def read_text(path: Path, where: tuple[str, int] | None = None) -> str:
     source, line = where or (shown(path), 1)
     if not os.path.isfile(path):
         wrong = "is a folder" if os.path.isdir(path) else "does not exist" if not os.path.exists(path) else "is no file"
-        raise Findings([Finding(source, line, f"{shown(path)!r} {wrong}; name a file")])
+        raise Findings([Finding(source, line, f"{quoted(shown(path))} {wrong}; name a file")])
     try:
         with path.open("rb") as stream:
             data = stream.read(MAX_BYTES + 1)
     except OSError as error:
-        raise Findings([Finding(source, line, f"cannot read {shown(path)!r}: {error.strerror}")]) from None
+        raise Findings([Finding(source, line, f"cannot read {quoted(shown(path))}: {error.strerror}")]) from None
     if len(data) > MAX_BYTES:
         raise Findings([Finding(shown(path), 1, f"longer than {MAX_BYTES} bytes; name a file written by hand")])
     try:

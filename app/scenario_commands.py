@@ -101,7 +101,9 @@ def schema(
     To read it yourself:
       regrasp scenarios schema --markdown
     """
-    from app.scenario_schema import json_schema
+    from app.scenario_schema import ScenarioFile, json_schema
 
-    text = json_schema()
-    typer.echo(markdown(text) if as_markdown else json.dumps(text, indent=2, ensure_ascii=False))
+    if as_markdown:
+        typer.echo(markdown(ScenarioFile.model_json_schema()))
+    else:
+        typer.echo(json.dumps(json_schema(), indent=2, ensure_ascii=False))

@@ -1,6 +1,6 @@
 """Scenario files: which cell, which tree, what goes wrong, and what must come out."""
 
-from collections.abc import Callable, Collection, Hashable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -8,17 +8,25 @@ from typing import Any, Literal, ParamSpec, TypeVar
 
 from app import vary
 from app.findings import Finding, Findings, nearest, shown
-from app.overrides import Assignment, apply, read
+from app.overrides import Assignment, apply, path_of, read
 from app.placement import misplaced
 from app.resources import read_text, resolve
-from app.scenario_schema import ScenarioFile, TreeInput
-from app.schema import validated
+from app.scenario_parts import check_inputs, check_names, names_of, tree_text
+from app.scenario_schema import ScenarioFile
+from app.schema import Error, read_as, validated
+from app.schema_nodes import at
 from app.yaml_lines import Document, Place, parse
+from app.yaml_lines import Path as KeyPath
 from interfaces.cell import Cell
-from interfaces.fault import ObstacleMovesIn
+from interfaces.quote import MOST, cut, quoted
 
 P = ParamSpec("P")
 T = TypeVar("T")
+_REQUIRED = {  # right values, for a look at other keys alone
+    name: field.examples[0]
+    for name, field in ScenarioFile.model_fields.items()
+    if field.is_required() and field.examples
+}
 
 
 @dataclass(frozen=True)
@@ -63,7 +71,7 @@ def load_scenario(name_or_path: str, overrides: Sequence[str] = (), case: str | 
     source = _Source(name_or_path, overrides)
     names = [name for name, _ in source.cases]
     if case is not None and case not in names and not source.found:
-        source.found[Finding("--case", 1, f"no case {case!r}; {nearest(case, names)}")] = ""
+        source.note([Finding("--case", 1, f"no case {quoted(case)}; {nearest(case, names)}")])
     wanted = names.index(case) if case in names else 0
     return source.checked(source.cases[wanted : wanted + 1])[0]
 
@@ -88,79 +96,141 @@ def case_names(name_or_path: str, overrides: Sequence[str] = ()) -> list[str]:
 class _Source:
     """A scenario's file, its cases, and what was found wrong so far.
 
-    What cases share (a cell, a tree, where the obstacles stand) is read and checked once.
+    The file must be right also without its `vary`, but for keys that only `vary` gives. What cases share (a cell, a
+    tree, where the obstacles stand) is read and checked once.
     """
 
     def __init__(self, name_or_path: str, overrides: Sequence[str]) -> None:
-        self.found: dict[Finding, str] = {}  # with the case that showed it first, '' for the file itself
-        self._done: dict[Hashable, Any] = {}
-        self.path = resolve("scenario", name_or_path, Path())
+        self.found: dict[Finding, dict[str, None]] = {}  # with the cases that show it, '' for the file itself
+        self._wrong: list[KeyPath] = []  # where the file itself is wrong
+        self._done: dict[Hashable, tuple[Any, list[Finding]]] = {}
         self.overrides = tuple(overrides)
-        self._document = parse(read_text(self.path), shown(self.path))
         assignments, wrong = read(overrides)
-        self.found |= dict.fromkeys(wrong, "")
+        self.note(wrong)
+        try:
+            self.path = resolve("scenario", name_or_path, Path())
+            self._document = parse(read_text(self.path), shown(self.path))
+        except Findings as error:
+            raise Findings([*wrong, *error.items]) from None
+        self.note(self._document.findings)
+        _, errors = read_as(self._document, ScenarioFile)  # gives misspelt keys their right names
+        self.note(error.finding for error in errors if error.is_misspelt)
         of_vary = [a for a in assignments if f"{a.key}.".startswith("vary.")]
         self._fixed = [a for a in assignments if a not in of_vary]
-        self._attempt("", apply, self._document, of_vary)
-        axes = self._attempt("", vary.axes, self._document, self._fixed)
-        self.cases = list(vary.expand(axes or []))
+        self.note(_attempt(apply, self._document, of_vary)[1])
+        axes, wrong = vary.axes(self._document, self._fixed)
+        self.note(wrong)
+        self.cases = list(vary.expand(axes))
+        self._varied = [path_of(key) for key in vary.keys(self._document)]
         if isinstance(self._document.value, dict):
             self._document.value.pop("vary", None)
 
+    def note(self, findings: Iterable[Finding], case: str = "") -> None:
+        """Add what a case shows, or the file itself."""
+        for finding in findings:
+            self.found.setdefault(finding, {})[case] = None
+
     def checked(self, chosen: Sequence[tuple[str, list[Assignment]]]) -> list[Scenario]:
-        """The scenarios of these cases. Raises `Findings`; one that the first of them has not names its case."""
-        made = [self._scenario(*case) for case in chosen]
+        """The scenarios of these cases. Raises `Findings`; one that only some of them show names the first."""
+        self._scenario("", [a for a in self._fixed if not any(_holds(k, a.path) for k in self._varied)])
+        wrong, made = self._wrong, []
+        for name, given in chosen:
+            placed = [a for a in given if not any(_holds(path, a.path) and path != a.path for path in wrong)]
+            made.append(self._scenario(name, [*placed, *self._fixed]))
         if self.found:
-            shared = ("", chosen[0][0])
-            raise Findings(f if case in shared else _of_case(f, case) for f, case in self.found.items())
+            raise Findings(_of_cases(finding, list(where), len(chosen)) for finding, where in self.found.items())
         return [scenario for scenario in made if scenario]
 
-    def _attempt(self, case: str, make: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T | None:
-        """What `make` returns; None when it raises findings, which are noted."""
-        try:
-            return make(*args, **kwargs)
-        except Findings as error:
-            for finding in error.items:
-                self.found.setdefault(finding, case)
-            return None
-
     def _once(self, case: str, make: Callable[..., T], key: Hashable, *args: Any) -> T | None:
-        """As `_attempt`, but only for the first case with this key; the others get the same."""
+        """What `make` returns, and for the case its findings; called for the first case with this key only."""
         if (make, key) not in self._done:
-            self._done[make, key] = self._attempt(case, make, *args)
-        done: T | None = self._done[make, key]
+            self._done[make, key] = _attempt(make, *args)
+        done: T | None
+        done, findings = self._done[make, key]
+        self.note(findings, case)
         return done
 
     def _scenario(self, case: str, assignments: Sequence[Assignment]) -> Scenario | None:
+        """The file with values laid over it; None where it is wrong."""
         given = self._document
-        document = Document(deepcopy(given.value), dict(given.places), given.findings, set(given.unread))
-        every = [*assignments, *self._fixed]
-        of_cell = [replace(a, key=a.key[5:]) for a in every if a.key.startswith("cell.")]
-        self._attempt(case, apply, document, [a for a in every if not a.key.startswith("cell.")])
-        file = self._attempt(case, validated, document, ScenarioFile)
-        names = document.value if isinstance(document.value, dict) else {}
-        laid = repr([(a.key, a.new.value) for a in of_cell])
-        cell = self._once(case, _cell, (repr(names.get("cell")), laid), document, self.path.parent, of_cell)
-        tree = self._once(case, _tree, (repr(names.get("tree")), id(cell)), document, self.path.parent, cell)
-        if file and cell:
-            self._once(case, misplaced, (file.obstacles, id(cell)), document, file.obstacles, cell.known)
-        if file and tree:
-            self._once(case, _check_names, (tree, file.faults, file.obstacles), document, file, tree)
-        if file and tree and cell:
-            self._once(case, _check_inputs, (tree, repr(file.inputs), id(cell)), document, tree, file, cell)
+        document = Document(deepcopy(given.value), dict(given.places), unread=set(given.unread))
+        of_cell = [replace(a, key=a.key[5:]) for a in assignments if a.key.startswith("cell.")]
+        self.note(_attempt(apply, document, [a for a in assignments if not a.key.startswith("cell.")])[1], case)
+        file = self._read(case, document, {a.path[0] for a in assignments})
+        cell, tree = self._cell_and_tree(case, document, of_cell)
+        inputs, obstacles, faults = (repr(at(document.value, (key,))) for key in ("inputs", "obstacles", "faults"))
+        self._once(case, check_inputs, (tree, inputs, id(cell)), document, tree, cell)
+        self._once(case, check_names, (tree, obstacles, faults), document, tree)
+        self._once(case, misplaced, (obstacles, id(cell)), document, cell.known if cell else None)
         if not (file and cell and tree):
             return None
         name = self.path.name.removesuffix(".yaml").removesuffix(".scenario")
         return Scenario(name, self.path, file, cell, tree, self.overrides, case)
 
+    def _read(self, case: str, document: Document, changed: Collection[str | int]) -> ScenarioFile | None:
+        """The file by itself. Of one that is wrong already the cases look again only at what they change."""
+        if self._wrong and isinstance(document.value, dict):
+            value = _REQUIRED | {key: value for key, value in document.value.items() if key in changed}
+            document = replace(document, value=value)
+        file, errors = read_as(document, ScenarioFile)
+        errors = [error for error in errors if not self._is_for_cases(case, error)]
+        self.note((self._told(error) for error in errors), case)
+        if not case:
+            self._wrong = [error.path for error in errors]
+        return None if self._wrong else file
 
-def _of_case(finding: Finding, case: str) -> Finding:
-    return replace(finding, message=f"{finding.message} (case {case})")
+    def _cell_and_tree(
+        self, case: str, document: Document, of_cell: Sequence[Assignment]
+    ) -> tuple[Cell | None, Path | None]:
+        """The cell with these values, and the tree's file; None for what cannot be read."""
+        folder = self.path.parent
+        cell_at, tree_at = (document.place((key,)) for key in ("cell", "tree"))
+        laid = repr([(a.key, a.new.value, a.place) for a in of_cell])
+        cell = self._once(case, _cell, (repr(at(document.value, ("cell",))), cell_at, laid), document, folder, of_cell)
+        name = repr(at(document.value, ("tree",)))
+        tree = self._once(case, _named, (name, tree_at), document, "tree", folder)
+        if tree:
+            self._once(
+                case, check_tree_file, (tree, tree_at, id(cell)), tree, tree_at, names_of(cell) if cell else None
+            )
+        return cell, tree
+
+    def _told(self, error: Error) -> Finding:
+        if error.is_missing and error.path in self._varied:
+            return replace(error.finding, message=f"{error.finding.message}; vary changes only what is there")
+        return error.finding
+
+    def _is_for_cases(self, case: str, error: Error) -> bool:
+        """Whether the cases say more of it: of a key that stands in `vary` alone, of values that `vary` changes."""
+        if error.is_missing and len(error.path) == 1:
+            return error.path in self._varied
+        return error.is_of_several and case == "" and any(_holds(error.path, key) for key in self._varied)
+
+
+def _attempt(make: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> tuple[T | None, list[Finding]]:
+    """What `make` returns, or the findings that it raises."""
+    try:
+        return make(*args, **kwargs), []
+    except Findings as error:
+        return None, error.items
+
+
+def _holds(outer: KeyPath, inner: KeyPath) -> bool:
+    """Whether one path is the other, or leads to it."""
+    return inner[: len(outer)] == outer
+
+
+def _of_cases(finding: Finding, cases: Sequence[str], of: int) -> Finding:
+    """The finding with the first of the cases that show it, if not all do."""
+    if "" in cases or len(cases) == of:
+        return finding
+    more = f" and {len(cases) - 1} more" if cases[1:] else ""
+    return replace(finding, message=f"{finding.message} (case {cut(cases[0], 3 * MOST)}{more})")
 
 
 def _named(document: Document, key: Literal["cell", "tree"], folder: Path) -> Path | None:
     """The file that the scenario names under `key`; None when the check of the scenario has found no name there."""
-    name = document.value.get(key) if isinstance(document.value, dict) else None
+    name = at(document.value, (key,))
     return resolve(key, name, folder, document.place((key,))) if isinstance(name, str) else None
 
 
@@ -169,44 +239,18 @@ def _cell(document: Document, folder: Path, assignments: Sequence[Assignment]) -
     return load_cell(path, assignments, document.place(("cell",))) if path else None
 
 
-def _tree(document: Document, folder: Path, cell: Cell | None) -> Path | None:
-    path = _named(document, "tree", folder)
-    if path is not None:
-        check_tree_file(path, document.place(("tree",)), _names(cell) if cell else None)
-    return path
-
-
-def _names(cell: Cell) -> dict[str, list[str]]:
-    """What a tree may name of the cell, by kind."""
-    return {"socket": [socket.name for socket in cell.known.sockets]}
-
-
-def _check_inputs(document: Document, tree: Path, file: ScenarioFile, cell: Cell) -> None:
-    from trees import check_inputs  # late, as below
-
-    given = {key: tree_text(value) for key, value in file.inputs.items()}
-    if found := [
-        Finding(*document.place(("inputs", key)), f"inputs.{key}: {message}")
-        for key, message in check_inputs(tree, given, names=_names(cell))
-    ]:
-        raise Findings(found)
-
-
-def tree_text(value: TreeInput) -> str:
-    """An input's value as a tree file would state it."""
-    return str(value).lower() if isinstance(value, bool) else str(value)
-
-
 def load_cell(path: Path, assignments: Sequence[Assignment] = (), where: Place | None = None) -> Cell:
     """Read and check a cell file with values laid over it.
 
     Raises `Findings`, at `where` (the place that names the cell) when there is no such file.
     """
     document = parse(read_text(path, where), shown(path))
-    apply(document, assignments)
-    cell = validated(document, Cell)
-    found = list(_inconsistent(document, cell))
-    if found:
+    _, found = _attempt(apply, document, assignments)
+    cell, wrong = _attempt(validated, document, Cell)
+    found += wrong
+    if cell:
+        found += _inconsistent(document, cell)
+    if found or not cell:
         raise Findings(found)
     return cell
 
@@ -216,15 +260,15 @@ def _inconsistent(document: Document, cell: Cell) -> Iterator[Finding]:
     known = cell.known
     sockets = [s.name for s in known.sockets]
     if known.plugged_into not in sockets:
-        message = f"no socket {known.plugged_into!r}; {nearest(known.plugged_into, sockets)}"
+        message = f"no socket {quoted(known.plugged_into)}; {nearest(known.plugged_into, sockets)}"
         yield Finding(*document.place(("known", "plugged_into")), message)
     arms: list[str] = [a.name for a in known.arms]
     cameras: list[str] = [c.name for c in known.cameras]
     groups = {"sockets": (sockets, sockets), "arms": (arms, ["left", "right"]), "cameras": (cameras, ["rear", "wrist"])}
     for key, (names, needed) in groups.items():
         if sorted(names) != sorted(set(needed)):
-            message = f"{key} are {', '.join(names)}; give one each of {', '.join(sorted(set(needed)))}"
-            yield Finding(*document.place(("known", key)), message)
+            given, right = (cut(", ".join(group), 3 * MOST) for group in (names, sorted(set(needed))))
+            yield Finding(*document.place(("known", key)), f"{key} are {given}; give one each of {right}")
 
 
 def check_tree_file(path: Path, where: Place | None = None, names: Mapping[str, Collection[str]] | None = None) -> None:
@@ -244,27 +288,3 @@ def description(path: Path) -> str:
     """The sentence that a scenario file gives of itself, without a check of the rest."""
     value = parse(read_text(path), shown(path)).value
     return str(value.get("description", "")) if isinstance(value, dict) else ""
-
-
-def _check_names(document: Document, file: ScenarioFile, tree: Path) -> None:
-    """Raises `Findings` for obstacles and nodes of the tree that faults name and that are not there."""
-    found = []
-    obstacles = [o.name for o in file.obstacles]
-    for i, fault in enumerate(file.faults):
-        if isinstance(fault, ObstacleMovesIn) and fault.obstacle not in obstacles:
-            message = f"no obstacle {fault.obstacle!r}; {nearest(fault.obstacle, obstacles)}"
-            found.append(Finding(*document.place(("faults", i, "obstacle")), message))
-        if fault.when.node is not None and fault.when.node not in (names := _node_names(tree)):
-            message = f"no node {fault.when.node!r} in {tree.name}; {nearest(fault.when.node, names)}"
-            found.append(Finding(*document.place(("faults", i, "when", "node")), message))
-    if found:
-        raise Findings(found)
-
-
-def _node_names(tree: Path) -> set[str]:
-    """Every way to name a node of the tree: its path, and the last names of it."""
-    from behaviors import LEAVES
-    from trees import load_tree, node_paths
-
-    steps = [path.split("/") for path in node_paths(load_tree(tree, LEAVES)).values()]
-    return {"/".join(names[i:]) for names in steps for i in range(len(names))}

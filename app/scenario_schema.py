@@ -12,7 +12,10 @@ from interfaces.scene import Gravity
 
 Outcome = Literal["stowed", "safe_stop"]
 Edge = Annotated[float, Field(gt=0, le=3)]  # metres
+ObstacleSize = tuple[Edge, Edge, Edge]
 Reach = Annotated[float, Field(ge=0, le=1)]  # metres
+Jitter = tuple[Reach, Reach, Reach]
+Yaw = Annotated[float, Field(ge=-360, le=360)]
 
 
 def _in_order(text: str) -> str:
@@ -31,7 +34,7 @@ class Steps(Model):
 
 
 Listed = Annotated[tuple[JsonValue, ...], Field(min_length=1)]
-WholeNumbers = Annotated[str, Field(pattern=r"^\d{1,10}:\d{1,10}$", examples=["0:5"]), AfterValidator(_in_order)]
+WholeNumbers = Annotated[str, Field(pattern=r"^[0-9]{1,10}:[0-9]{1,10}$", examples=["0:5"]), AfterValidator(_in_order)]
 Vary = dict[str, Listed | WholeNumbers | Steps]
 
 
@@ -47,7 +50,7 @@ class ObstacleSpec(Model):
 
     name: Annotated[str, Field(description="What messages and records call it.", examples=["short"])]
     size: Annotated[
-        tuple[Edge, Edge, Edge],
+        ObstacleSize,
         Field(description="Edges along x, y, z before it is turned, in metres.", examples=[[0.08, 0.12, 0.18]]),
     ]
     color: Annotated[Color, Field(description="Red, green, blue, each 0 to 1.", examples=[[0.45, 0.2, 0.6]])] = (
@@ -62,11 +65,9 @@ class ObstacleSpec(Model):
             examples=[{"zero": [0.22, 0.12, 0.1], "earth": [0.22, 0.11, 0.0]}],
         ),
     ]
-    yaw_deg: Annotated[float, Field(ge=-360, le=360, description="Turned left by so many degrees.", examples=[30])] = (
-        0.0
-    )
+    yaw_deg: Annotated[Yaw, Field(description="Turned left by so many degrees.", examples=[30])] = 0.0
     jitter: Annotated[
-        tuple[Reach, Reach, Reach],
+        Jitter,
         Field(
             description="The seed moves it by up to so many metres along x, y, z, to both sides, uniformly.",
             examples=[[0.004, 0.006, 0.0]],
@@ -218,6 +219,7 @@ class ScenarioFile(Model):
             description=(
                 "Dotted keys of this file, or with cell. of the cell, each with a list of values, whole numbers 'A:B' "
                 "(B left out) or evenly spaced numbers. Every combination is a case; the first values make the default."
+                " The file must be right without them, too; only keys at its top may stand here alone."
             ),
             examples=[
                 {
@@ -232,4 +234,8 @@ class ScenarioFile(Model):
 
 def json_schema() -> dict[str, Any]:
     """The schema of scenario files as JSON Schema, draft 2020-12."""
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **ScenarioFile.model_json_schema()}
+    schema = ScenarioFile.model_json_schema()
+    required = [{"required": [key]} for key in schema.pop("required")]
+    varied = [{"required": ["vary"], "properties": {"vary": key}} for key in required]
+    either = [{"anyOf": [here, there]} for here, there in zip(required, varied, strict=True)]
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema, "allOf": either}

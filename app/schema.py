@@ -1,18 +1,21 @@
 """Plain values against a pydantic model, with pydantic's errors told as findings at file and line."""
 
 import json
-from collections import defaultdict
-from collections.abc import Sequence
-from typing import Any, TypeVar
+from functools import cache
+from typing import NamedTuple, TypeVar
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, TypeAdapter, ValidationError
 from pydantic_core import ErrorDetails
 
 from app.findings import Finding, Findings, nearest
-from app.yaml_lines import Document, Path, Value
+from app.model_errors import TAG_ERRORS, misspelt, model_errors
+from app.schema_nodes import Schema, child, nodes_at
+from app.yaml_lines import Document, Path
+from interfaces.quote import cut, quoted
 
 M = TypeVar("M", bound=BaseModel)
-Schema = dict[str, Any]  # a node of the model's JSON schema
+T = TypeVar("T")
+MOST_ROUNDS = 6  # one brings out what is misspelt inside a misspelt key, and files of ours nest no deeper
 
 _METRES = "metres, such as 0.3"
 _LENGTHS = "size position zero earth jitter center seat base offset anchor length radius depth capture_distance"
@@ -40,18 +43,73 @@ _UNITS = dict.fromkeys(_LENGTHS.split(), _METRES) | {  # by the name of the key 
 }
 
 
-def validated(document: Document, model: type[M]) -> M:
-    """The model's instance. Raises `Findings` with every error; strict: text is never taken for a number."""
-    found = list(document.findings)
+class Error(NamedTuple):
+    """What is wrong with the value at `path`, and in which way."""
+
+    path: Path
+    finding: Finding
+    is_misspelt: bool = False  # a key that got its right name
+    is_missing: bool = False
+    is_of_several: bool = False  # of a mapping's values together, each right alone
+
+
+@cache
+def _schema(model: type[BaseModel]) -> Schema:
+    return model.model_json_schema()
+
+
+def read_as(document: Document, model: type[M]) -> tuple[M | None, list[Error]]:
+    """The model's instance, or every error; strict: text is never taken for a number.
+
+    A misspelt key gets its right name in `document`: what is below it is looked at, too. Of what the document itself
+    could not read, which is among its own findings, nothing is said.
+    """
     try:
-        made = model.model_validate_json(json.dumps(document.value), strict=True)
-    except ValidationError as error:
-        root = model.model_json_schema()
-        errors = _best_branches(document.value, error.errors())
-        found += [_finding(document, root, path, e) for path, e in errors if path not in document.unread]
-    if found:
-        raise Findings(found)
+        return model.model_validate_json(json.dumps(document.value), strict=True), []
+    except ValidationError:
+        root = _schema(model)
+    errors, respelt = _respell(document, model, root)
+    for error in model_errors(document.value, model, root):
+        if error.path not in document.unread and error.path not in respelt:
+            finding, is_missing = _finding(document, root, *error), error.details["type"] == "missing"
+            errors.append(Error(error.path, finding, is_missing=is_missing, is_of_several=error.is_of_several))
+    return None, errors
+
+
+def _respell(document: Document, model: type[M], root: Schema) -> tuple[list[Error], set[Path]]:
+    """Give misspelt keys their right names: an error each, and their new paths."""
+    errors: list[Error] = []
+    respelt: set[Path] = set()
+    for _ in range(MOST_ROUNDS):
+        for path, right in list(misspelt(document.value, model, root)):
+            new = (*path[:-1], right)
+            if new not in respelt:
+                message = f"unknown key {quoted(path[-1])}; did you mean {right!r}?"
+                errors.append(Error(path, Finding(*document.place(path), message), is_misspelt=True))
+                document.rename(path, right)
+                respelt.add(new)
+    return errors, respelt
+
+
+def validated(document: Document, model: type[M]) -> M:
+    """The model's instance. Raises `Findings` with every error."""
+    made, errors = read_as(document, model)
+    if made is None or document.findings:
+        raise Findings([*document.findings, *(error.finding for error in errors)])
     return made
+
+
+def part(document: Document, path: Path, kind: TypeAdapter[T], default: T | None = None) -> T | None:
+    """What stands at `path`; `default` where nothing does, None where it is not of this kind."""
+    value = document.value
+    for step in path:
+        held, value = child(value, step)
+        if not held:
+            return default
+    try:
+        return kind.validate_json(json.dumps(value), strict=True)
+    except ValidationError:
+        return None
 
 
 def unit(key: str) -> str:
@@ -59,117 +117,44 @@ def unit(key: str) -> str:
     return _UNITS.get(key, "").partition(",")[0]
 
 
-def _child(value: Value, step: str | int) -> tuple[bool, Value]:
-    """Whether `value` holds `step`, and what stands there."""
-    if isinstance(value, dict) and isinstance(step, str) and step in value:
-        return True, value[step]
-    if isinstance(value, list) and isinstance(step, int) and step < len(value):
-        return True, value[step]
-    return False, value
-
-
-def _split(value: Value, loc: Sequence[str | int]) -> tuple[Path, Path]:
-    """Pydantic's location as the path that the file has, and the steps it has not: union branches, missing keys."""
-    path: Path = ()
-    beside: Path = ()
-    for step in loc:
-        held, value = _child(value, step)
-        path, beside = ((*path, step), beside) if held else (path, (*beside, step))
-    return path, beside
-
-
-def _best_branches(value: Value, errors: list[ErrorDetails]) -> list[tuple[Path, ErrorDetails]]:
-    """Each error with its path in the file; of a union's branches only the one with the fewest errors, at a tie the one
-    that reads furthest."""
-    unions: dict[Path, dict[str | int, list[tuple[Path, ErrorDetails]]]] = defaultdict(lambda: defaultdict(list))
-    kept = []
-    for error in errors:
-        path, beside = _split(value, error["loc"])
-        if len(beside) > (error["type"] == "missing"):  # what is missing stands last in `beside`
-            spot = error["loc"][: error["loc"].index(beside[0])]
-            unions[spot][beside[0]].append((path, error))
-        else:
-            kept.append((path, error))
-    return kept + [e for branches in unions.values() for e in min(branches.values(), key=_badness)]
-
-
-def _badness(errors: list[tuple[Path, ErrorDetails]]) -> tuple[int, int, bool]:
-    """Lower for the branch that was meant; an error of our own validators comes only after the type was right."""
-    kinds = {error["type"] for _, error in errors}
-    return len(errors), -max(len(error["loc"]) for _, error in errors), "value_error" not in kinds
-
-
 def _finding(document: Document, root: Schema, path: Path, error: ErrorDetails) -> Finding:
-    kind, last = error["type"], error["loc"][-1:]
-    dotted = ".".join(map(str, path))
-    if kind == "missing" and isinstance(last[0], str):
-        expected = _expected(document, root, (*path, last[0]))
-        where = f" in {dotted}" if dotted else ""
-        message = f"key {last[0]!r} is missing{where}; expected {expected}"
-    elif kind in ("union_tag_invalid", "union_tag_not_found"):
-        path = (*path, error["ctx"]["discriminator"].strip("'"))
-        names = [str(schema["const"]) for schema in _at(root, path, document.value)]
-        said = f"no {error['ctx']['tag']!r}; " if "tag" in error["ctx"] else "it is missing; "
-        message = f"{'.'.join(map(str, path))}: {said}{nearest(error['ctx'].get('tag', ''), names)}"
+    kind, dotted = error["type"], _dotted(path)
+    if kind == "missing" and path[-1:] == error["loc"][-1:]:
+        where = f" in {_dotted(path[:-1])}" if path[1:] else ""
+        message = f"key {path[-1]!r} is missing{where}; expected {_expected(document, root, path)}"
+    elif kind in TAG_ERRORS:
+        names = [str(schema["const"]) for schema in nodes_at(root, path, document.value)]
+        said = f"no {quoted(error['ctx']['tag'])}; " if "tag" in error["ctx"] else "it is missing; "
+        message = f"{dotted}: {said}{nearest(error['ctx'].get('tag', ''), names)}"
     elif kind == "extra_forbidden":
-        keys = {key for schema in _at(root, path[:-1], document.value) for key in schema.get("properties", {})}
-        message = f"unknown key {str(path[-1])!r}; {nearest(str(path[-1]), keys)}"
+        keys = {key for schema in nodes_at(root, path[:-1], document.value) for key in schema.get("properties", {})}
+        message = f"unknown key {quoted(path[-1])}; {nearest(str(path[-1]), keys)}"
     elif kind == "value_error":
-        message = f"{dotted or 'the file'}: {error['msg'].removeprefix('Value error, ')}"
+        message = f"{dotted}: {error['msg'].removeprefix('Value error, ')}"
     elif kind in ("literal_error", "enum") and isinstance(error["input"], str):
-        names = [
-            name for schema in _at(root, path, document.value) for name in schema.get("enum", [schema.get("const")])
-        ]
-        message = f"{dotted}: no {error['input']!r}; {nearest(error['input'], names)}"
+        nodes = nodes_at(root, path, document.value)
+        names = [name for schema in nodes for name in schema.get("enum", [schema.get("const")])]
+        message = f"{dotted}: no {quoted(error['input'])}; {nearest(error['input'], names)}"
     else:
-        message = f"{dotted or 'the file'} is {_short(document, path)}; expected {_expected(document, root, path)}"
+        message = f"{dotted} is {_short(document, path)}; expected {_expected(document, root, path)}"
     return Finding(*document.place(path), message)
+
+
+def _dotted(path: Path) -> str:
+    return cut(".".join(map(str, path))) or "the file"
 
 
 def _short(document: Document, path: Path) -> str:
     value = document.value
     for step in path:
-        _, value = _child(value, step)
-    text = "empty" if value is None else repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."
-
-
-def _at(root: Schema, path: Path, value: Value) -> list[Schema]:
-    """The schema nodes that describe what is at `path` in `value`; several where the model has a union."""
-    nodes = alternatives(root, root)
-    for step in path:
-        nodes = _of_type(nodes, value)
-        _, value = _child(value, step)
-        below = []
-        for node in nodes:
-            if isinstance(step, int):
-                items = node.get("prefixItems", [])
-                below.append(items[step] if step < len(items) else node.get("items"))
-            else:
-                below.append(node.get("properties", {}).get(step, node.get("additionalProperties")))
-        nodes = [opened for node in below if isinstance(node, dict) for opened in alternatives(root, node)]
-    return _of_type(nodes, value)
-
-
-def _of_type(nodes: list[Schema], value: Value) -> list[Schema]:
-    """Of a union's nodes told apart by `type`, the one that the value names; all where it names none."""
-    kind = value.get("type") if isinstance(value, dict) else None
-    return [n for n in nodes if n.get("properties", {}).get("type", {}).get("const") == kind] or nodes
-
-
-def alternatives(root: Schema, node: Schema) -> list[Schema]:
-    """Follow references and unions to the nodes that say something."""
-    if "$ref" in node:
-        return alternatives(root, root["$defs"][node["$ref"].rsplit("/", 1)[1]])
-    if options := node.get("anyOf", node.get("oneOf")):
-        return [opened for option in options for opened in alternatives(root, option)]
-    return [] if node.get("type") == "null" else [node]
+        _, value = child(value, step)
+    return "empty" if value is None else quoted(value)
 
 
 def _expected(document: Document, root: Schema, path: Path) -> str:
     """What would be right at `path`, in words."""
     key = next((step for step in reversed(path) if isinstance(step, str)), "")
-    nodes = _at(root, path, document.value)
+    nodes = nodes_at(root, path, document.value)
     kinds = [node["properties"]["type"]["const"] for node in nodes if "type" in node.get("properties", {})]
     if kinds:
         return f"a mapping with type: one of {', '.join(kinds)}"

@@ -4,9 +4,9 @@ import json
 from collections.abc import Iterator
 from typing import Any
 
-from app.schema import alternatives, range_words, unit
+from app.schema import range_words, unit
+from app.schema_nodes import Schema, alternatives
 
-Schema = dict[str, Any]
 _HEADER = "| field | type | unit | default | meaning | example |\n|---|---|---|---|---|---|"
 
 

@@ -8,6 +8,7 @@ import typer
 from app.findings import Finding, Findings, nearest
 from app.resources import resolve, shipped
 from app.scenario_file import check_tree_file
+from interfaces.quote import quoted
 
 app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Look at behaviour trees.")
 
@@ -118,7 +119,7 @@ def leaves(name: Annotated[str | None, typer.Argument(help="One element, in full
 
     known = words(LEAVES)
     if name is not None and name not in known:
-        raise Findings([Finding(name, 1, f"no element {name!r}; {nearest(name, known)}")])
+        raise Findings([Finding(name, 1, f"no element {quoted(name)}; {nearest(name, known)}")])
     for tag, kind in known.items():
         if name in (None, tag):
             typer.echo("\n".join(describe(tag, kind, full=name is not None)))

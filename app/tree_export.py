@@ -10,7 +10,9 @@ from app.output import FILES
 from app.record import write_whole
 from app.record_reader import RunRecord, read_record
 from app.resources import read_text, resolve
-from app.scenario_file import check_tree_file, tree_text
+from app.scenario_file import check_tree_file
+from app.scenario_parts import tree_text
+from interfaces.quote import quoted
 from trees import Node, TreeSyntaxError, collapsed, read_graph, recorded, run_stats
 from trees.export import FORMATS, SUFFIXES, THEMES, export_tree
 
@@ -48,7 +50,7 @@ def _form(request: Request) -> str:
     found = [*_wrong_form(request.form, out)] if request.form else []
     found += [*_wrong_out(out, form)] if out else []
     if request.theme not in THEMES:
-        found.append(Finding("--theme", 1, f"no theme {request.theme!r}; {nearest(request.theme, THEMES)}"))
+        found.append(Finding("--theme", 1, f"no theme {quoted(request.theme)}; {nearest(request.theme, THEMES)}"))
     if form == "groot" and request.depth is not None:
         found.append(
             Finding("--depth", 1, "Groot2 opens whole trees only; leave --depth out, or take another --format")
@@ -69,7 +71,7 @@ def _named(out: Path) -> str:
 
 def _wrong_form(form: str, out: Path | None) -> Iterator[Finding]:
     if form not in FORMATS:
-        yield Finding("--format", 1, f"no format {form!r}; {nearest(form, FORMATS)}")
+        yield Finding("--format", 1, f"no format {quoted(form)}; {nearest(form, FORMATS)}")
     elif out and _named(out) not in ("", form):
         other = out.with_suffix(next(suffix for suffix, name in SUFFIXES.items() if name == form))
         wrong = f"is a name of {_named(out)}, not of {form}; write {shown(other)}, or leave --format out"
@@ -80,7 +82,7 @@ def _wrong_out(out: Path, form: str) -> Iterator[Finding]:
     if not form:
         yield Finding(shown(out), 1, f"the name ends in none of {', '.join(SUFFIXES)}; rename it, or name a --format")
     if out.is_dir() or not out.absolute().parent.is_dir():
-        wrong = "is a folder" if out.is_dir() else f"there is no folder {shown(out.absolute().parent)!r}"
+        wrong = "is a folder" if out.is_dir() else f"there is no folder {quoted(shown(out.absolute().parent))}"
         yield Finding(shown(out), 1, f"{wrong}; name a file in a folder that exists")
 
 
@@ -126,7 +128,7 @@ def _with_run(path: Path, record: RunRecord) -> Node:
 def _check_paths(path: Path, record: RunRecord, known: Collection[str]) -> None:
     for number, tick in enumerate(record.ticks, 1):
         if tick.path not in known:
-            wrong = f"there is no node {tick.path!r} in {shown(path)}; {nearest(tick.path, known)}"
+            wrong = f"there is no node {quoted(tick.path)} in {shown(path)}; {nearest(tick.path, known)}"
             hint = "name the tree that ran, or leave TREE out"
             raise Findings([Finding(shown(record.folder / "ticks.jsonl"), number, f"{wrong} ({hint})")])
 

@@ -9,11 +9,12 @@ from itertools import product
 import numpy as np
 from pydantic import BaseModel
 
-from app.findings import Finding, Findings
+from app.findings import Finding
 from app.overrides import Assignment
 from app.scenario_schema import Steps, Vary
-from app.schema import validated
-from app.yaml_lines import Document, Place, Value
+from app.schema import read_as
+from app.yaml_lines import Document, Path, Place, Value
+from interfaces.quote import cut
 
 MOST_CASES = 10_000
 DEFAULT = "default"  # the name of the only case where nothing varies
@@ -27,34 +28,40 @@ class _Varied(BaseModel):
 
 @dataclass(frozen=True)
 class Axis:
-    """One key that varies, its values, and where they stand."""
+    """One key that varies, and its values, which know where they stand."""
 
     key: str
-    values: Sequence[Value]
-    place: Place
+    values: Sequence[Document]
 
-    def assignment(self, value: Value) -> Assignment:
+    def assignment(self, value: Document) -> Assignment:
         """One of the values for the key."""
-        return Assignment(self.key, Document(value, {(): self.place}), f"vary: {self.key}", self.place)
+        return Assignment(self.key, value, f"vary: {cut(self.key)}", value.place(()))
 
 
-def axes(document: Document, overrides: Sequence[Assignment]) -> list[Axis]:
-    """What varies, in the file's order.
+def axes(document: Document, overrides: Sequence[Assignment]) -> tuple[list[Axis], list[Finding]]:
+    """What varies, in the file's order, as far as it is right; and what is wrong with the rest.
 
     A key that `overrides` set varies no more: it keeps that one value. One inside a value that they set is gone.
-    Raises `Findings`: no valid `vary`, a value twice, or too many cases.
     """
-    if not isinstance(document.value, dict):
-        return []
+    written = keys(document)
+    _, errors = read_as(document, _Varied)
+    wrong = {error.path[1] for error in errors if len(error.path) > 1}
+    wrong |= {path[1] for path in document.unread if path[:1] == ("vary",) and len(path) == 2}
+    good = {key: value for key, value in written.items() if key not in wrong}
     found = []
-    for key, written in validated(document, _Varied).vary.items():
+    for key, spec in _Varied.model_validate_json(json.dumps({"vary": good}), strict=True).vary.items():
         fixed = [a for a in overrides if f"{key}.".startswith(f"{a.key}.")]
         if not fixed:
-            found.append(Axis(key, _values(written), document.place(("vary", key))))
+            found.append(Axis(key, _values(document, key, spec)))
         elif fixed[-1].key == key:
-            found.append(Axis(key, [fixed[-1].new.value], fixed[-1].place))
-    _check(found, document.place(("vary",)))
-    return found
+            found.append(Axis(key, [fixed[-1].new]))
+    return found, [*(error.finding for error in errors), *_problems(found, document.place(("vary",)))]
+
+
+def keys(document: Document) -> dict[str, Value]:
+    """What stands in `vary`, right or wrong, by key."""
+    vary = document.value.get("vary") if isinstance(document.value, dict) else None
+    return vary if isinstance(vary, dict) else {}
 
 
 def count(axes: Sequence[Axis]) -> int:
@@ -63,36 +70,49 @@ def count(axes: Sequence[Axis]) -> int:
 
 
 def expand(axes: Sequence[Axis]) -> Iterator[tuple[str, list[Assignment]]]:
-    """Name and assignments of every case, the last key varying fastest."""
-    for values in product(*(axis.values for axis in axes)):
-        chosen = list(zip(axes, values, strict=True))
-        name = ",".join(f"{axis.key}={_text(value)}" for axis, value in chosen)
-        yield name or DEFAULT, [axis.assignment(value) for axis, value in chosen]
+    """Name and assignments of every case, the last key varying fastest; of too many only those with one key changed."""
+    chosen = product(*(axis.values for axis in axes)) if count(axes) <= MOST_CASES else _one_by_one(axes)
+    for values in chosen:
+        given = list(zip(axes, values, strict=True))
+        name = ",".join(f"{axis.key}={_text(value.value)}" for axis, value in given)
+        yield name or DEFAULT, [axis.assignment(value) for axis, value in given]
 
 
-def _values(written: Sequence[Value] | str | Steps) -> Sequence[Value]:
-    if isinstance(written, str):
-        return range(*map(int, written.split(":")))
-    if isinstance(written, Steps):
-        numbers = [float(f"{v:.12g}") for v in np.linspace(written.first, written.last, written.steps)]
-        return [int(v) for v in numbers] if all(v.is_integer() for v in numbers) else numbers
-    return written
+def _values(document: Document, key: str, spec: Sequence[Value] | str | Steps) -> Sequence[Document]:
+    path: Path = ("vary", key)
+    if not isinstance(spec, str | Steps):
+        return document.items(path)
+    return [Document(number, {(): document.place(path)}) for number in _numbers(spec)]
 
 
-def _check(axes: Sequence[Axis], place: Place) -> None:
+def _numbers(spec: str | Steps) -> Sequence[int] | Sequence[float]:
+    """The numbers of a range; of one that is too long as many as make too many cases, the last among them."""
+    if isinstance(spec, str):
+        whole = range(*map(int, spec.split(":")))
+        return whole if len(whole) <= MOST_CASES else [*whole[:MOST_CASES], whole[-1]]
+    numbers = [float(f"{v:.12g}") for v in np.linspace(spec.first, spec.last, spec.steps)]
+    return [int(v) for v in numbers] if all(v.is_integer() for v in numbers) else numbers
+
+
+def _one_by_one(axes: Sequence[Axis]) -> Iterator[Sequence[Document]]:
+    """The first values, and those with one other in the place of each: of a long list some from both ends."""
+    first = [axis.values[0] for axis in axes]
+    yield first
+    for i, axis in enumerate(axes):
+        for value in [*axis.values[1:50], *axis.values[50:][-50:]]:
+            yield [*first[:i], value, *first[i + 1 :]]
+
+
+def _problems(axes: Sequence[Axis], place: Place) -> Iterator[Finding]:
+    """Too many cases, or a value twice."""
     if count(axes) > MOST_CASES:
-        message = f"vary makes {count(axes)} cases; shorten a list or a range, {MOST_CASES} are the most"
-        raise Findings([Finding(*place, message)])
-    found = []
+        yield Finding(*place, f"vary makes more than {MOST_CASES} cases; shorten a list or a range")
     for axis in axes:
-        texts = [_text(value) for value in axis.values]
-        found += [
-            Finding(*axis.place, f"vary: {axis.key} takes {text} twice; keep one")
-            for i, text in enumerate(texts)
-            if text in texts[:i]
-        ]
-    if found:
-        raise Findings(found)
+        seen: set[str] = set()
+        for value in axis.values:
+            if (text := _text(value.value)) in seen:
+                yield Finding(*value.place(()), f"vary: {cut(axis.key)} takes {cut(text)} twice; keep one")
+            seen.add(text)
 
 
 def _text(value: Value) -> str:

@@ -3,10 +3,12 @@
 import math
 import re
 from dataclasses import dataclass, field
+from typing import Any
 
 import yaml
 
 from app.findings import Finding, Findings
+from interfaces.quote import MOST, cut, quoted
 
 Value = None | bool | int | float | str | list["Value"] | dict[str, "Value"]
 Path = tuple[str | int, ...]
@@ -16,7 +18,7 @@ MAX_DEPTH = 20
 MAX_VALUES = 20_000  # after aliases are expanded
 # What YAML 1.1 and 1.2 both read as a number, so not 010, 1_000, 1:30 or 1e3.
 _NUMBER = re.compile(r"[-+]?(0|[1-9]\d{0,18}|(0|[1-9]\d{0,18})?\.\d{0,30}([eE][-+]\d{1,3})?)")
-_LOOKS_LIKE_NUMBER = re.compile(r"([-+]?)(\d+\.?\d*|\.\d+)[eE]([-+]?)(\d+)")
+_LOOKS_LIKE_NUMBER = re.compile(r"([-+]?)(\d+(?:\.\d*)?|\.\d+)[eE]([-+]?)(\d+)")
 _TAG = "tag:yaml.org,2002:"
 _REMEDIES = {  # by a word of PyYAML's own message
     "'\\t'": "indent with spaces, not with tabs",
@@ -50,6 +52,33 @@ class Document:
             path = path[:-1]
         return self.places[path]
 
+    def rename(self, path: Path, name: str) -> None:
+        """Give the key at `path`, which there must be, another name."""
+        parent: Any = self.value
+        for step in path[:-1]:
+            parent = parent[step]
+        parent[name] = parent.pop(path[-1])
+        new = (*path[:-1], name)
+        inside = len(path)
+        for old in [p for p in self.places if p[:inside] == path]:
+            self.places[new + old[inside:]] = self.places.pop(old)
+        self.unread = {new + p[inside:] if p[:inside] == path else p for p in self.unread}
+
+    def items(self, path: Path) -> list["Document"]:
+        """The items of the list at `path`, which there must be, without findings."""
+        value: Any = self.value
+        for step in path:
+            value = value[step]
+        made = [Document(item, {}) for item in value]
+        inside = len(path)
+        for p, place in self.places.items():
+            if p[:inside] == path and len(p) > inside:
+                made[int(p[inside])].places[p[inside + 1 :]] = place
+        for p in self.unread:
+            if p[:inside] == path and len(p) > inside:
+                made[int(p[inside])].unread.add(p[inside + 1 :])
+        return made
+
 
 def parse(text: str, source: str, line: int | None = None) -> Document:
     """Read one YAML document; every line is reported as `line` when that is given (a value from the command line).
@@ -77,7 +106,7 @@ def parse(text: str, source: str, line: int | None = None) -> Document:
 
 def _not_yaml(source: str, line: int, problem: str) -> Findings:
     remedy = next((r for words, r in _REMEDIES.items() if words in problem), "write it such as key: value")
-    return Findings([Finding(source, line, f"not YAML: {problem}; {remedy}")])
+    return Findings([Finding(source, line, f"not YAML: {cut(problem, 2 * MOST)}; {remedy}")])
 
 
 def _limit_nesting(text: str, source: str, line: int | None) -> None:
@@ -126,7 +155,7 @@ class _Builder:
             return [self.build(child, (*path, i), depth + 1) for i, child in enumerate(node.value)]
         if isinstance(node, yaml.ScalarNode):
             return self.scalar(node, path)
-        self.wrong(node, f"tag {node.tag!r} is not allowed; write plain values", path)
+        self.wrong(node, f"tag {quoted(node.tag)} is not allowed; write plain values", path)
         return None
 
     def pairs(self, node: yaml.MappingNode, depth: int) -> dict[str, tuple[yaml.Node, yaml.Node]]:
@@ -140,7 +169,7 @@ class _Builder:
             elif not isinstance(key, yaml.ScalarNode):
                 self.wrong(key, "a key must be a name; write text before the colon")
             elif key.value in own:
-                self.wrong(key, f"key {key.value!r} stands twice; keep one")
+                self.wrong(key, f"key {quoted(key.value)} stands twice; keep one")
             else:
                 own[key.value] = (key, value)
         return merged | own
@@ -169,7 +198,7 @@ class _Builder:
             return None
         if kind in ("str", "timestamp", "value"):
             return text
-        self.wrong(node, f"tag {node.tag!r} is not allowed; write plain values", path)
+        self.wrong(node, f"tag {quoted(node.tag)} is not allowed; write plain values", path)
         return None
 
 
@@ -179,15 +208,12 @@ def _not_a_number(text: str) -> str:
         sign, digits, power_sign, power = match.groups()
         right = f"{sign}{digits if '.' in digits else digits + '.0'}e{power_sign or '+'}{power}"
         if right != text:
-            return f"{_cut(text)} is text to YAML, not a number; write {right[:40]}"
+            return f"{quoted(text)} is text to YAML, not a number; write {cut(right)}"
     try:
         read = yaml.safe_load(text)
     except (yaml.YAMLError, ValueError, OverflowError):  # Python refuses to read thousands of digits
         read = None
     if isinstance(read, int | float) and abs(read) < 1e15:  # nan is not
-        return f"{_cut(text)} is {read} to some readers of YAML and not to others; write {read}, or quotes around text"
-    return f"{_cut(text)} is no plain finite number; write it such as 1000, 0.3 or 1.0e+3"
-
-
-def _cut(text: str) -> str:
-    return repr(text if len(text) <= 40 else text[:37] + "...")
+        both = f"{quoted(text)} is {read} to some readers of YAML and not to others"
+        return f"{both}; write {read}, or quotes around text"
+    return f"{quoted(text)} is no plain finite number; write it such as 1000, 0.3 or 1.0e+3"

@@ -6,7 +6,7 @@ The file gives ranges for the moment; `drawn` picks one, after which a range hol
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from interfaces.cell import Direction, Fraction, Model, Vector
 
@@ -15,17 +15,26 @@ ArmName = Literal["left", "right"]
 JointName = Literal["waist", "shoulder", "elbow", "forearm_roll", "wrist_angle", "wrist_rotate"]
 JOINT_NAMES: tuple[JointName, ...] = ("waist", "shoulder", "elbow", "forearm_roll", "wrist_angle", "wrist_rotate")
 
+
+def _in_order(span: tuple[float, float]) -> tuple[float, float]:
+    if span[0] > span[1]:
+        raise ValueError("runs backwards; put the smaller first, such as [0.3, 0.8]")
+    return span
+
+
 Second = Annotated[float, Field(ge=0, le=3600)]
+Seconds = Annotated[tuple[Second, Second], AfterValidator(_in_order)]
+Shares = Annotated[tuple[Fraction, Fraction], AfterValidator(_in_order)]
 Some = Annotated[float, Field(gt=0, le=1)]  # a share that is not nothing
 
 
 class When(Model):
     """When a fault begins: exactly one of `at`, `carried`, `node` and `phase`. Each fault begins once."""
 
-    at: tuple[Second, Second] | None = Field(
+    at: Seconds | None = Field(
         default=None, description="Simulated seconds; drawn between the two.", examples=[[5.0, 8.0]]
     )
-    carried: tuple[Fraction, Fraction] | None = Field(
+    carried: Shares | None = Field(
         default=None,
         description="Share of the straight way from socket to clip that the held connector has come; drawn between.",
         examples=[[0.3, 0.6]],
@@ -33,7 +42,7 @@ class When(Model):
     node: str | None = Field(
         default=None, description="A node of the tree is entered: its path or the last name of it.", examples=["insert"]
     )
-    after: tuple[Second, Second] | None = Field(
+    after: Seconds | None = Field(
         default=None, description="With `node`: seconds from its entering; drawn between.", examples=[[0.5, 1.5]]
     )
     phase: Phase | None = Field(
@@ -52,10 +61,6 @@ class When(Model):
             )
         if self.after is not None and self.node is None:
             raise ValueError("after goes with node; write node: carry beside it, or take it out")
-        for name in ("at", "carried", "after"):
-            span = getattr(self, name)
-            if span is not None and span[0] > span[1]:
-                raise ValueError(f"{name} runs backwards; put the smaller first, such as {name}: [0.3, 0.8]")
         return self
 
     def drawn(self, rng: np.random.Generator) -> "When":

@@ -9,6 +9,7 @@ from collections.abc import Collection, Iterator, Mapping
 from itertools import islice
 from pathlib import Path
 
+from interfaces.quote import cut, quoted
 from trees.element import Element, TreeSyntaxError, key_of, read_elements
 from trees.flow import check_flow
 from trees.vocabulary import COUNTERPARTS, Kind, Names, kinds, nearest
@@ -17,7 +18,6 @@ from trees.wiring import Filled, TooLarge
 Finding = tuple[int, str]  # line from 1 (0: the file itself), "what is wrong; what would be right"
 
 MOST_FINDINGS = 500  # a file with more was not written by hand
-MOST_SHOWN = 80  # letters of a word that nobody knows
 _NAME = re.compile(r"[\w-]+")
 
 
@@ -57,14 +57,17 @@ def _findings(root: Element, known: Mapping[str, Kind]) -> Iterator[Finding]:
     loops = [*_loops(trees)]
     yield from loops
     try:
-        yield from _check_runs(root, trees, known)
+        yield from check_runs(root, trees, known)
     except TooLarge as error:
         if not loops:  # filling one in has no end
             yield root.line, str(error)
 
 
-def _check_runs(root: Element, trees: Mapping[str, Element], known: Mapping[str, Kind]) -> list[Finding]:
-    """What shows only in the tree that will run, its subtrees filled in. Raises TooLarge."""
+def check_runs(root: Element, trees: Mapping[str, Element], known: Mapping[str, Kind]) -> list[Finding]:
+    """What shows only in the tree that will run, its subtrees filled in. Raises TooLarge.
+
+    `trees` are those under `root` by their ID, `known` the kinds of elements by tag.
+    """
     main = trees.get(root.attributes.get("main_tree_to_execute", ""))
     if main is None:
         return []
@@ -74,12 +77,12 @@ def _check_runs(root: Element, trees: Mapping[str, Element], known: Mapping[str,
 
 def unknown(what: str, word: str, known: Collection[str]) -> str:
     """The sentence about a word that is not known, with the nearest that is."""
-    return f"unknown {what} {word[:MOST_SHOWN]!r}; {nearest(word, known)}"
+    return f"unknown {what} {quoted(word)}; {nearest(word, known)}"
 
 
 def _check_document(root: Element, trees: Mapping[str, Element]) -> Iterator[Finding]:
     if root.tag != "root":
-        yield root.line, f"the outermost element is <{root.tag}>; write <root>"
+        yield root.line, f"the outermost element is <{cut(root.tag)}>; write <root>"
     for attribute in root.attributes.keys() - {"main_tree_to_execute"}:
         yield root.line, unknown("attribute of root", attribute, ["main_tree_to_execute"])
     main = root.attributes.get("main_tree_to_execute")
@@ -87,7 +90,7 @@ def _check_document(root: Element, trees: Mapping[str, Element]) -> Iterator[Fin
         yield root.line, "root does not state main_tree_to_execute; write the ID of the tree to run"
     elif main not in trees:
         right = nearest(main, trees) if trees else "write a BehaviorTree with this ID"
-        yield root.line, f"unknown main tree {main[:MOST_SHOWN]!r}; {right}"
+        yield root.line, f"unknown main tree {quoted(main)}; {right}"
     for tree in root.children:
         if tree.tag in ("Include", "Import"):
             yield tree.line, f"{tree.tag} is refused, a tree is one file; copy the BehaviorTree into this one"
@@ -101,7 +104,7 @@ def _check_document(root: Element, trees: Mapping[str, Element]) -> Iterator[Fin
                 'BehaviorTree has no ID; write ID="..."',
             )
         elif trees[tree.attributes["ID"]] is not tree:  # the mapping keeps the last
-            yield tree.line, f"BehaviorTree ID {tree.attributes['ID']!r} is given twice; rename one"
+            yield tree.line, f"BehaviorTree ID {quoted(tree.attributes['ID'])} is given twice; rename one"
         if len(tree.children) != 1:
             yield tree.line, f"BehaviorTree has {len(tree.children)} children; give it one, such as a Sequence"
         for attribute, value in tree.attributes.items():
@@ -117,14 +120,14 @@ def _check_names(tree: Element) -> Iterator[Finding]:
         seen = set()
         for element in parent.children:
             if not _NAME.fullmatch(element.name):
-                has = f"the name {element.name!r}" if element.name else "no name"
+                has = f"the name {quoted(element.name)}" if element.name else "no name"
                 yield element.line, f"{element.tag} has {has}; give it one of letters, digits, _ and -"
             elif element.name in seen:
-                yield element.line, f"the name {element.name!r} is taken by a sibling; rename one"
+                yield element.line, f"the name {quoted(element.name)} is taken by a sibling; rename one"
             elif element.tag == "SubTree" and element.name in namespaces:
                 yield (
                     element.line,
-                    f"another SubTree here is named {element.name!r}: they would share their keys; rename one",
+                    f"another SubTree here is named {quoted(element.name)}: they would share their keys; rename one",
                 )
             seen.add(element.name)
             if element.tag == "SubTree":
@@ -137,7 +140,7 @@ def _check_element(element: Element, known: Mapping[str, Kind], keys: Mapping[st
         return
     if element.tag not in known:
         if right := COUNTERPARTS.get(element.tag):
-            yield element.line, f"unknown element {element.tag!r}; write {right}"
+            yield element.line, f"unknown element {quoted(element.tag)}; write {right}"
         else:
             yield element.line, unknown("element", element.tag, [*known, "SubTree"])
         return
@@ -163,12 +166,12 @@ def _check_attribute(element: Element, kind: Kind, name: str, value: str) -> Ite
     try:
         is_key = key_of(value) is not None and attribute.takes_key
     except ValueError as error:
-        yield element.line, f"{element.label}: {name} {error}"
+        yield element.line, f"{element.label}: {cut(name)} {error}"
         return
     if attribute.is_output and not is_key:
-        yield element.line, f"{element.label}: {name}={value!r} is an output; wire it to a {{key}}"
+        yield element.line, f"{element.label}: {name}={quoted(value)} is an output; wire it to a {{key}}"
     elif not is_key and (problem := attribute.problem(value)):
-        yield element.line, f"{element.label}: {name}={value[:MOST_SHOWN]!r} {problem}"
+        yield element.line, f"{element.label}: {name}={quoted(value)} {problem}"
 
 
 def _check_subtree(element: Element, keys: Mapping[str, set[str]]) -> Iterator[Finding]:
@@ -185,14 +188,14 @@ def _check_subtree(element: Element, keys: Mapping[str, set[str]]) -> Iterator[F
         if name not in ("ID", "name"):
             yield from _check_key(element, name, value)
             if name not in keys[identifier]:
-                yield element.line, unknown(f"key of subtree {identifier}", name, keys[identifier])
+                yield element.line, unknown(f"key of subtree {cut(identifier)}", name, keys[identifier])
 
 
 def _check_key(element: Element, name: str, value: str) -> Iterator[Finding]:
     try:
         key_of(value)
     except ValueError as error:
-        yield element.line, f"{element.label}: {name} {error}"
+        yield element.line, f"{element.label}: {cut(name)} {error}"
 
 
 def _keys_used(tree: Element) -> set[str]:
@@ -210,7 +213,7 @@ def _never_run(root: Element, trees: Mapping[str, Element]) -> Iterator[Finding]
             todo += [element.attributes.get("ID", "") for element in _subtrees(trees[identifier])]
     for identifier, tree in trees.items():
         if main in trees and identifier not in run:
-            yield tree.line, f"BehaviorTree {identifier!r} is never run; include it with a SubTree, or remove it"
+            yield tree.line, f"BehaviorTree {quoted(identifier)} is never run; include it with a SubTree, or remove it"
 
 
 def _loops(trees: Mapping[str, Element]) -> Iterator[Finding]:
@@ -226,7 +229,7 @@ def _loops(trees: Mapping[str, Element]) -> Iterator[Finding]:
                 done.add(current)
                 del branch[current]
             elif identifier in branch:
-                yield element.line, f"subtree {identifier!r} includes itself here; remove this SubTree"
+                yield element.line, f"subtree {quoted(identifier)} includes itself here; remove this SubTree"
             elif identifier in trees and identifier not in done:
                 branch[identifier] = _subtrees(trees[identifier])
 

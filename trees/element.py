@@ -7,6 +7,8 @@ from pathlib import Path
 from xml.parsers import expat
 from xml.parsers.expat import errors
 
+from interfaces.quote import cut, quoted
+
 MAX_DEPTH = 60  # elements inside one another; the parser that builds the tree is recursive
 _KEY = re.compile(r"\{([A-Za-z_]\w*)\}")
 
@@ -40,7 +42,7 @@ class Element:
     @property
     def label(self) -> str:
         """How a sentence names it: Wait 'watch'."""
-        return f"{self.tag} {self.name!r}"
+        return f"{cut(self.tag)} {quoted(self.name)}"
 
     @property
     def name(self) -> str:
@@ -63,7 +65,8 @@ def key_of(value: str) -> str | None:
     if match := _KEY.fullmatch(value):
         return match[1]
     if "{" in value or "}" in value:
-        raise ValueError(f"{value!r} is neither a literal nor a {{key}}; write braces around one whole word, or none")
+        wrong = f"{quoted(value)} is neither a literal nor a {{key}}"
+        raise ValueError(f"{wrong}; write braces around one whole word, or none")
     return None
 
 
@@ -97,7 +100,7 @@ def read_elements(path: Path) -> Element:
 
     def text(content: str) -> None:
         if word := content.strip():
-            raise TreeSyntaxError(parser.CurrentLineNumber, f"stray text {word[:40]!r}; put it in a <!-- comment -->")
+            raise TreeSyntaxError(parser.CurrentLineNumber, f"stray text {quoted(word)}; put it in a <!-- comment -->")
 
     parser.CharacterDataHandler = text
     parser.StartElementHandler = start
@@ -118,4 +121,6 @@ def _remedy(fault: str, open_elements: list[Element]) -> str:
     if fault in _REMEDIES:
         return _REMEDIES[fault]
     inner = open_elements[-1]
-    return f"close <{inner.tag}> of line {inner.line}" if inner.tag else "write one <root> with everything inside it"
+    if not inner.tag:
+        return "write one <root> with everything inside it"
+    return f"close <{cut(inner.tag)}> of line {inner.line}"

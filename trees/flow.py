@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 from py_trees.common import Status
 
+from interfaces.quote import cut
 from trees.vocabulary import ANY_STATUS, BUILT_IN
 from trees.wiring import Node, Wire
 
@@ -61,10 +62,10 @@ def check_flow(root: Node) -> Iterator[tuple[int, str]]:
         writers.setdefault(wire.path, wire)
     for reader in flow.readers:
         if reader.path not in writers:
-            yield reader.line, f"{reader.what} reads {reader.path}, which no port writes; wire an output to it"
+            yield reader.line, f"{reader.what} reads {cut(reader.path)}, which no port writes; wire an output to it"
     for reader in flow.too_early:
         if writer := writers.get(reader.path):
-            early = f"{reader.what} reads {reader.path} before anything can have written it"
+            early = f"{reader.what} reads {cut(reader.path)} before anything can have written it"
             yield reader.line, f"{early}; tick {writer.what.partition(':')[0]} of line {writer.line} before it"
 
 

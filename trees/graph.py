@@ -7,6 +7,7 @@ from typing import Any, Literal
 
 from py_trees.common import Status
 
+from interfaces.quote import quoted
 from trees.element import Element, key_of, read_elements
 from trees.run_stats import NodeStats
 from trees.vocabulary import BUILT_IN
@@ -105,7 +106,7 @@ def read_graph(path: Path, leaves: Mapping[str, type] | None = None, inputs: Map
     trees = {tree.attributes.get("ID", ""): tree for tree in root.children}
     main = root.attributes.get("main_tree_to_execute", "")
     if main not in trees or not trees[main].children:
-        raise ValueError(f"no tree {main!r}")
+        raise ValueError(f"no tree {quoted(main)}")
     keys = _constants(trees[main].attributes | dict(inputs or {}), {})
     return _node(trees[main].children[0], "", _Scope(trees, leaves, keys, (main,)))
 

@@ -6,6 +6,8 @@ from uuid import UUID
 
 import py_trees
 
+from interfaces.quote import quoted
+
 
 def in_tree_order(root: py_trees.behaviour.Behaviour) -> Iterator[py_trees.behaviour.Behaviour]:
     """Every node, a parent before its children, siblings from left to right."""
@@ -48,6 +50,6 @@ def find_path(name: str, paths: Iterable[str]) -> str:
     if len(found) == 1:
         return found[0]
     if found:
-        raise ValueError(f"{name!r} may be {' or '.join(found)}; write more of the path")
+        raise ValueError(f"{quoted(name)} may be {' or '.join(found)}; write more of the path")
     nearest = get_close_matches(name, [path.rsplit("/", 1)[-1] for path in known], 1, 0.5) or known
-    raise ValueError(f"the tree has no node {name!r}; there is {', '.join(dict.fromkeys(nearest))}")
+    raise ValueError(f"the tree has no node {quoted(name)}; there is {', '.join(dict.fromkeys(nearest))}")

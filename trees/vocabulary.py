@@ -16,6 +16,8 @@ from py_trees.common import Status
 from py_trees.ports import PortsMixin
 from py_trees.ports_utils import convert_str_to_type, is_instance_of_type
 
+from interfaces.quote import MOST, cut
+
 Accepts = Any  # a type, or the words that may stand there as a tuple of strings
 Names = Mapping[str, Collection[str]]  # the names that a kind of thing has: {"socket": ["back_1", "back_2"]}
 ANY_STATUS = frozenset({Status.SUCCESS, Status.FAILURE, Status.RUNNING})
@@ -126,9 +128,9 @@ COUNTERPARTS = {  # of BehaviorTree.CPP's words
 def nearest(word: str, known: Collection[str]) -> str:
     """The words that help after an unknown one: the nearest known one, else all that there are."""
     listed = sorted(known)[:MOST_LISTED]
-    if near := get_close_matches(word, listed, 1, 0.5):
-        return f"did you mean {near[0]}?"
-    return f"there are {', '.join(listed)}" if listed else "there are none, remove it"
+    if near := get_close_matches(word[:MOST], listed, 1, 0.5):
+        return f"did you mean {cut(near[0])}?"
+    return f"there are {', '.join(map(cut, listed))}" if listed else "there are none, remove it"
 
 
 def kinds(leaves: Mapping[str, type], names: Names | None = None) -> dict[str, Kind]:

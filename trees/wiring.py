@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from interfaces.quote import cut, quoted
 from trees.element import Element, key_of
 from trees.vocabulary import Attribute, Kind
 
@@ -118,7 +119,7 @@ class Filled:
         for name, value in element.attributes.items():
             source = scope.source(value)
             attribute = node.kind.attributes.get(name) if node.kind else None
-            what = f"{element.label}: {name}={value}"
+            what = f"{element.label}: {cut(name)}={cut(value)}"
             if attribute is None:
                 if not source.is_constant:
                     node.writes.append(Wire(what, element.line, source.text, None))
@@ -131,10 +132,10 @@ class Filled:
     def _wire(self, node: Node, what: str, attribute: Attribute, source: _Source) -> None:
         wrong = None
         if source.is_constant and attribute.is_output:
-            wrong = f"is an output, but {source.text!r} is given for the key; give it a {{key}}"
+            wrong = f"is an output, but {quoted(source.text)} is given for the key; give it a {{key}}"
         elif source.is_constant:
             problem = attribute.problem(source.text)
-            wrong = problem and f"is {source.text!r} here, which {problem}"
+            wrong = problem and f"is {quoted(source.text)} here, which {problem}"
         elif not attribute.is_port:
             wrong = "must be a constant, also through a subtree's keys; write a literal"
         else:

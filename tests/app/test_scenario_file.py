@@ -9,7 +9,8 @@ from toy_scenario import write_scenario
 
 from app.findings import Finding, Findings
 from app.resources import shipped
-from app.scenario_file import load_cell, load_scenario, tree_text
+from app.scenario_file import load_cell, load_scenario
+from app.scenario_parts import tree_text
 from behaviors.unplug import Unplug
 from interfaces.cause import CauseCode
 
@@ -114,7 +115,7 @@ def test_shipped_cells_are_right(name: str) -> None:
         ("tries: 4", "tries: '{x}'", "mine.yaml:5: inputs.tries is '{x}'; expected"),
         ("hidden: true", "hidden: yep", "mine.yaml:19: expect.hidden is 'yep'; expected true or false"),
         ("slips: 1", "cause: slipped", "mine.yaml:16: expect: a run that ends stowed has no cause; write"),
-        ("[0.3, 0.8]", "[0.8, 0.3]", "mine.yaml:14: faults.0.when: carried runs backwards; put the smaller first"),
+        ("[0.3, 0.8]", "[0.8, 0.3]", "mine.yaml:14: faults.0.when.carried: runs backwards; put the smaller first"),
         ("jaw_opens", "jaw_open", "mine.yaml:14: faults.0.type: no 'jaw_open'; did you mean 'jaw_opens'?"),
         ("type: jaw_opens, ", "", "mine.yaml:14: faults.0.type: it is missing; there are cable_snags, camera_dark"),
         ("{type: jaw_opens, when", "{type: jaw_stuck, force_share: 1, when", "mine.yaml:14: unknown key 'force_share'"),

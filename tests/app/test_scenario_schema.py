@@ -1,14 +1,19 @@
 import json
 from collections.abc import Iterator
 from importlib.resources import files
+from pathlib import Path
 from typing import Any, get_args
 
 import pytest
+import yaml
 from pydantic import BaseModel, create_model
 from pydantic.fields import FieldInfo
 from typer.testing import CliRunner
 
 from app.cli import app
+from app.findings import Findings
+from app.resources import shipped
+from app.scenario_file import cases
 from app.scenario_schema import ScenarioFile, json_schema
 
 
@@ -85,3 +90,53 @@ def test_the_reference_that_ships_is_what_the_command_prints() -> None:
     """Where this fails: `regrasp scenarios schema --markdown > scenarios/SCHEMA.md`."""
     shipped = (files("scenarios") / "SCHEMA.md").read_text(encoding="utf-8")
     assert CliRunner().invoke(app, ["scenarios", "schema", "--markdown"]).stdout == shipped
+
+
+def with_jsonschema() -> Any:
+    """A validator of the published schema, from a library that only this test would need."""
+    return pytest.importorskip("jsonschema").Draft202012Validator(json_schema())
+
+
+def test_every_shipped_scenario_is_right_by_the_published_schema() -> None:
+    validator = with_jsonschema()
+    for path in shipped("scenario").values():
+        assert [error.message for error in validator.iter_errors(yaml.safe_load(path.read_text()))] == []
+
+
+_WHOLE = {"description": "d", "cell": "thesis", "tree": "recovery", "gravity": "zero"}
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        *({key: None, "vary": {key: [value]}} for key, value in _WHOLE.items()),
+        {"gravity": None},
+        {"gravity": None, "vary": {"seed": "0:2"}},
+        {"gravity": None, "vary": {"gravity": []}},
+        {"gravty": "zero"},
+        {"vary": {"seed": "0-2"}},
+        {"vary": {"light.brightness": {"from": 0.5, "to": 1.0, "steps": 2}}},
+        {"inputs": {"tries": "{x}"}},
+        {"faults": [{"type": "jaw_opens", "when": {"at": [1, 2]}}]},
+        {"faults": [{"type": "camera_dark", "when": {"at": [1, 2]}}]},
+        {"faults": [{"type": "camera_dark", "when": {"at": [1, 2]}}], "vary": {"faults.0.camera": ["rear"]}},
+    ],
+    ids=json.dumps,
+)
+def test_the_published_schema_takes_what_the_check_takes(tmp_path: Path, changes: dict[str, Any]) -> None:
+    content = {key: value for key, value in (_WHOLE | changes).items() if value is not None}
+    path = tmp_path / "mine.yaml"
+    path.write_text(yaml.safe_dump(content))
+    try:
+        cases(str(path))
+        taken = True
+    except Findings:
+        taken = False
+    assert with_jsonschema().is_valid(content) == taken
+
+
+def test_a_key_that_a_file_must_have_may_stand_in_vary_alone() -> None:
+    """As the schema says it: each such key at the top, or in `vary`."""
+    gravity = {"required": ["vary"], "properties": {"vary": {"required": ["gravity"]}}}
+    assert {"anyOf": [{"required": ["gravity"]}, gravity]} in json_schema()["allOf"]
+    assert len(json_schema()["allOf"]) == len(_WHOLE)

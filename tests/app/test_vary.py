@@ -94,7 +94,7 @@ def test_set_fixes_a_varied_key_and_wins_over_what_varies(scenario: Path) -> Non
         ("gravity: zero", "mine.yaml:22: vary.gravity is 'zero'; expected a list of at least 1 value, or text such as"),
         ("seed: '5:5'", "mine.yaml:22: vary.seed: '5:5' holds no number; write A:B with A below B, such as '0:5'"),
         ("seed: 1:5", "mine.yaml:22: '1:5' is 65 to some readers of YAML and not to others; write 65, or quotes"),
-        ("seed: '0:10001'", "mine.yaml:21: vary makes 10001 cases; shorten a list or a range, 10000 are the most"),
+        ("seed: '0:10001'", "mine.yaml:21: vary makes more than 10000 cases; shorten a list or a range"),
         ("seed: {from: 0, to: 1}", "mine.yaml:22: key 'steps' is missing in vary.seed; expected a whole number"),
         ("faults.1.seconds: [1]", "mine.yaml:22: vary: faults.1.seconds: no item '1' in faults; give a number from 0"),
         ("cell.hiden.x: [1]", "mine.yaml:22: unknown key 'hiden'; did you mean 'hidden'?"),
@@ -112,7 +112,9 @@ def test_what_is_wrong_in_all_cases_is_told_once_beside_what_is_in_some(scenario
     wrong, *placed = findings()
     assert wrong == "mine.yaml:5: inputs.trys: unknown input 'trys'; did you mean tries?"
     assert placed
-    assert all(f.endswith("; move it, or jitter it less (case seed=0,obstacles.0.size.2=0.9)") for f in placed)
+    assert all(
+        f.endswith("; move it, or jitter it less (case seed=0,obstacles.0.size.2=0.9 and 2 more)") for f in placed
+    )
 
 
 _scalars = st.none() | st.booleans() | st.integers(-99, 99) | st.text("ab=,/. ü", max_size=4)
@@ -122,8 +124,57 @@ _lists = st.lists(_scalars | st.lists(_scalars, max_size=2), min_size=1, max_siz
 @given(st.dictionaries(st.text("abc", min_size=1), _lists, max_size=3))
 def test_names_are_as_many_as_combinations_and_make_folders_of_their_own(lists: dict[str, list[object]]) -> None:
     document = parse(yaml.safe_dump({"vary": lists}), "f.yaml")
-    names = [name for name, _ in expand(axes(document, []))]
+    found, wrong = axes(document, [])
+    assert wrong == []
+    names = [name for name, _ in expand(found)]
     assert len(names) == prod(map(len, lists.values()))
     folders = {folder_name(name) for name in set(names)}
     assert len(folders) == len(set(names))
     assert all("/" not in f and f not in (".", "..", "") and len(f) <= 120 for f in folders)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "text", "expected"),
+    [
+        ("gravity: zero", "gravity: mars", "gravity: [zero]", ["4: gravity: no 'mars'; there are earth, zero"]),
+        ("gravity: zero", "", "gravity: [zero]", []),
+        ("gravity: zero", "", "gravity: []", ["22: vary.gravity is []; expected"]),
+        ("gravity: zero", "", "seed: [1]", ["1: key 'gravity' is missing; expected one of zero, earth"]),
+        ("tries: 4", "tries: many", "inputs.tries: [1]", ["5: inputs.tries: Retry 'again': num_failures={tries}"]),
+        ("slips: 1", "cause: slippd", "expect.outcome: [safe_stop]", ["18: expect.cause: no 'slippd'"]),
+        ("slips: 1", "cause: arm_failed", "expect.outcome: [safe_stop]", []),
+        ("limits: {sim_seconds: 600}", "limits: 3", "limits.sim_seconds: [1]", ["15: limits is 3; expected a mapping"]),
+        ("type: jaw_opens,", "type: camera_dark,", "faults.0.camera: [rear]", ["14: key 'camera' is missing in f"]),
+        ("gravity: zero", "gravity: 1", "seed: [1e9, 2.5]", ["4: gravity is 1", "22: '1e9' is", "22: seed is 2.5"]),
+    ],
+)  # fmt: skip
+def test_the_file_is_right_without_vary_too_but_for_keys_that_only_vary_gives(
+    scenario: Path, old: str, new: str, text: str, expected: list[str]
+) -> None:
+    vary(scenario, f"  {text}\n")
+    scenario.write_text(scenario.read_text().replace(old, new))
+    found = findings() if expected else [str(len(cases("mine.yaml")))]
+    for line, start in zip(found, expected or ["1"], strict=True):
+        assert line.removeprefix("mine.yaml:").startswith(start)
+
+
+def test_too_many_cases_hide_no_value_that_is_wrong(scenario: Path) -> None:
+    vary(scenario, "  seed: '0:9999999999'\n  gravity: [zero, mars]\n  expect.tries: [1, 200]\n")
+    assert [line.split(" (case ")[0].split("; ")[0] for line in findings()] == [
+        "mine.yaml:21: vary makes more than 10000 cases",
+        "mine.yaml:22: seed is 9999999998",
+        "mine.yaml:23: gravity: no 'mars'",
+        "mine.yaml:24: expect.tries is 200",
+    ]
+
+
+def test_a_finding_stands_at_its_own_value_and_names_the_case(scenario: Path) -> None:
+    vary(scenario, "  inputs.tries:\n    - 2\n    - three\n  seed: [1, 2]\n")
+    [finding] = findings()
+    assert finding.startswith("mine.yaml:24: inputs.tries: Retry 'again': num_failures={tries} is 'three' here")
+    assert finding.endswith("(case inputs.tries=three,seed=1 and 1 more)")
+
+
+def test_the_command_line_and_the_file_are_told_of_together(scenario: Path) -> None:
+    scenario.write_text("a: [")
+    assert [line.split(" ")[0] for line in findings("nonsense")] == ["--set:1:", "mine.yaml:1:"]

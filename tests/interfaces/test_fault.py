@@ -27,7 +27,7 @@ def test_a_drawn_moment_lies_within_its_range_and_a_seed_repeats_it(span: Span, 
         ({}, "nothing given; give one of at, carried, node, phase"),
         ({"at": (1, 2), "node": "carry"}, "at and node given"),
         ({"phase": "lost", "after": (1, 2)}, "after goes with node"),
-        ({"node": "carry", "after": (2, 1)}, "after runs backwards"),
+        ({"node": "carry", "after": (2, 1)}, "runs backwards; put the smaller first"),
     ],
 )
 def test_a_moment_is_said_in_one_way(data: dict[str, object], said: str) -> None:

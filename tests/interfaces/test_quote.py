@@ -1,0 +1,17 @@
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from interfaces.quote import MOST, cut, quoted
+
+
+@given(st.text() | st.binary(max_size=200) | st.lists(st.integers()))
+def test_what_is_quoted_is_short_and_whole_where_it_can_be(value: object) -> None:
+    whole, text = repr(value), quoted(value)
+    assert len(text) <= MOST
+    assert text == whole or (len(whole) > MOST and "..." in text)
+
+
+@pytest.mark.parametrize("most", [60, 180])
+def test_a_long_text_keeps_both_ends(most: int) -> None:
+    assert cut("a" * 3000 + "b" * 3000, most) == "a" * (most - 23) + "..." + "b" * 20
