@@ -16,7 +16,7 @@ from interfaces.cell import Connector, KnownCell, WristMount, pose_along
 from interfaces.frame import Intrinsics, RgbdFrame
 from perception.cable_end import cable_leaves
 from perception.camera_model import project
-from perception.cylinder import COARSE, FINE, Fit, Sight, fit, nearest_on_rays, depth_misses, thinned
+from perception.cylinder import COARSE, FINE, Fit, Sight, depth_misses, fit, nearest_on_rays, thinned
 from perception.estimate import ROLL_VARIANCE, Estimate, NoEstimate
 from perception.outline import outline
 from perception.registration import CARRIED, FIXED, Registration, register
