@@ -1,6 +1,6 @@
 """What a run tried: every execution of a leaf with how it ended, and the chain from the root down that decided."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import py_trees
@@ -21,6 +21,7 @@ class _Failure:
     tick: int
     link: Link
     cause: Cause | None
+    passed_on: bool  # the cause was another leaf's: a safe stop's
     below: "_Failure | None"
 
     def down(self) -> Iterator["_Failure"]:
@@ -35,14 +36,18 @@ class Attempts(py_trees.visitors.VisitorBase):
     """Watches a tree through its ticks; `made` are the attempts in the order of their beginning.
 
     It has to watch: a node with memory resets what failed before, at the next tick. `causes` is the list to which
-    failing leaves append. After a stop outside a tick call `finalise()`.
+    failing leaves append. `types` are the words of the tree file by path; without one it is the class. After a stop
+    outside a tick call `finalise()`.
     """
 
-    def __init__(self, root: Behaviour, causes: Sequence[Cause], now: Callable[[], float]) -> None:
+    def __init__(
+        self, root: Behaviour, causes: Sequence[Cause], now: Callable[[], float], types: Mapping[str, str] | None = None
+    ) -> None:
         super().__init__(full=False)
         self.made: list[Attempt] = []
         self._root, self._causes, self._now = root, causes, now
         self._paths = node_paths(root)
+        self._types = types or {}
         self._leaves = [node for node in in_tree_order(root) if not node.children]
         self._open: set[int] = set()  # ids of leaves that run
         self._latest: dict[int, tuple[int, int]] = {}  # of a leaf: index of its last attempt, tick of its last visit
@@ -56,12 +61,16 @@ class Attempts(py_trees.visitors.VisitorBase):
 
     def run(self, behaviour: Behaviour) -> None:
         """At a node's visit; its children's visits come first."""
-        failed, cause = behaviour.status is Status.FAILURE, None
-        if not behaviour.children:
-            cause = self._new_cause() if failed else None
-            self._visit_leaf(behaviour, cause)
+        failed = behaviour.status is Status.FAILURE
+        if behaviour.children:
+            if failed:
+                self._failures[id(behaviour)] = self._failure(behaviour)
+            return
+        cause, passed_on = self._new_cause() if failed else (None, False)
+        self._visit_leaf(behaviour, cause)
         if failed:
-            self._failures[id(behaviour)] = self._failure(behaviour, cause)
+            why = f"{cause.code.value}: {cause.message}" if cause else "failed, and names no cause"
+            self._failures[id(behaviour)] = _Failure(self._tick, self._link(behaviour, why), cause, passed_on, None)
 
     def finalise(self) -> None:
         """After a tick, or after a stop outside one: what was stopped unseen has ended."""
@@ -94,16 +103,19 @@ class Attempts(py_trees.visitors.VisitorBase):
         return tuple(links) or None
 
     def _link(self, node: Behaviour, why: str) -> Link:
-        type_name = "Fallback" if isinstance(node, Selector) else type(node).__name__  # as tree files name it
-        return Link(self._paths[node.id], type_name, self._seconds(), why)
+        path = self._paths[node.id]
+        return Link(path, self._types.get(path, type(node).__name__), self._seconds(), why)
 
     def _seconds(self) -> float:
         return round(self._now(), 6)
 
-    def _new_cause(self) -> Cause | None:
-        """The last cause that came since the last failed leaf's visit, so from the one that is visited now."""
-        new, self._told = self._causes[self._told :], len(self._causes)
-        return new[-1] if new else None
+    def _new_cause(self) -> tuple[Cause | None, bool]:
+        """The last cause that came since the last failed leaf's visit, so from the one that is visited now.
+
+        And whether that leaf passed it on: it stands in the list before.
+        """
+        old, new, self._told = self._causes[: self._told], self._causes[self._told :], len(self._causes)
+        return (new[-1], any(cause is new[-1] for cause in old)) if new else (None, False)
 
     def _visit_leaf(self, leaf: Behaviour, cause: Cause | None) -> None:
         if id(leaf) not in self._open and not self._repeats(leaf, cause):
@@ -124,9 +136,12 @@ class Attempts(py_trees.visitors.VisitorBase):
         self._open.discard(id(leaf))
 
     def _repeats(self, leaf: Behaviour, cause: Cause | None) -> bool:
-        """Whether the leaf ends at once, exactly as it did in the tick before: counted as the same attempt."""
+        """Whether the leaf ends at once, exactly as it did in the tick before: counted as the same attempt.
+
+        A loop's next round is another attempt.
+        """
         index, tick = self._latest.get(id(leaf), (-1, -1))
-        if leaf.status is Status.RUNNING or tick != self._tick - 1:
+        if leaf.status is Status.RUNNING or tick != self._tick - 1 or _in_a_new_round(leaf):
             return False
         last = self.made[index]
         at_once = last.times > 1 or last.started == last.ended
@@ -135,23 +150,22 @@ class Attempts(py_trees.visitors.VisitorBase):
         self.made[index] = replace(last, times=last.times + 1)
         return True
 
-    def _failure(self, node: Behaviour, cause: Cause | None) -> _Failure:
-        if not node.children:
-            why = f"{cause.code.value}: {cause.message}" if cause else "failed, and names no cause"
-            return _Failure(self._tick, self._link(node, why), cause, None)
+    def _failure(self, node: Behaviour) -> _Failure:
+        """Of a node with children."""
         child = self._deciding_child(node)
         below = self._failures[id(child)] if child is not None else None
-        return _Failure(self._tick, self._link(node, _why(node, child)), None, below)
+        return _Failure(self._tick, self._link(node, _why(node, child)), None, False, below)
 
     def _deciding_child(self, node: Behaviour) -> Behaviour | None:
         """The child whose failure made the node fail; None where it was none's.
 
-        A Fallback's is the last one that names a cause: a condition, or the stop after a failed mission, names none.
+        A Fallback's is the last one with a cause of its own: the stop after a failed mission passes on the mission's.
         """
         failures = {id(child): f for child in node.children if (f := self._failures.get(id(child)))}
         if isinstance(node, Selector):  # all its children have failed, with memory in earlier ticks
-            named = [c for c in node.children if [*failures[id(c)].down()][-1].cause is not None]
-            return (named or node.children)[-1]
+            leaves = {id(child): [*failures[id(child)].down()][-1] for child in node.children}
+            own = [c for c in node.children if leaves[id(c)].cause is not None and not leaves[id(c)].passed_on]
+            return (own or node.children)[-1]
         return next((c for c in node.children if id(c) in failures and failures[id(c)].tick == self._tick), None)
 
 
@@ -168,6 +182,17 @@ def _why(node: Behaviour, child: Behaviour | None) -> str:
     if child is None:
         return "failed by itself"
     return f"child {_own_name(child)} failed ({node.children.index(child) + 1} of {len(node.children)})"
+
+
+def _in_a_new_round(leaf: Behaviour) -> bool:
+    """Whether the leaf is visited because a decorator such as Retry, which goes on, has begun what is below it anew.
+
+    At a node's visit those above it still have their status of the tick before.
+    """
+    node = leaf
+    while node.parent is not None and node.parent.status is not Status.RUNNING:
+        node = node.parent
+    return node is not leaf and isinstance(node.parent, Decorator)
 
 
 def _own_name(node: Behaviour) -> str:

@@ -29,7 +29,7 @@ from perception.service import Perception
 from sim.ground_truth import GroundTruth
 from sim.renderer import RendererName
 from sim.world import World
-from trees import in_tree_order, load_tree, node_paths
+from trees import in_tree_order, load_tree, node_paths, read_graph
 
 TICK = 0.05  # simulated seconds
 Progress = Callable[[float, str], None]
@@ -125,7 +125,9 @@ def _assemble(scenario: Scenario, world: World, seed: int, log: Any) -> Episode:
     break_services(services, world.faults, world.now)
     py_trees.blackboard.Blackboard.clear()
     tree = py_trees.trees.BehaviourTree(load_tree(scenario.tree, LEAVES, scenario.inputs))
-    attempts = Attempts(tree.root, services.belief.causes, world.now)
+    graph = read_graph(scenario.tree, LEAVES, scenario.inputs)
+    types = {node.path: node.type for node in graph.walk() if node.kind != "subtree"}
+    attempts = Attempts(tree.root, services.belief.causes, world.now, types)
     return Episode(world, services, tree, Judge(GroundTruth(world), scenario.file.expect), attempts)
 
 

@@ -5,8 +5,10 @@ from collections.abc import Iterator
 from app.findings import printable
 from app.record import BeliefState, Link, Pose, Result
 from app.record_reader import RunRecord
-from app.summary import expectation_lines, headline, slip_lines
+from app.summary import expectation_lines, headline, slip_lines, what_ran
 from app.timeline import event_text, timeline, wrapped
+from app.tried import attempts, course
+from app.vary import DEFAULT
 
 REPORT_WIDTH = 100  # columns of a page in a test report
 LAST_EVENTS = 8  # shown of a run without a result
@@ -22,9 +24,7 @@ def _whole(record: RunRecord, result: Result, width: int) -> Iterator[str]:
     yield f"{headline(result)}, {result.sim_seconds:.1f} simulated seconds"
     yield from _what_was_run(record, result.versions)
     yield from _section("Why it ended so", _why(result, width))
-    yield from _section(
-        "What was tried (simulated seconds, from and to)", timeline(result.attempts, record.events, width)
-    )
+    yield from _tried(record, width)
     yield from _section("Losses of the connector, by ground truth", slip_lines(result))
     if result.belief:
         yield from _section("What the robot knew at the end", _belief(result.belief))
@@ -35,8 +35,11 @@ def _whole(record: RunRecord, result: Result, width: int) -> Iterator[str]:
 def _page(record: RunRecord, width: int) -> Iterator[str]:
     """Of a run without a result."""
     begin = record.begin
-    yield f"{begin.get('scenario', 'a run')}, seed {begin.get('seed', 'unknown')}: no result"
+    ran = what_ran(str(begin.get("scenario", "a run")), str(begin.get("case", DEFAULT)), begin.get("seed", "unknown"))
+    end = next((e.values.get("outcome") for e in record.events if e.event == "end"), None)
+    yield f"{ran}: killed, or still going on" if end is None else f"{ran}: {end}, but its result.json is gone"
     yield from _what_was_run(record, {})
+    yield from _tried(record, width)
     statuses = {tick.path: tick.status for tick in record.ticks}
     running = sorted((p for p, status in statuses.items() if status == "RUNNING"), key=lambda path: path.split("/"))
     # Whatever stands below a path comes right after it.
@@ -45,8 +48,14 @@ def _page(record: RunRecord, width: int) -> Iterator[str]:
     ]
     seconds = record.ticks[-1].t if record.ticks else 0.0
     yield from _section(f"What was running at {seconds:.2f} s, when the record ends", leaves)
-    last = (f"{e.t:8.2f}  {e.node or '-'}  {event_text(e)}" for e in record.events[-LAST_EVENTS:])
+    events = [event for event in record.events if event.event != "begin"]
+    last = (f"{e.t:8.2f}  {e.node or '-'}  {event_text(e)}" for e in events[-LAST_EVENTS:])
     yield from _section("The last events", (line for text in last for line in wrapped(text, width - 2)))
+
+
+def _tried(record: RunRecord, width: int) -> Iterator[str]:
+    told = timeline(attempts(record), record.events, course(record), width - 2)
+    yield from _section("What was tried (simulated seconds, from and to)", told)
 
 
 def _what_was_run(record: RunRecord, versions: dict[str, str]) -> Iterator[str]:
@@ -78,8 +87,11 @@ def _why(result: Result, width: int) -> Iterator[str]:
     names = [*_relative(chain)]
     column = min(36, max(map(len, names), default=0))
     for name, link in zip(names, chain, strict=True):
-        text = f"{link.at:8.2f} s  {link.type}: {link.why}"
-        yield from wrapped(text, width - 2, f"{name:<{column}}  ", " " * 12)
+        first, *more = wrapped(f"{link.at:8.2f} s  {link.type}: {link.why}", width - 2, " " * (column + 2), " " * 12)
+        if len(name) > column:
+            yield name
+            name = ""
+        yield from (name + first[len(name) :], *more)
 
 
 def _relative(chain: tuple[Link, ...]) -> Iterator[str]:

@@ -30,8 +30,13 @@ def summary(result: "Result", folder: Path) -> str:
 def headline(result: "Result") -> str:
     """Scenario, seed, outcome, and how many expectations were met."""
     met = sum(e.met for e in result.expectations)
-    ran = result.scenario if result.case == DEFAULT else f"{result.scenario} {result.case}"
-    return f"{ran}, seed {result.seed}: {result.outcome}, {met} of {len(result.expectations)} expectations met"
+    ran = what_ran(result.scenario, result.case, result.seed)
+    return f"{ran}: {result.outcome}, {met} of {len(result.expectations)} expectations met"
+
+
+def what_ran(scenario: str, case: str, seed: object) -> str:
+    """Scenario, case if it has several, seed."""
+    return f"{scenario}{'' if case == DEFAULT else f' {case}'}, seed {seed}"
 
 
 def expectation_lines(result: "Result") -> Iterator[str]:

@@ -1,4 +1,4 @@
-"""The tick log: each change of a node's status as one JSON line."""
+"""The tick log: each change of a node's status, and each end that is like the one before, as one JSON line."""
 
 import json
 from collections.abc import Callable
@@ -13,7 +13,8 @@ from trees import in_tree_order, node_paths
 class TickLog(py_trees.visitors.VisitorBase):
     """Writes {"t": simulated s, "path": "root/carry/move", "status": "RUNNING"} for every status that a tick changed.
 
-    Add it to a `BehaviourTree` as a visitor. Lines of one tick stand in tree order. Status is taken when a node is
+    A node that ends again as it ended before, such as a guard that is asked at every tick, has a line for each end: a
+    reader can count what was done. Add it to a `BehaviourTree` as a visitor. Lines of one tick stand in tree order. Status is taken when a node is
     visited, and once more after the tick: a node that was stopped later in the tick (preempted, or its Parallel ended)
     is not visited again and goes INVALID unseen. After `root.stop(...)` outside a tick call `finalise()`.
     """
@@ -40,12 +41,12 @@ class TickLog(py_trees.visitors.VisitorBase):
         stamp = json.dumps(round(self._now(), 6))
         lines = []
         for i, (node, path) in enumerate(self._nodes):
-            last = self._last[i]
-            for status in (self._visited.get(id(node), last), node.status):
-                if status is not last:
-                    lines.append(f'{{"t": {stamp}, "path": {path}, "status": "{status.value}"}}\n')
-                    last = status
-            self._last[i] = last
+            seen = self._visited.get(id(node))
+            statuses = [] if seen is None or seen is self._last[i] is Status.RUNNING else [seen]
+            if node.status is not (self._last[i] if seen is None else seen):
+                statuses.append(node.status)
+            lines += [f'{{"t": {stamp}, "path": {path}, "status": "{status.value}"}}\n' for status in statuses]
+            self._last[i] = node.status
         self._visited.clear()
         if lines:
             self._stream.write("".join(lines))

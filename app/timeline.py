@@ -2,7 +2,6 @@
 
 import textwrap
 from bisect import bisect_left, bisect_right
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import groupby
@@ -10,9 +9,10 @@ from typing import Any
 
 from app.record import Attempt
 from app.record_reader import Event
+from app.tried import Course
 
 Names = tuple[str, ...]  # a path's parts
-STATUS = {"INVALID": "stopped"}
+STATUS = {"INVALID": "stopped", "RUNNING": "still running"}
 MARGIN = 19  # columns of the two times
 MOST_EVENTS = 6  # shown of one attempt
 MOST_ATTEMPTS = 500  # shown of a run
@@ -22,9 +22,10 @@ TOLD_ELSEWHERE = ("failed", "begin", "end")
 
 @dataclass(frozen=True)
 class _Round:
-    """Attempts up to the next one that stands earlier in the tree: there `again` begins anew."""
+    """Attempts up to the next round of a loop; `again` is what the loop began anew, for the `number`th time."""
 
-    again: Names | None
+    again: Names
+    number: int
     attempts: tuple[Attempt, ...]
 
     def signature(self) -> Any:
@@ -32,75 +33,65 @@ class _Round:
         return self.again, [(a.path, a.status, a.cause and a.cause.code) for a in self.attempts]
 
 
-def timeline(attempts: Sequence[Attempt], events: Sequence[Event], width: int) -> Iterator[str]:
+def timeline(attempts: Sequence[Attempt], events: Sequence[Event], course: Course, width: int) -> Iterator[str]:
     """Lines of at most `width` columns: begin and end of each attempt, and below it its cause and its events."""
     if len(attempts) > MOST_ATTEMPTS:
         yield f"{'':{MARGIN}}{len(attempts) - MOST_ATTEMPTS} earlier attempts are left out; --json has them all"
         attempts = attempts[-MOST_ATTEMPTS:]
-    groups = _Groups(attempts)
-    count: Counter[Names] = Counter()
+    headings = _Headings(attempts)
     by_node: dict[str, list[Event]] = {}
     for event in events:
         by_node.setdefault(event.node, []).append(event)
-    for _, same in groupby(groups.rounds(), key=_Round.signature):
+    for _, same in groupby(_rounds(attempts, course), key=_Round.signature):
         first, *more = same
-        count[first.again or ()] += 1
-        shown: Names = () if first.again is None else first.again[:-1]
+        shown, again = headings.reopened(first)
         for attempt in first.attempts:
-            headings = groups.headings(attempt)
-            above = 0
-            for depth, heading in enumerate(headings):
+            above, open_now = 0, headings.of(attempt)
+            for depth, heading in enumerate(open_now):
                 if shown[: len(heading)] != heading:
-                    again = f"  again, round {1 + count[heading]}" if heading == first.again else ""
-                    yield f"{'':{MARGIN}}{'  ' * depth}{'/'.join(heading[above:])}{again}"
+                    note = f"  again, round {first.number}" if heading == again else ""
+                    yield f"{'':{MARGIN}}{'  ' * depth}{'/'.join(heading[above:])}{note}"
                 above = len(heading)
-            shown = headings[-1] if headings else ()
-            yield from _lines(attempt, above, len(headings), by_node.get(attempt.path, []), width)
+            shown = open_now[-1] if open_now else ()
+            yield from _lines(attempt, above, len(open_now), by_node.get(attempt.path, []), width)
         if more:
-            count[first.again or ()] += len(more)
             begin, end = more[0].attempts[0].started, max(a.ended for a in more[-1].attempts)
             yield f"{begin:8.2f} {end:8.2f}  and the same again, {len(more)} more time{'s' * (len(more) > 1)}"
 
 
-class _Groups:
-    """Where the attempts' paths branch, and in which order their parts came first."""
+def _rounds(attempts: Sequence[Attempt], course: Course) -> Iterator[_Round]:
+    """The attempts, parted where a loop begins what is below it anew."""
+    again: tuple[Names, int] = ((), 1)
+    members: list[Attempt] = []
+    for attempt in attempts:
+        if members and (new := course.new_round(attempt.path, members[-1].started, attempt.started)):
+            yield _Round(*again, tuple(members))
+            again, members = (tuple(new[0].split("/")), new[1]), []
+        members.append(attempt)
+    if members:
+        yield _Round(*again, tuple(members))
+
+
+class _Headings:
+    """The ancestors at which the attempts' paths part; a chain of only children is one."""
 
     def __init__(self, attempts: Sequence[Attempt]) -> None:
-        self._attempts = attempts
-        self._order: dict[Names, dict[str, int]] = {}  # of each node its children's names, and their order
-        for attempt in attempts:
-            names = _names(attempt)
-            for depth, name in enumerate(names):
-                siblings = self._order.setdefault(names[:depth], {})
-                siblings.setdefault(name, len(siblings))
+        self._below: dict[Names, set[str]] = {}
+        for names in map(_names, attempts):
+            for depth in range(len(names)):
+                self._below.setdefault(names[:depth], set()).add(names[depth])
 
-    def headings(self, attempt: Attempt) -> list[Names]:
-        """The attempt's ancestors at which paths part, from the top; a chain of only children is one."""
+    def of(self, attempt: Attempt) -> list[Names]:
+        """From the top."""
         names = _names(attempt)
-        return [names[:depth] for depth in range(1, len(names)) if len(self._order[names[:depth]]) > 1]
+        return [names[:depth] for depth in range(1, len(names)) if len(self._below[names[:depth]]) > 1]
 
-    def rounds(self) -> Iterator[_Round]:
-        """The attempts, parted where one begins at a place in the tree before that of the attempt that it follows."""
-        again: Names | None = None
-        members: list[Attempt] = []
-        for attempt in self._attempts:
-            if members and (begins := self._begins_anew(members[-1], attempt)) is not None:
-                yield _Round(again, tuple(members))
-                again, members = begins, []
-            members.append(attempt)
-        if members:
-            yield _Round(again, tuple(members))
-
-    def _begins_anew(self, before: Attempt, attempt: Attempt) -> Names | None:
-        """The node that both stand under when `attempt` is a new execution of it; None for one beside or after."""
-        a, b = _names(before), _names(attempt)
-        depth = next((i for i, (x, y) in enumerate(zip(a, b, strict=False)) if x != y), min(len(a), len(b)))
-        if attempt.started < before.ended:
-            return None
-        if depth == len(b):
-            return b
-        order = self._order[b[:depth]]
-        return b[:depth] if order[b[depth]] < order[a[depth]] else None
+    def reopened(self, group: _Round) -> tuple[Names, Names]:
+        """What stays open of the headings above when a round begins, and the heading that it begins with."""
+        if not group.again:
+            return (), ()
+        heading = next((h for h in self.of(group.attempts[0]) if len(h) >= len(group.again)), ())
+        return heading[:-1], heading
 
 
 def _names(attempt: Attempt) -> Names:

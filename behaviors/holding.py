@@ -5,10 +5,11 @@ from typing import Any, ClassVar
 from py_trees.common import Status
 
 from behaviors.leaf import Leaf
+from interfaces.cause import CauseCode
 
 
 class Holding(Leaf):
-    """SUCCESS when the robot believes that its right hand holds the connector, else FAILURE (which needs no cause)."""
+    """SUCCESS when the robot believes that its right hand holds the connector, else FAILURE."""
 
     INPUT_PORTS: ClassVar[dict[str, Any]] = {}
     OUTPUT_PORTS: ClassVar[dict[str, Any]] = {}
@@ -16,4 +17,8 @@ class Holding(Leaf):
 
     def work(self) -> Status:
         """See the class."""
-        return Status.SUCCESS if self.services.belief.held is not None else Status.FAILURE
+        belief = self.services.belief
+        if belief.held is not None:
+            return Status.SUCCESS
+        last = f", the last at {belief.notices[-1].at:.2f} s by {belief.notices[-1].by}" if belief.notices else ""
+        return self.fail(CauseCode.NOTHING_HELD, f"the hand holds nothing; {len(belief.notices)} losses noticed{last}")

@@ -67,9 +67,14 @@ class Leaf(BehaviourWithPorts):
 
     def fail(self, code: CauseCode, message: str) -> Status:
         """Note the cause, and FAILURE."""
-        self.services.belief.causes.append(Cause(code, message, self.path))
-        self.feedback_message = message
-        self.services.log.warning("failed", node=self.path, code=code.value, message=message)
+        return self.fail_with(Cause(code, message, self.path))
+
+    def fail_with(self, cause: Cause) -> Status:
+        """Note a cause, which may be another leaf's, and FAILURE."""
+        self.services.belief.causes.append(cause)
+        self.feedback_message = cause.message
+        values = {} if cause.node == self.path else {"of": cause.node}
+        self.services.log.warning("failed", node=self.path, code=cause.code.value, message=cause.message, **values)
         return Status.FAILURE
 
     def say(self, event: str, **values: Any) -> None:

@@ -11,7 +11,7 @@ REST = 0.3  # s within which the arms are at rest (spec)
 class SafeStop(StepsLeaf):
     """Stops both arms and holds them; jaws keep their force. FAILURE once they rest: the mission failed.
 
-    What failed before has named the cause; the stop itself names one only where nothing did.
+    Its cause is that of what failed before; it has one of its own only where nothing names one.
     """
 
     RETURNS = frozenset({Status.RUNNING, Status.FAILURE})
@@ -28,5 +28,4 @@ class SafeStop(StepsLeaf):
             return status
         if not self.services.belief.causes:
             return self.fail(CauseCode.INTERNAL_ERROR, "stopped safely, and nothing says why")
-        self.feedback_message = f"stopped safely: {self.services.belief.causes[-1].message}"
-        return Status.FAILURE
+        return self.fail_with(self.services.belief.causes[-1])

@@ -14,6 +14,7 @@ class CauseCode(StrEnum):
     GRASP_EMPTY = "grasp_empty"
     GRASP_FAILED = "grasp_failed"
     SLIPPED = "slipped"
+    NOTHING_HELD = "nothing_held"
     CONNECTOR_NOT_FOUND = "connector_not_found"
     SEARCH_EXHAUSTED = "search_exhausted"
     NOT_STOWED = "not_stowed"

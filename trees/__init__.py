@@ -6,10 +6,11 @@ from trees.graph import Node, collapsed, read_graph, recorded
 from trees.inputs import check_inputs
 from trees.load import TreeError, load_tree
 from trees.paths import in_tree_order, node_paths
-from trees.run_stats import NodeStats, run_stats
+from trees.run_stats import Execution, NodeStats, executions, run_stats
 from trees.show import show_tree
 
 __all__ = [
+    "Execution",
     "Finding",
     "Node",
     "NodeStats",
@@ -18,6 +19,7 @@ __all__ = [
     "check_inputs",
     "check_tree",
     "collapsed",
+    "executions",
     "in_tree_order",
     "load_tree",
     "node_paths",

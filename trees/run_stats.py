@@ -1,22 +1,53 @@
-"""What a recorded run did at each node, counted from its tick log."""
+"""What a recorded run did at each node, read from its tick log: every execution, and how many there were."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+Change = tuple[float, str, str]  # simulated s, path, status: a line of the tick log
+
+
+@dataclass(frozen=True, slots=True)
+class Execution:
+    """One execution of a node, in simulated seconds; INVALID: stopped from above; RUNNING: at work at the log's end."""
+
+    path: str
+    started: float
+    ended: float
+    status: str
+
+
+def executions(changes: Iterable[Change]) -> list[Execution]:
+    """Every execution of every node in the order of beginning, from the lines of a tick log in their order.
+
+    What runs at the end of the log has run until its last line.
+    """
+    made: list[Execution] = []
+    running: dict[str, int] = {}  # of a path the index of its execution
+    now = 0.0
+    for now, path, status in changes:
+        if path not in running:
+            if status == "INVALID":
+                continue  # what had ended is reset
+            running[path] = len(made)
+            made.append(Execution(path, now, now, "RUNNING"))
+        if status != "RUNNING":
+            at = running.pop(path)
+            made[at] = replace(made[at], ended=now, status=status)
+    for at in running.values():
+        made[at] = replace(made[at], ended=now)
+    return made
 
 
 @dataclass
 class NodeStats:
-    """One node's share of a run.
+    """One node's share of a run."""
 
-    The log holds changes of status only, so a node that ends in the same way at tick after tick counts as one visit.
-    """
-
-    visits: int = 0  # times that it began
+    visits: int = 0  # executions
     successes: int = 0
     failures: int = 0
     stopped: int = 0  # from above, before it ended by itself
     running_seconds: float = 0.0  # simulated
-    last: str = "INVALID"  # status at the end of the log
+    last: str = "INVALID"  # how its last execution ended
 
     @property
     def text(self) -> str:
@@ -29,26 +60,15 @@ class NodeStats:
         return ", ".join([*parts, f"{self.running_seconds:.2f} s"] if self.running_seconds else parts)
 
 
-def run_stats(ticks: Iterable[tuple[float, str, str]]) -> dict[str, NodeStats]:
-    """The stats of each node by its path, from the changes of status in their order: simulated s, path, status.
-
-    A node that still runs has run until the last line.
-    """
+def run_stats(changes: Iterable[Change]) -> dict[str, NodeStats]:
+    """The stats of each node by its path, from the same lines; what was never visited is left out."""
     stats: dict[str, NodeStats] = {}
-    running_since: dict[str, float] = {}
-    now = 0.0
-    for now, path, status in ticks:
-        node = stats.setdefault(path, NodeStats())
-        if path in running_since:
-            node.running_seconds += now - running_since.pop(path)
-            node.stopped += status == "INVALID"
-        elif status != "INVALID":
-            node.visits += 1
-        if status == "RUNNING":
-            running_since[path] = now
-        node.successes += status == "SUCCESS"
-        node.failures += status == "FAILURE"
-        node.last = status
-    for path, since in running_since.items():
-        stats[path].running_seconds += now - since
+    for one in executions(changes):
+        node = stats.setdefault(one.path, NodeStats())
+        node.visits += 1
+        node.successes += one.status == "SUCCESS"
+        node.failures += one.status == "FAILURE"
+        node.stopped += one.status == "INVALID"
+        node.running_seconds += one.ended - one.started
+        node.last = one.status
     return stats
