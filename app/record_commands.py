@@ -90,7 +90,7 @@ def diff(folder: Folder, other: Annotated[Path, typer.Argument(metavar="DIR", he
         typer.echo("\n".join([f"{printable(str(folder))} | {printable(str(other))}", *begun, *parted]))
     if parted:
         raise typer.Exit(EXIT_DIFFERENT)
-    typer.echo(f"the same {len(first.ticks)} changes of nodes and {len(first.events)} events")
+    typer.echo(f"the same {len(first.ticks)} lines of ticks and {len(first.events)} events")
 
 
 def _read(folder: Path) -> "RunRecord":

@@ -75,7 +75,9 @@ def read_record(folder: Path) -> RunRecord:
     if os.path.lexists(folder / "result.json"):
         result = _result(folder / "result.json", found)
     else:
-        remarks.append("there is no result.json: the run was killed, or still goes on")
+        ended = any(event.event == "end" for event in events)
+        why = "it is lost, for the run ended" if ended else "the run was killed, or still goes on"
+        remarks.append(f"there is no result.json: {why}")
     if found:
         raise Findings(found)
     return RunRecord(folder, result, tuple(events), tuple(ticks), tuple(remarks))

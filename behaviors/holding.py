@@ -20,5 +20,8 @@ class Holding(Leaf):
         belief = self.services.belief
         if belief.held is not None:
             return Status.SUCCESS
-        last = f", the last at {belief.notices[-1].at:.2f} s by {belief.notices[-1].by}" if belief.notices else ""
-        return self.fail(CauseCode.NOTHING_HELD, f"the hand holds nothing; {len(belief.notices)} losses noticed{last}")
+        losses = "no loss was noticed"
+        if notices := belief.notices:
+            many = f"{len(notices)} losses noticed, the last" if len(notices) > 1 else "a loss was noticed"
+            losses = f"{many} at {notices[-1].at:.2f} s by {notices[-1].by}"
+        return self.fail(CauseCode.NOTHING_HELD, f"the hand holds nothing; {losses}")

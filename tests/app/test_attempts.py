@@ -1,5 +1,6 @@
 """Trees made by hand, ticked by the real BehaviourTree; 1 s a tick, the first at 0 s."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import py_trees
@@ -24,10 +25,10 @@ class Bench:
         """A leaf that fails in the end, with a cause."""
         return Script(name, *before, F, causes=self.causes)
 
-    def run(self, root: Behaviour, ticks: int = 50) -> Attempts:
+    def run(self, root: Behaviour, ticks: int = 50, types: Mapping[str, str] | None = None) -> Attempts:
         """Tick until the root ends, or so often, then stop what is left."""
         tree = py_trees.trees.BehaviourTree(root)
-        attempts = Attempts(root, self.causes, lambda: self.now)
+        attempts = Attempts(root, self.causes, lambda: self.now, types)
         tree.visitors.append(attempts)
         for _ in range(ticks):
             self.now += 1.0
@@ -76,7 +77,9 @@ def test_the_chain_goes_through_retry_and_sequence_to_the_last_try() -> None:
     bench = Bench()
     body = Sequence("try", memory=True, children=[Script("held", S), bench.fails("grasp", R, F)])
     mission = Sequence("mission", memory=True, children=[Script("start", S), Retry("tries", body, 2)])
-    attempts = bench.run(Selector("root", memory=True, children=[mission, Script("stop", R, F)]))
+    attempts = bench.run(
+        Selector("root", memory=True, children=[mission, Script("stop", R, F)]), types={"root": "Fallback"}
+    )
     assert told(attempts) == [
         ("start", 0.0, 0.0, "SUCCESS", None, 1),
         ("held", 0.0, 0.0, "SUCCESS", None, 1),
@@ -131,7 +134,20 @@ def test_decorators_say_what_they_make_of_their_child() -> None:
     assert told(attempts)[0] == ("tool", 0.0, 0.0, "FAILURE", "tool 0 mm", 1)
 
 
-def test_a_fallbacks_chain_skips_a_condition_that_names_no_cause() -> None:
+def test_the_chain_skips_a_stop_that_passes_on_the_cause_of_what_failed_before() -> None:
+    class Stop(Script):
+        def update(self) -> Status:
+            bench.causes.append(bench.causes[-1])
+            return Status.FAILURE
+
+    bench = Bench()
+    attempts = bench.run(Selector("root", memory=True, children=[bench.fails("carry"), Stop("stop", F)]))
+    assert told(attempts)[1] == ("stop", 0.0, 0.0, "FAILURE", "carry 0 mm", 1)
+    assert chain(attempts)[1:] == [("carry", "Script", "slipped: carry 0 mm")]
+    assert attempts.cause() == Cause(CauseCode.SLIPPED, "carry 0 mm", "carry")
+
+
+def test_a_fallbacks_chain_skips_what_names_no_cause() -> None:
     bench = Bench()
     either = Selector("either", memory=True, children=[bench.fails("recover", R), Script("held", F)])
     assert chain(bench.run(either))[1:] == [("recover", "Script", "slipped: recover 0 mm")]

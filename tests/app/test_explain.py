@@ -7,10 +7,12 @@ from typer.testing import CliRunner
 
 from app.cli import app
 from app.explain import explanation
-from app.record import Attempt
+from app.record import Attempt, Link
 from app.record_reader import Event, read_record
 from app.timeline import timeline
+from app.tried import Course
 from interfaces.cause import Cause, CauseCode
+from trees import executions
 
 
 def page(folder: Path, width: int = 100) -> str:
@@ -85,7 +87,19 @@ def test_every_outcome_has_its_page(tmp_path: Path, outcome: str) -> None:
 def test_a_killed_run_is_told_as_far_as_it_is_known(tmp_path: Path) -> None:
     kill(write_record(tmp_path / "run"))
     told = page(tmp_path / "run")
-    assert told.startswith("toy, seed 7: no result\n")
+    assert told.startswith("toy, seed 7: killed, or still going on\n")
+    assert (
+        """\
+What was tried (simulated seconds, from and to)
+                     root/mission
+      0.00     0.00    start                              SUCCESS
+                       tries/one/try
+      0.00     0.00      held                             SUCCESS
+      0.00     0.50      grasp                            FAILURE
+                             0.50 s slip: by=gap, value=0.0443
+"""
+        in told
+    )
     assert "note: there is no result.json: the run was killed, or still goes on" in told
     assert "What was running at 0.50 s, when the record ends\n  root/mission/tries\n" in told
     assert "slip: by=gap, value=0.0443" in told
@@ -95,7 +109,7 @@ def test_a_run_that_was_killed_before_its_first_tick_has_a_page(tmp_path: Path) 
     folder = write_record(tmp_path / "run")
     (folder / "result.json").unlink()
     (folder / "ticks.jsonl").write_text("")
-    assert "no result" in explanation(read_record(folder), 80)
+    assert "killed, or still going on" in explanation(read_record(folder), 80)
 
 
 @pytest.mark.parametrize("width", [80, 100, 120])
@@ -104,6 +118,14 @@ def test_long_sentences_are_wrapped(tmp_path: Path, width: int) -> None:
     told = page(write_record(tmp_path / "run", cause=cause), width)
     assert " ".join(told.split()).count("slipped away") == 20
     assert max(map(len, told.splitlines())) <= width
+
+
+def test_a_wrapped_link_of_the_chain_names_its_node_once(tmp_path: Path) -> None:
+    chain = (Link("root", "Fallback", 1.0, "all failed"), Link("root/" + "long" * 12, "Grasp", 1.0, "gone " * 40))
+    told = page(write_record(tmp_path / "run", chain=chain), 80)
+    assert told.count("longlong") == 6  # once as a link
+    assert told.count(" gone") + told.count("gone ") >= 40
+    assert max(map(len, told.splitlines())) <= 80
 
 
 def test_what_stands_in_a_record_does_not_steer_the_terminal(tmp_path: Path) -> None:
@@ -117,6 +139,10 @@ def attempts(*lines: tuple[str, float, float, str]) -> list[Attempt]:
     return [Attempt(path, start, end, status) for path, start, end, status in lines]  # type: ignore[arg-type]
 
 
+def ticks(*lines: tuple[float, str, str]) -> Course:
+    return Course(executions(lines))
+
+
 def test_rounds_that_went_alike_are_folded() -> None:
     again = [
         line
@@ -125,7 +151,9 @@ def test_rounds_that_went_alike_are_folded() -> None:
             ("r/t/look", i, i, "SUCCESS"), ("r/t/grasp", i, i + 0.5, "FAILURE" if i < 5 else "SUCCESS")
         )
     ]
-    assert [" ".join(line.split()) for line in timeline(again, [], 100)] == [
+    tries = [(i + half, "r/t", "FAILURE" if half else "RUNNING") for i in range(1, 6) for half in (0.0, 0.5)]
+    course = ticks((1.0, "r", "RUNNING"), *tries)
+    assert [" ".join(line.split()) for line in timeline(again, [], course, 100)] == [
         "r/t",
         "1.00 1.00 look SUCCESS",
         "1.00 1.50 grasp FAILURE",
@@ -139,14 +167,30 @@ def test_rounds_that_went_alike_are_folded() -> None:
     ]
 
 
-def test_what_runs_side_by_side_is_no_new_round() -> None:
+def test_what_runs_side_by_side_or_is_asked_at_every_tick_is_no_new_round() -> None:
     both = attempts(("p/watch", 0.0, 1.0, "SUCCESS"), ("p/move", 0.0, 5.0, "SUCCESS"), ("p/watch", 2.0, 3.0, "SUCCESS"))
-    assert not any("again" in line for line in timeline(both, [], 100))
+    assert not any("again" in line for line in timeline(both, [], ticks(), 100))
+    asked = attempts(
+        ("r/ok/held", 0.0, 0.0, "SUCCESS"), ("r/work", 0.0, 2.0, "INVALID"), ("r/ok/held", 1.0, 1.0, "FAILURE")
+    )
+    course = ticks((0.0, "r", "RUNNING"), *((t, "r/ok", "SUCCESS") for t in (0.0, 1.0)), (0.0, "r/work", "RUNNING"))
+    assert not any("again" in line for line in timeline(asked, [], course, 100))
+
+
+def test_a_loop_in_a_loop_counts_its_rounds_from_one() -> None:
+    grasps = attempts(*(("o/in/try/grasp", float(t), float(t), "FAILURE") for t in range(4)))
+    looks = attempts(*(("o/in/try/look", float(t), float(t), "SUCCESS") for t in range(4)))
+    lines = [(0.0, "o", "RUNNING"), (0.0, "o/in", "RUNNING"), (0.0, "o/in/try", "FAILURE")]
+    lines += [(1.0, "o/in", "FAILURE"), (1.0, "o/in/try", "FAILURE"), (2.0, "o/in", "RUNNING")]
+    lines += [(2.0, "o/in/try", "FAILURE"), (3.0, "o/in", "FAILURE"), (3.0, "o/in/try", "FAILURE")]
+    made = [one for pair in zip(looks, grasps, strict=True) for one in pair]
+    told = [line.split("again, ")[1] for line in timeline(made, [], ticks(*lines), 100) if "again" in line]
+    assert told == ["round 2", "round 2", "round 2"]
 
 
 def test_many_events_of_an_attempt_are_counted() -> None:
     events = [Event(1.0, "look", "a/b", {"n": i}) for i in range(20)]
-    told = [*timeline(attempts(("a/b", 0.0, 2.0, "SUCCESS")), events, 100)]
+    told = [*timeline(attempts(("a/b", 0.0, 2.0, "SUCCESS")), events, ticks(), 100)]
     assert len(told) == 8
     assert told[-1].strip() == "and 14 events more"
 

@@ -65,8 +65,8 @@ def test_a_run_that_goes_on_where_the_other_was_killed(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("other", "code", "told"),
     [
-        ("a", 0, "the same 21 changes of nodes and 2 events\n"),
-        ("seed 9", 0, "a | seed 9\nseed: 7 | 9\nthe same 21 changes of nodes and 2 events\n"),
+        ("a", 0, "the same 24 lines of ticks and 2 events\n"),
+        ("seed 9", 0, "a | seed 9\nseed: 7 | 9\nthe same 24 lines of ticks and 2 events\n"),
         ("gap", 1, "a | gap\nfirst differing event"),
         ("nowhere", 2, ""),
     ],

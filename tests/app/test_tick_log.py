@@ -45,10 +45,10 @@ def log_of(root: py_trees.behaviour.Behaviour, ticks: int) -> list[tuple[float, 
     return [(line["t"], line["path"].removeprefix("root/"), line["status"]) for line in lines]
 
 
-def test_changes_and_stops_are_logged_in_tree_order() -> None:
+def test_changes_repeated_ends_and_stops_are_logged_in_tree_order() -> None:
     # tick   | guard   | work    | monitor | move    | stop
     # 0.00   | SUCCESS | RUNNING | RUNNING | RUNNING | -
-    # 0.05   | no change
+    # 0.05   | SUCCESS, again | no change
     # 0.10   | FAILURE | INVALID | INVALID | INVALID | RUNNING: the work is preempted and never visited
     # 0.15   | no change but stop SUCCESS, root SUCCESS; then the tree is stopped
     assert log_of(guarded_tree(), 3) == [
@@ -58,6 +58,7 @@ def test_changes_and_stops_are_logged_in_tree_order() -> None:
         (0.0, "guarded/work", "RUNNING"),
         (0.0, "guarded/work/monitor", "RUNNING"),
         (0.0, "guarded/work/move", "RUNNING"),
+        (0.05, "guarded/guard", "SUCCESS"),
         (0.1, "guarded", "FAILURE"),
         (0.1, "guarded/guard", "FAILURE"),
         (0.1, "guarded/work", "INVALID"),

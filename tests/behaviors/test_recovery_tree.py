@@ -17,8 +17,10 @@ from py_trees.blackboard import Blackboard
 from py_trees.common import Status
 from scipy.spatial.transform import RigidTransform
 
+from app.attempts import Attempts
 from app.resources import shipped
 from behaviors import LEAVES, Leaf
+from interfaces.cause import Cause, ServiceError
 from interfaces.cell import KnownCell
 from interfaces.frame import Intrinsics, RgbdFrame
 from motion.task import Task
@@ -99,12 +101,14 @@ class Play:
         self.root = load_tree(shipped("tree")["recovery"], LEAVES, {"tries": "2"})
         self.leaves = {n.name.rsplit(".", 1)[1]: n for n in in_tree_order(self.root) if isinstance(n, Leaf)}
         self.seen: set[str] = set()
-        py_trees.trees.BehaviourTree(self.root).setup(services=services)
+        self.services = services
+        self.tree = py_trees.trees.BehaviourTree(self.root)
+        self.tree.setup(services=services)
 
     def run(self, ticks: int = 500) -> int:
         """Tick so often or until the tree ends; how often it was ticked."""
         for tick in range(1, ticks + 1):
-            self.root.tick_once()
+            self.tree.tick()
             self.seen |= {name for name, leaf in self.leaves.items() if leaf.status is Status.RUNNING}
             if self.root.status is not Status.RUNNING:
                 return tick
@@ -170,3 +174,32 @@ def test_a_slip_at_any_tick_of_carrying_and_inserting_ends_stowed(play: Make, sl
     whole = play(slip)
     whole.run()
     assert whole.root.status is Status.SUCCESS
+
+
+@pytest.mark.parametrize("trouble", ["slip", "no hand", "dark cameras", "rear camera breaks off", "jaw breaks off"])
+def test_every_failed_leaf_names_a_cause(
+    play: Callable[[int], Play], monkeypatch: pytest.MonkeyPatch, trouble: str
+) -> None:
+    def breaks(*_arguments: Any) -> None:
+        raise ServiceError("broke off")
+
+    whole = play(2)
+    attempts = Attempts(whole.root, whole.services.belief.causes, whole.clock.now)
+    if trouble == "no hand":
+        monkeypatch.setattr(whole.motion, "pick", lambda *_, **__: Task(iter([None]), lambda: None))
+        monkeypatch.setattr(whole.hand, "close", lambda force: setattr(whole.hand, "gap", 0.0))
+    elif trouble == "dark cameras":
+        whole.eyes.troubles |= {"rear": "the rear camera is dark", "wrist": "the wrist camera is dark"}
+    elif trouble != "slip":
+        broken, what = (whole.eyes, "look") if "camera" in trouble else (whole.hand, "reading")
+        monkeypatch.setattr(broken, what, breaks)
+    whole.tree.add_visitor(attempts)
+    whole.run()
+    failed = [attempt for attempt in attempts.made if attempt.status == "FAILURE"]
+    assert {type(attempt.cause) for attempt in failed} == {Cause}
+    ended = {attempt.path.rsplit("/", 1)[-1] for attempt in failed}
+    assert ended >= ({"detect_slip", "holding"} if trouble == "slip" else {"safe_stop"})
+    assert all(attempt.cause and attempt.cause.message for attempt in failed)
+    if trouble != "slip":
+        assert (cause := attempts.cause()) is not None
+        assert not cause.node.endswith("safe_stop")

@@ -24,6 +24,15 @@ def test_it_stops_the_arms_at_once_and_fails_with_the_last_cause(known: KnownCel
     assert stage.motion.stopped == 1
     assert stage.belief.causes[-1].code is CauseCode.OUT_OF_REACH
     assert "0.82 m" in stage.belief.causes[-1].message
+    assert stage.belief.causes[-1] is stage.belief.causes[-2]  # passed on, with the node that it came from
+    assert stage.log.of("failed") == [
+        {
+            "node": "safe_stop",
+            "code": "out_of_reach",
+            "message": "connector 0.82 m from the right arm",
+            "of": "root/b",
+        }
+    ]
     assert not stage.motion.grippers["right"].told  # the jaw keeps its force
 
 

@@ -73,8 +73,8 @@ def test_visits_results_stops_and_seconds_are_counted_from_changes() -> None:
     stats = run_stats(changes)
     assert stats["a"].text == "2 visits, 1 stopped, 2.50 s"  # and runs on
     assert stats["b"].text == "3 visits, 1 ok, 2 failed, 1.50 s"
-    assert stats["c"].text == "not visited"
-    assert [stats[path].last for path in "abc"] == ["RUNNING", "FAILURE", "INVALID"]
+    assert "c" not in stats
+    assert [stats[path].last for path in "ab"] == ["RUNNING", "FAILURE"]
 
 
 def test_a_file_without_a_main_tree_is_refused(tmp_path: Path) -> None:

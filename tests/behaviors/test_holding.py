@@ -1,0 +1,23 @@
+from pathlib import Path
+
+from fake_services import Stage
+from py_trees.common import Status
+from scipy.spatial.transform import RigidTransform
+
+from behaviors.services import Notice
+from interfaces.cause import Cause, CauseCode
+from interfaces.cell import KnownCell
+
+
+def test_an_empty_hand_says_how_often_and_when_it_lost_what_it_held(known: KnownCell, tmp_path: Path) -> None:
+    stage = Stage(known, tmp_path)
+    tree = stage.tree('<Holding name="holding"/>')
+    assert stage.run(tree, 0.0) is Status.FAILURE
+    stage.belief.notices += [Notice(3.0, "distance"), Notice(9.3, "gap")]
+    assert stage.run(tree, 0.0) is Status.FAILURE
+    assert stage.belief.causes == [
+        Cause(CauseCode.NOTHING_HELD, "the hand holds nothing; no loss was noticed", "holding"),
+        Cause(CauseCode.NOTHING_HELD, "the hand holds nothing; 2 losses noticed, the last at 9.30 s by gap", "holding"),
+    ]
+    stage.belief.held = RigidTransform.identity()
+    assert stage.run(tree, 0.0) is Status.SUCCESS
