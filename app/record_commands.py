@@ -49,27 +49,32 @@ def explain(
 def replay(
     folder: Folder,
     begin: Annotated[float | None, typer.Option("--from", metavar="SECONDS", help="Begin here.")] = None,
-    end: Annotated[float | None, typer.Option("--to", metavar="SECONDS", help="In a pipe, end here.")] = None,
+    end: Annotated[float | None, typer.Option("--to", metavar="SECONDS", help="End here.")] = None,
     part: Annotated[str, typer.Option("--filter", metavar="TEXT", help="Only nodes with this in their path.")] = "",
 ) -> None:
-    """Step through a run's ticks on the terminal: the tree, what changed, what happened. In a pipe, print them.
+    """Step through a run's changes on the terminal: the tree, what changed, what happened. In a pipe, print them.
+
+    A change is a tick in which a node's status changed or something happened; ticks that went like the one before are
+    left out.
 
     \b
-    Keys: right/left step, PgDn/PgUp ten ticks, Home/End, n next failure, g go to a time, / filter, q quit.
+    Keys: right/left step, PgDn/PgUp ten changes, Home/End, n next failure, g go to a time, / filter, q quit.
     \b
     Examples:
       regrasp replay runs/short_obstacle-0-1
       regrasp replay runs/short_obstacle-0-1 --from 8 --to 12 --filter delivery | less
     """
-    from app.replay import Replay
+    from app.replay import Replay, check_span
 
-    run = Replay(_read(folder))
+    check_span(begin, end)
+    run = Replay(_read(folder), float("inf") if end is None else end)
+    run.check(begin or 0.0, part)
     if sys.stdin.isatty() and sys.stdout.isatty() and os.environ.get("TERM") != "dumb":
         from app.replay_screen import show
 
         show(run, part, begin or 0.0)
         return
-    for line in run.lines(begin or 0.0, float("inf") if end is None else end, part):
+    for line in run.lines(begin or 0.0, part):
         typer.echo(line)
 
 

@@ -1,20 +1,23 @@
-"""A record tick by tick: what every node was at each, as lines or for a screen."""
+"""A record change by change: what every node was after each, as lines or for a screen."""
 
+import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from app.findings import Finding, Findings, printable, shown
+from app.findings import Finding, Findings, nearest, printable, shown
 from app.record_reader import Event, RunRecord, Tick
 from app.resources import read_text
 from app.timeline import event_text
 from trees.element import TreeSyntaxError
 from trees.graph import Node, read_graph
 
+SLACK = 1e-9  # s, for a second that was typed
+
 
 @dataclass
 class Frame:
-    """One moment at which something happened: the nodes' changes and the events, in their order."""
+    """One tick in which something changed: the nodes' changes and the events, in their order."""
 
     t: float
     changes: list[Tick] = field(default_factory=list)
@@ -31,20 +34,26 @@ class Row:
 
 
 class Replay:
-    """The frames of a record, and the rows of its tree in tree order."""
+    """The frames of a record up to second `end`, and the rows of its tree in tree order.
 
-    def __init__(self, record: RunRecord) -> None:
+    A node that ends again as it did before has not changed: a guard that is asked at every tick would be all there is.
+    """
+
+    def __init__(self, record: RunRecord, end: float = math.inf) -> None:
         """Raises `Findings` for a tree.xml that cannot be read, and for a record in which nothing happened."""
         frames: dict[float, Frame] = {}
+        last: dict[str, str] = {}
         for tick in record.ticks:
-            frames.setdefault(tick.t, Frame(tick.t)).changes.append(tick)
+            if last.get(tick.path) != tick.status:
+                frames.setdefault(tick.t, Frame(tick.t)).changes.append(tick)
+            last[tick.path] = tick.status
         for event in record.events:
             frames.setdefault(event.t, Frame(event.t)).events.append(event)
         if not frames:
             raise Findings(
                 [Finding(shown(record.folder), 1, "nothing happened in this run; there is nothing to replay")]
             )
-        self.frames = [frames[t] for t in sorted(frames)]
+        self.frames = [frames[t] for t in sorted(frames) if t <= max(end, min(frames)) + SLACK]
         self.rows = _rows(record)
         self._times = [frame.t for frame in self.frames]
         self._history: dict[str, tuple[list[int], list[str]]] = {}
@@ -62,7 +71,27 @@ class Replay:
 
     def at(self, seconds: float) -> int:
         """Index of the last frame at or before that second, the first one if there is none."""
-        return max(0, bisect_right(self._times, seconds + 1e-9) - 1)
+        return max(0, bisect_right(self._times, seconds + SLACK) - 1)
+
+    def known(self, part: str) -> bool:
+        """Whether a node of the tree, or of an event, has `part` in its path."""
+        return any(part in path for path in self._paths())
+
+    def check(self, begin: float, part: str) -> None:
+        """Raises `Findings` where nothing is left to show from second `begin` or of paths with `part`."""
+        found = []
+        if begin > self._times[-1] + SLACK:
+            wrong = f"{begin:g} s is after the last change, at {self._times[-1]:.2f} s; name an earlier second"
+            found.append(Finding("--from", 1, wrong))
+        if not self.known(part):
+            names = {path.rsplit("/", 1)[-1] for path in self._paths()}
+            found.append(Finding("--filter", 1, f"no node has {part!r} in its path; {nearest(part, names)}"))
+        if found:
+            raise Findings(found)
+
+    def _paths(self) -> list[str]:
+        events = {event.node for frame in self.frames for event in frame.events if event.node}
+        return [*(row.path for row in self.rows), *events]
 
     def next_failure(self, index: int, part: str = "") -> int | None:
         """Index of the next frame in which a node fails whose path has `part` in it."""
@@ -71,9 +100,9 @@ class Replay:
             (i for i in later if any(t.status == "FAILURE" and part in t.path for t in self.frames[i].changes)), None
         )
 
-    def lines(self, begin: float, end: float, part: str) -> Iterator[str]:
-        """Changes and events from second `begin` to `end` of the nodes whose path has `part` in it, a line each."""
-        for frame in self.frames[bisect_left(self._times, begin - 1e-9) : bisect_right(self._times, end + 1e-9)]:
+    def lines(self, begin: float, part: str) -> Iterator[str]:
+        """Changes and events from second `begin` of the nodes whose path has `part` in it, a line each."""
+        for frame in self.frames[bisect_left(self._times, begin - SLACK) :]:
             yield from (
                 printable(f"{frame.t:8.2f}  {tick.path}  {tick.status}") for tick in frame.changes if part in tick.path
             )
@@ -82,6 +111,19 @@ class Replay:
                 for event in frame.events
                 if part in event.node
             )
+
+
+def check_span(begin: float | None, end: float | None) -> None:
+    """Raises `Findings` for seconds that are none, and for an end before the beginning."""
+    found = [
+        Finding(option, 1, f"{seconds:g} is no second of a run; write a number such as 8.5")
+        for option, seconds in (("--from", begin), ("--to", end))
+        if seconds is not None and not 0 <= seconds < math.inf
+    ]
+    if not found and begin is not None and end is not None and begin > end:
+        found.append(Finding("--to", 1, f"{end:g} s is before --from, {begin:g} s; name a later second"))
+    if found:
+        raise Findings(found)
 
 
 def _rows(record: RunRecord) -> list[Row]:

@@ -1,4 +1,4 @@
-"""`regrasp replay` on a terminal: the tree at a tick, and keys to go from tick to tick."""
+"""`regrasp replay` on a terminal: the tree after a change, and keys to go from change to change."""
 
 import re
 from dataclasses import dataclass, replace
@@ -12,8 +12,14 @@ from app.keys import keyboard
 from app.replay import Replay
 from app.timeline import event_text
 
-PAGE = 10  # ticks
-HELP = "right/left step  PgDn/PgUp 10  Home/End  n next failure  g go to a time  / filter  q quit"
+PAGE = 10  # changes
+HELP = (  # the first that fits is shown
+    "right/left step  PgDn/PgUp 10  Home/End  n next failure  g go to a time  / filter  q quit",
+    "right/left step  PgDn/PgUp 10  Home/End  n failure  g time  / filter  q quit",
+    "arrows  n failure  g time  / q quit",
+    "q quit",
+)
+STATUS_WIDTH = 7  # of each of the four
 COLORS = {"RUNNING": "yellow", "SUCCESS": "green", "FAILURE": "bold red", "INVALID": "dim"}
 STEPS = {"forward": 1, " ": 1, "l": 1, "back": -1, "h": -1, "page forward": PAGE, "page back": -PAGE}
 PROMPTS = {"g": "go to second: ", "/": "only paths with: "}
@@ -70,23 +76,24 @@ def _typed(replay: Replay, view: View, key: str) -> View:
     if key != "enter":
         return replace(view, typed=view.typed + key) if len(key) == 1 and key.isprintable() else view
     if view.prompt == "/":
-        return replace(closed, part=view.typed)
+        known = replay.known(view.typed)
+        return replace(closed, part=view.typed) if known else replace(closed, note=f"no node has {view.typed!r}")
     if not re.fullmatch(r"\d*\.?\d+", view.typed):
         return replace(closed, note=f"{view.typed!r} is no number of seconds")
     return replace(closed, index=replay.at(float(view.typed)))
 
 
 def draw(replay: Replay, view: View, width: int, height: int) -> Group:
-    """The screen: a line of where we are, the tree, the tick's events, a line of keys."""
+    """The screen: a line of where we are, the tree, the change's events, a line of keys."""
     frame = replay.frames[view.index]
     events = [
         f"{_own_name(event.node) or '-'}  {event_text(event)}" for event in frame.events if view.part in event.node
     ]
     events = events[: max(1, height // 4)]
-    head = f"{frame.t:8.2f} s   tick {view.index + 1} of {len(replay.frames)}"
+    head = f"{frame.t:8.2f} s   change {view.index + 1} of {len(replay.frames)}"
     head += f"   only paths with {view.part!r}" if view.part else ""
-    foot = PROMPTS[view.prompt] + view.typed + "_" if view.prompt else view.note or HELP
-    tree = _tree(replay, view, max(1, height - len(events) - 3))
+    foot = PROMPTS[view.prompt] + view.typed + "_" if view.prompt else view.note or _help(width)
+    tree = _tree(replay, view, width, max(1, height - len(events) - 3))
     lines = [Text(head, "bold"), *tree, *(Text(printable(text), "cyan") for text in events), Text(foot, "reverse")]
     for line in lines:
         line.no_wrap, line.overflow = True, "ellipsis"
@@ -94,23 +101,42 @@ def draw(replay: Replay, view: View, width: int, height: int) -> Group:
     return Group(*lines)
 
 
-def _tree(replay: Replay, view: View, height: int) -> list[Text]:
-    """As many lines of the tree as there is place, around the first change of this tick."""
+def _help(width: int) -> str:
+    return next((text for text in HELP if len(text) <= width), HELP[-1])
+
+
+def _tree(replay: Replay, view: View, width: int, height: int) -> list[Text]:
+    """As many lines of the tree as there is place, around the first node that changed."""
     nodes = [node for node in replay.rows if view.part in node.path]
     changed = {tick.path for tick in replay.frames[view.index].changes}
     focus = next((i for i, node in enumerate(nodes) if node.path in changed), 0)
     top = max(0, min(focus - height // 3, len(nodes) - height))
+    names = [printable(node.path if view.part else "  " * node.depth + _own_name(node.path)) for node in nodes]
+    column = min(max(map(len, names), default=0), max(width - STATUS_WIDTH - 4, 1))
     lines = []
-    for node in nodes[top : top + height]:
+    for node, name in zip(nodes[top : top + height], names[top : top + height], strict=True):
         status = replay.status(node.path, view.index)
-        name = node.path if view.part else "  " * node.depth + _own_name(node.path)
         line = Text()
         line.append("* " if node.path in changed else "  ", "bold")
-        line.append(printable(f"{name:<36} "), COLORS[status])
-        line.append(f"{status:<8}", COLORS[status] + (" reverse" if node.path in changed else ""))
-        line.append(printable(f"  {node.type}"), "dim")
+        line.append(f"{_shortened(name, column):<{column}}  ", COLORS[status])
+        line.append(f"{status:<{STATUS_WIDTH}}", COLORS[status] + (" reverse" if node.path in changed else ""))
+        if len(line) + 2 + len(node.type) <= width:
+            line.append(printable(f"  {node.type}"), "dim")
         lines.append(line)
     return lines
+
+
+def _shortened(name: str, width: int) -> str:
+    """The indented name without the middle that is too much for `width` columns; at most half of them are indent."""
+    if len(name) <= width:
+        return name
+    own = name.lstrip()
+    indent = min(len(name) - len(own), width // 2)
+    room = width - indent
+    if len(own) > room:
+        tail = (room - 1) // 2
+        own = own[: room - 1 - tail] + "…" + own[len(own) - tail :]
+    return " " * indent + own
 
 
 def _own_name(path: str) -> str:

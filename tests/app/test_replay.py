@@ -71,6 +71,35 @@ def test_in_a_pipe_it_prints_lines(folder: Path) -> None:
     assert len(CliRunner().invoke(app, ["replay", str(folder)]).stdout.splitlines()) > 15
 
 
+def test_the_screen_ends_where_it_is_told(folder: Path) -> None:
+    record = read_record(folder)
+    assert [frame.t for frame in Replay(record, 1.0).frames] == [0.0, 0.5, 1.0]
+    assert [frame.t for frame in Replay(record, 0.2).frames] == [0.0]
+
+
+WRONG = {
+    "no number": (["--from", "nan"], "--from:1: nan is no second of a run; write a number such as 8.5"),
+    "no end": (["--to", "inf"], "--to:1: inf is no second of a run; write a number such as 8.5"),
+    "before the beginning": (["--from=-1"], "--from:1: -1 is no second of a run; write a number such as 8.5"),
+    "end first": (["--from", "30", "--to", "20"], "--to:1: 20 s is before --from, 30 s; name a later second"),
+    "too late": (["--from", "99"], "--from:1: 99 s is after the last change, at 1.50 s; name an earlier second"),
+    "no such node": (["--filter", "grsp"], "--filter:1: no node has 'grsp' in its path; did you mean 'grasp'?"),
+}
+
+
+@pytest.mark.parametrize(("args", "told"), WRONG.values(), ids=WRONG.keys())
+def test_what_shows_nothing_is_told_in_one_line(folder: Path, args: list[str], told: str) -> None:
+    ran = CliRunner().invoke(app, ["replay", str(folder), *args])
+    assert (ran.exit_code, ran.stdout, ran.stderr) == (2, "", told + "\n")
+
+
+def test_an_end_like_the_one_before_is_no_change(folder: Path) -> None:
+    lines = [f'{{"t": {t}, "path": "root", "status": "{s}"}}\n' for t, s in ((0.0, "SUCCESS"), (1.0, "SUCCESS"))]
+    (folder / "ticks.jsonl").write_text("".join(lines))
+    (folder / "events.jsonl").write_text("")
+    assert [frame.t for frame in Replay(read_record(folder)).frames] == [0.0]
+
+
 def press(replay: Replay, view: View, *keys: str) -> View | None:
     for key in keys:
         if (after := pressed(replay, view, key)) is None:
@@ -97,6 +126,7 @@ def press(replay: Replay, view: View, *keys: str) -> View | None:
         (["g", *"nan", "enter"], View(0, note="'nan' is no number of seconds")),
         (["g", *"1", "escape"], View(0)),
         (["/", *"neverr", "delete", "enter", "n"], View(3, part="never")),
+        (["/", *"grips", "enter"], View(0, note="no node has 'grips'")),
         (["/", "q"], View(0, prompt="/", typed="q")),
         (["q"], None),
         (["?"], View(0)),
@@ -115,18 +145,18 @@ def drawn(replay: Replay, view: View, width: int = 80, height: int = 24) -> list
 
 def test_the_screen_shows_tree_changes_and_events(replay: Replay) -> None:
     assert drawn(replay, View(1)) == [
-        "    0.50 s   tick 2 of 4",
-        "  root                                 RUNNING   Fallback",
-        "    mission                            RUNNING   Sequence",
-        "      start                            SUCCESS   Look",
-        "      tries                            RUNNING   Retry",
-        "*       try                            FAILURE   Sequence",
-        "          held                         SUCCESS   Look",
-        "*         grasp                        FAILURE   Grasp",
-        "    stop                               INVALID   Stop",
-        "    never                              INVALID   Stop",
+        "    0.50 s   change 2 of 4",
+        "  root           RUNNING  Fallback",
+        "    mission      RUNNING  Sequence",
+        "      start      SUCCESS  Look",
+        "      tries      RUNNING  Retry",
+        "*       try      FAILURE  Sequence",
+        "          held   SUCCESS  Look",
+        "*         grasp  FAILURE  Grasp",
+        "    stop         INVALID  Stop",
+        "    never        INVALID  Stop",
         "grasp  slip: by=gap, value=0.0443",
-        "right/left step  PgDn/PgUp 10  Home/End  n next failure  g go to a time  / filt…",
+        "right/left step  PgDn/PgUp 10  Home/End  n failure  g time  / filter  q quit",
     ]
 
 
@@ -139,6 +169,28 @@ def test_the_screen_fits_and_holds_what_changed(replay: Replay, width: int, heig
         assert any(line.startswith("*") for line in lines)
 
 
+@pytest.mark.parametrize("width", [40, 80, 160])
+@pytest.mark.parametrize("part", ["", "grasp"])
+def test_at_any_width_statuses_are_whole_and_the_last_line_says_how_to_quit(
+    replay: Replay, width: int, part: str
+) -> None:
+    lines = drawn(replay, View(1, part=part), width)
+    assert lines[-1].endswith("q quit")
+    [grasp] = [line for line in lines if "grasp " in line and line.startswith("*")]
+    assert "  FAILURE" in grasp
+    assert (GRASP in grasp) == (part != "" and width > 40)
+    assert grasp.startswith("* root/mission/t…/one/try/grasp  FAILURE" if part and width == 40 else "* ")
+
+
+def test_a_name_that_is_too_long_loses_its_middle_and_then_half_its_indent(folder: Path) -> None:
+    long = "root/" + "a/" * 20 + "the_name_of_a_node_that_is_long"
+    (folder / "ticks.jsonl").write_text(f'{{"t": 0.0, "path": "{long}", "status": "RUNNING"}}\n')
+    (folder / "events.jsonl").write_text("")
+    (folder / "tree.xml").unlink()
+    lines = drawn(Replay(read_record(folder)), View(), 40)
+    assert lines[1] == "*               the_nam…is_long  RUNNING"
+
+
 def test_a_filter_leaves_whole_paths(replay: Replay) -> None:
     lines = drawn(replay, replace(View(1), part="grasp"))
     assert lines[0].endswith("only paths with 'grasp'")
@@ -149,11 +201,11 @@ Type = Callable[[bytes, bytes], bytes]  # sends keys and reads until a text show
 
 
 @pytest.fixture
-def terminal(folder: Path) -> Iterator[tuple[subprocess.Popen[bytes], Type, int]]:
-    """`regrasp replay` on a pseudo-terminal of 80 by 24."""
+def terminal(folder: Path, request: pytest.FixtureRequest) -> Iterator[tuple[subprocess.Popen[bytes], Type, int]]:
+    """`regrasp replay` on a pseudo-terminal of 80 by 24, or as wide as the test's parameter; with --to 1.5."""
     ours, theirs = pty.openpty()
-    fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 80, 0, 0))
-    command = [sys.executable, "-m", "app", "replay", str(folder)]
+    fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 24, getattr(request, "param", 80), 0, 0))
+    command = [sys.executable, "-m", "app", "replay", str(folder), "--to", "1.5"]
     env = os.environ | {"TERM": "xterm-256color"}
     env = {name: value for name, value in env.items() if name not in ("COLUMNS", "LINES", "NO_COLOR")}
     process = subprocess.Popen(command, stdin=theirs, stdout=theirs, stderr=theirs, env=env, start_new_session=True)
@@ -179,12 +231,12 @@ def test_on_a_terminal_keys_step_and_the_terminal_is_restored(
 ) -> None:
     process, type_, theirs = terminal
     before = termios.tcgetattr(theirs)
-    first = type_(b"", b"tick 1 of 4")
+    first = type_(b"", b"change 1 of 4")
     assert b"\x1b[?1049h" in first  # the alternate screen
-    type_(b"\x1b[C", b"tick 2 of 4")
-    type_(b"\x1b[F", b"tick 4 of 4")
-    type_(b"g0.5\r", b"tick 2 of 4")
-    type_(b"n", b"tick 3 of 4")
+    type_(b"\x1b[C", b"change 2 of 4")
+    type_(b"\x1b[F", b"change 4 of 4")
+    type_(b"g0.5\r", b"change 2 of 4")
+    type_(b"n", b"change 3 of 4")
     assert not termios.tcgetattr(theirs)[3] & termios.ICANON
     if leave == b"q":
         type_(b"q", b"\x1b[?1049l")
@@ -193,3 +245,14 @@ def test_on_a_terminal_keys_step_and_the_terminal_is_restored(
         type_(b"", b"\x1b[?1049l")
     assert process.wait(60) == (0 if leave == b"q" else 130)
     assert termios.tcgetattr(theirs) == before
+
+
+@pytest.mark.parametrize("terminal", [40, 160], indirect=True)
+def test_a_narrow_and_a_wide_terminal_show_statuses_and_how_to_quit(
+    terminal: tuple[subprocess.Popen[bytes], Type, int],
+) -> None:
+    process, type_, _ = terminal
+    assert b"RUNNING" in type_(b"", b"q quit")
+    assert b"FAILURE" in type_(b"n", b"q quit")
+    type_(b"q", b"\x1b[?1049l")
+    assert process.wait(60) == 0
