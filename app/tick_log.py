@@ -14,7 +14,9 @@ class TickLog(py_trees.visitors.VisitorBase):
     """Writes {"t": simulated s, "path": "root/carry/move", "status": "RUNNING"} for every status that a tick changed.
 
     A node that ends again as it ended before, such as a guard that is asked at every tick, has a line for each end: a
-    reader can count what was done. Add it to a `BehaviourTree` as a visitor. Lines of one tick stand in tree order. Status is taken when a node is
+    reader can count what was done.
+
+    Add it to a `BehaviourTree` as a visitor. Lines of one tick stand in tree order. Status is taken when a node is
     visited, and once more after the tick: a node that was stopped later in the tick (preempted, or its Parallel ended)
     is not visited again and goes INVALID unseen. After `root.stop(...)` outside a tick call `finalise()`.
     """

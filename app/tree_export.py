@@ -16,6 +16,8 @@ from interfaces.quote import quoted
 from trees import Node, TreeSyntaxError, collapsed, read_graph, recorded, run_stats
 from trees.export import FORMATS, SUFFIXES, THEMES, export_tree
 
+MOST_MISSING = 3  # nodes that are named
+
 
 @dataclass(frozen=True)
 class Request:
@@ -87,18 +89,17 @@ def _wrong_out(out: Path, form: str) -> Iterator[Finding]:
 
 
 def _tree_file(request: Request, record: RunRecord | None) -> Path:
-    """The file of the tree that is named, else the run's own copy, else the shipped one that the run names."""
+    """The file of the tree that is named, else the run's own copy."""
     if request.tree is not None:
         return resolve("tree", request.tree, Path())
     assert record is not None  # _form saw to it
     copy = record.folder / "tree.xml"
-    if copy.is_file():
-        return copy
-    name = record.begin.get("tree")
-    where = (shown(record.folder / "events.jsonl"), 1)
-    if not isinstance(name, str):
-        raise Findings([Finding(*where, "does not name the run's tree; name it: regrasp trees export TREE --run DIR")])
-    return resolve("tree", name, Path(), where)
+    if not copy.is_file():
+        wrong = "is no file" if copy.exists() else "is missing"
+        raise Findings(
+            [Finding(shown(copy), 1, f"{wrong}; name the tree that ran: regrasp trees export TREE --run DIR")]
+        )
+    return copy
 
 
 def _read(path: Path, record: RunRecord | None) -> Node:
@@ -126,11 +127,15 @@ def _with_run(path: Path, record: RunRecord) -> Node:
 
 
 def _check_paths(path: Path, record: RunRecord, known: Collection[str]) -> None:
+    missing: dict[str, int] = {}  # the line on which each came first
     for number, tick in enumerate(record.ticks, 1):
         if tick.path not in known:
-            wrong = f"there is no node {quoted(tick.path)} in {shown(path)}; {nearest(tick.path, known)}"
-            hint = "name the tree that ran, or leave TREE out"
-            raise Findings([Finding(shown(record.folder / "ticks.jsonl"), number, f"{wrong} ({hint})")])
+            missing.setdefault(tick.path, number)
+    if missing:
+        first, more = [*missing][:MOST_MISSING], len(missing) - MOST_MISSING
+        names = ", ".join(first) + (f" and {more} more nodes" if more > 0 else "")
+        wrong = f"{shown(path)} is not the tree that ran: it has no {names}; name that tree, or leave TREE out"
+        raise Findings([Finding(shown(record.folder / "ticks.jsonl"), missing[first[0]], wrong)])
 
 
 def _write(out: Path, content: bytes, tree: Path) -> None:

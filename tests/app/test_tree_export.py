@@ -102,10 +102,19 @@ def test_a_killed_run_and_one_without_a_copy_of_its_tree(here: Path) -> None:
     assert "FAILED" not in export("--run", "run").stdout
     (here / "run" / "tree.xml").unlink()
     told = export("--run", "run")
-    assert "events.jsonl:1: does not name the run's tree; name it" in told.stderr
+    assert told.exit_code == 2
+    assert told.stderr.startswith("run/tree.xml:1: is missing; name the tree that ran: ")
+
+
+def test_a_run_of_another_tree_is_told_with_the_first_nodes_that_are_missing(here: Path) -> None:
+    write_record(here / "run")
     told = export("recovery", "--run", "run")
-    assert "ticks.jsonl:1: there is no node 'root'" in told.stderr
-    assert "name the tree that ran" in told.stderr
+    assert told.exit_code == 2
+    assert told.stderr.startswith("run/ticks.jsonl:1: ")
+    assert told.stderr.endswith(
+        "recovery.xml is not the tree that ran: it has no root, root/mission, root/mission/start and 6 more nodes; "
+        "name that tree, or leave TREE out\n"
+    )
 
 
 @pytest.mark.parametrize("text", ["", "<root", "<root/>", "\x00", '<root main_tree_to_execute="M"/>'])
