@@ -8,17 +8,29 @@ from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
-from pydantic import Field, TypeAdapter, ValidationError
+from pydantic import AfterValidator, Field, TypeAdapter, ValidationError
 from pydantic_core import from_json
 
 from app import output
 from app.findings import Finding, Findings, shown
 from app.record import SCHEMA, NodeStatus, Result
+from trees.wiring import MAX_TREE_DEPTH
 
 MAX_RESULT, MAX_LINES = 16 << 20, 64 << 20  # bytes of result.json, of each of the others: hours of a run
 MOST_FINDINGS = 10  # of one file
+TOO_DEEP = f"a path with more than {MAX_TREE_DEPTH} steps, which no tree has"
 T = TypeVar("T")
 Seconds = Annotated[float, Field(ge=0, le=1e6, allow_inf_nan=False)]
+
+
+def _path(path: str) -> str:
+    """The path of a node that a tree may have."""
+    if path.count("/") > MAX_TREE_DEPTH:
+        raise ValueError(TOO_DEEP)
+    return path
+
+
+NodePath = Annotated[str, AfterValidator(_path)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,7 +38,7 @@ class Tick:
     """A node's status changed: when (simulated s), which node, to what."""
 
     t: Seconds
-    path: str
+    path: NodePath
     status: NodeStatus
 
 
@@ -92,7 +104,7 @@ def _adapter(kind: type[T]) -> TypeAdapter[T]:
 class _EventHead:
     t: Seconds
     event: str
-    node: str = ""
+    node: NodePath = ""
 
 
 def _event(value: dict[str, Any]) -> Event:
@@ -139,7 +151,11 @@ def _result(path: Path, found: list[Finding]) -> Result | None:
             raise ValueError(f"no 'schema' with a number; a result.json that this program reads has {SCHEMA}")
         if schema > SCHEMA:
             raise ValueError(f"schema {schema} is newer than {SCHEMA}, which this program reads; take a newer Regrasp")
-        return _adapter(Result).validate_python(value)
+        result = _adapter(Result).validate_python(value)
+        for number, attempt in enumerate(result.attempts):
+            if attempt.path.count("/") > MAX_TREE_DEPTH:
+                raise ValueError(f"attempts.{number}.path: {TOO_DEEP}; app/RECORD.md says what belongs there")
+        return result
     except ValueError as error:
         at = re.search(r" at line (\d+) column", str(error))
         found.append(Finding(shown(path), int(at[1]) if at else 1, _sentence(error)))
@@ -169,7 +185,7 @@ def _object(text: bytes) -> dict[str, Any]:
     try:
         value = from_json(text, allow_inf_nan=False)
     except ValueError as error:
-        raise ValueError(f"not JSON: {error}") from None
+        raise ValueError(f"not JSON: {error}; a run writes {{...}}") from None
     if not isinstance(value, dict):
         raise ValueError("no JSON object; a run writes {...}")
     return value

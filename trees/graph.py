@@ -106,7 +106,7 @@ def read_graph(path: Path, leaves: Mapping[str, type] | None = None, inputs: Map
     trees = {tree.attributes.get("ID", ""): tree for tree in root.children}
     main = root.attributes.get("main_tree_to_execute", "")
     if main not in trees or not trees[main].children:
-        raise ValueError(f"no tree {quoted(main)}")
+        raise ValueError(f"no tree {quoted(main)} with a node in it; name one in main_tree_to_execute")
     keys = _constants(trees[main].attributes | dict(inputs or {}), {})
     return _node(trees[main].children[0], "", _Scope(trees, leaves, keys, (main,)))
 
@@ -131,7 +131,9 @@ def recorded(node: Node, stats: Mapping[str, NodeStats], failed: Collection[str]
 def _node(element: Element, above: str, scope: _Scope) -> Node:
     path = f"{above}/{element.name}" if above else element.name
     if next(scope.room, None) is None or path.count("/") >= MAX_TREE_DEPTH:
-        raise ValueError(f"more than {MAX_NODES} nodes, or deeper than {MAX_TREE_DEPTH}, with its subtrees filled in")
+        raise ValueError(
+            f"more than {MAX_NODES} nodes, or deeper than {MAX_TREE_DEPTH}, with its subtrees filled in; include fewer"
+        )
     if element.tag == "SubTree":
         return _subtree(element, path, scope)
     leaf = scope.leaves.get(element.tag)

@@ -1,4 +1,4 @@
-"""`make fuzz`: hostile scenarios, cells and trees against their readers.
+"""`make fuzz`: hostile scenarios, cells, trees and records against their readers.
 
 A worker process reads one file after another; each reading must come to an end within `SECONDS` and `MEMORY`, in
 success or with findings of a line each, and write nothing.
@@ -9,6 +9,7 @@ import os
 import random
 import re
 import resource
+import shutil
 import sys
 import tempfile
 from collections import Counter
@@ -17,10 +18,12 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-from hostile_files import Case, cases
+from hostile_files import KINDS, RECORD, SHIPPED, Case, cases
 
 from app.findings import Findings
 
+RECORDED = KINDS[len(SHIPPED) :]
+FORMATS = ("ascii", "dot", "groot", "json", "mermaid", "svg")
 SECONDS = 5.0
 MEMORY = 2**30  # bytes more than the idle worker has
 FINDING = re.compile(r"[^\n]*:\d+: [^\n]*; [^\n]+")
@@ -30,15 +33,23 @@ def read(case: Case, folder: Path) -> str:
     """How reading the case went: "clean", "findings", or what is wrong with the reader."""
     from app.scenario_file import check_tree_file, load_cell, load_scenario  # late: in the worker
 
+    if case.kind in RECORDED:
+        run = folder / "run"
+        shutil.copytree(RECORD, run, dirs_exist_ok=True)
+        (run / case.kind).write_bytes(case.data)
+        verdict = look(run, random.Random(case.made).choice(FORMATS))
+        again = _verdict(lambda: load_scenario(str(run / "scenario.yaml")))
+        return next((one for one in (verdict, again) if one not in ("clean", "findings")), min(verdict, again))
     path = folder / ("case.xml" if case.kind == "tree" else "case.yaml")
     path.write_bytes(case.data)
+    if case.kind == "scenario":
+        return _verdict(lambda: load_scenario(str(path)))
+    return _verdict(lambda: load_cell(path) if case.kind == "cell" else check_tree_file(path))
+
+
+def _verdict(reading: Callable[[], Any]) -> str:
     try:
-        if case.kind == "scenario":
-            load_scenario(str(path))
-        elif case.kind == "cell":
-            load_cell(path)
-        else:
-            check_tree_file(path)
+        reading()
     except Findings as findings:
         odd = [str(f) for f in findings.items if not FINDING.fullmatch(str(f))]
         return f"finding without a remedy: {odd[0][:300]}" if odd else "findings"
@@ -49,11 +60,48 @@ def read(case: Case, folder: Path) -> str:
     return "clean"
 
 
+def look(run: Path, form: str) -> str:
+    """How all the commands went that look at records: "clean", "findings", or what is wrong with the first of them."""
+    from typer.testing import CliRunner
+
+    from app.cli import app
+
+    commands = (
+        ["explain", str(run)],
+        ["explain", str(run), "--json"],
+        ["replay", str(run)],
+        ["diff", str(run), str(RECORD)],
+        ["diff", str(RECORD), str(run)],
+        ["trees", "export", "--run", str(run), "--format", form],
+        ["trees", "export", "recovery", "--run", str(run)],
+    )
+    codes = set()
+    for command in commands:
+        ran = CliRunner().invoke(app, command)
+        codes.add(ran.exit_code)
+        if wrong := _wrong(ran.exit_code, ran.exception, ran.stdout, ran.stderr):
+            return f"{' '.join(command)}: {wrong}"[:500]
+    return "findings" if 2 in codes else "clean"
+
+
+def _wrong(code: int, error: BaseException | None, out: str, told: str) -> str | None:
+    """What is wrong with the end of a command: its exit code, what it raised, printed, and told; None for nothing."""
+    if error is not None and not isinstance(error, SystemExit):
+        return f"{type(error).__name__}: {error}"
+    if code not in (0, 1, 2):
+        return f"exit code {code}"
+    if odd := next((line for line in out.split("\n") if not line.isprintable()), None):
+        return f"it prints {odd!r}"
+    if code == 2 and (odd := next((line for line in told.splitlines() if not FINDING.fullmatch(line)), None)):
+        return f"finding without a remedy: {odd}"
+    return None
+
+
 def _work(pipe: Any, folder: str) -> None:
     """Read what the pipe brings; tell how it went and what files were opened for writing meanwhile."""
     os.chdir(folder)
-    for kind in ("scenario", "cell", "tree"):
-        read(Case(kind, b"", ""), Path(folder))  # all imports
+    for kind in KINDS:
+        read(Case(kind, (RECORD / kind).read_bytes() if kind in RECORDED else b"", ""), Path(folder))  # all imports
     written: list[str] = []
 
     def audit(event: str, args: tuple[Any, ...]) -> None:
@@ -110,7 +158,7 @@ def fuzz(count: int, seed: int, progress: Callable[[int], None] = lambda _done: 
 
 def main() -> int:
     """Command line; 0 when every reader stood every case."""
-    parser = argparse.ArgumentParser(description="Hostile scenarios, cells and trees against their readers.")
+    parser = argparse.ArgumentParser(description="Hostile scenarios, cells, trees and records against their readers.")
     parser.add_argument("--cases", type=int, default=2000)
     parser.add_argument(
         "--seed", type=int, default=random.SystemRandom().randrange(10**6), help="default: another each time"

@@ -1,9 +1,11 @@
 """Files that no reader should have to see: known tricks, and mutated copies of our own."""
 
+import json
 import random
 import re
 from collections.abc import Callable, Iterator
-from typing import NamedTuple
+from pathlib import Path
+from typing import Literal, NamedTuple
 
 from app.resources import shipped
 
@@ -37,8 +39,13 @@ HOSTILE = (
 )
 
 
+RECORD = Path(__file__).parent / "record"  # of a run of ten seconds
+SHIPPED: tuple[Literal["scenario", "cell", "tree"], ...] = ("scenario", "cell", "tree")
+KINDS = (*SHIPPED, *(path.name for path in sorted(RECORD.iterdir())))
+
+
 class Case(NamedTuple):
-    """One file to read: its kind ("scenario", "cell" or "tree"), its bytes, and how it was made."""
+    """One file to read: its kind ("scenario", "cell", "tree", or its name in a record), its bytes, how it was made."""
 
     kind: str
     data: bytes
@@ -46,16 +53,18 @@ class Case(NamedTuple):
 
 
 def cases(count: int, seed: int) -> Iterator[Case]:
-    """The catalogue, then mutated copies of the shipped files, `count` in all."""
+    """The catalogue, then mutated copies of the shipped files and of a record's, `count` in all."""
     made = 0
     for case in catalogue(random.Random(seed)):
         if made < count:
             made += 1
             yield case
-    ours = {kind: [path.read_bytes() for path in shipped(kind).values()] for kind in ("scenario", "cell", "tree")}
+    ours = {name: [(RECORD / name).read_bytes()] for name in KINDS[len(SHIPPED) :]}
+    for known in SHIPPED:
+        ours[known] = [path.read_bytes() for path in shipped(known).values()]
     for number in range(count - made):
         rng = random.Random(f"{seed}/{number}")
-        kind = rng.choice(("scenario", "cell", "tree"))
+        kind = rng.choice((*SHIPPED, *KINDS))
         data = rng.choice(ours[kind])
         names = [rng.choice(list(MUTATIONS)) for _ in range(rng.randint(1, 4))]
         for name in names:
@@ -106,6 +115,53 @@ def catalogue(rng: random.Random) -> Iterator[Case]:
         for kind in kinds:
             for encoding in ("utf-8", rng.choice(("utf-16", "utf-32", "latin-1", "utf-8-sig"))):
                 yield Case(kind, text.encode(encoding), f"{name} in {encoding}")
+    for kind, tricks in record_tricks().items():
+        for name, text in tricks.items():
+            yield Case(kind, text.encode("utf-8", "surrogatepass"), name)
+
+
+def record_tricks() -> dict[str, dict[str, str]]:
+    """By the file of a record: what stands for its content, by name."""
+    tick = {"t": 0.0, "path": "recovery", "status": "RUNNING"}
+    paths = {
+        "deep path": "a/" * 50_000,
+        "empty path": "",
+        "only slashes": "/" * 100,
+        "steering path": "recovery/\x1b[2J\u202e\n",
+        "lone surrogate": "\ud800",
+        "long name": "a" * 100_000,
+    }
+    line = json.dumps(tick)
+    ticks = {name: json.dumps(tick | {"path": path}) + "\n" for name, path in paths.items()} | {
+        "many lines": f"{line}\n" * 20_000,
+        "many nodes": "".join(json.dumps(tick | {"path": f"recovery/{i}"}) + "\n" for i in range(5_000)),
+        "huge second": json.dumps(tick | {"t": 1e308}) + "\n",
+        "blank lines": f"{line}\n\n\n{line}\n",
+        "deep JSON": '{"t":' * 50_000,
+        "key twice": '{"t": 0, "t": 1, "path": "a", "status": "RUNNING"}\n',
+        "empty": "",
+    }
+    event = {"t": 0.0, "event": "failed", "node": "recovery", "code": "slipped", "message": "m"}
+    events = {name: json.dumps(event | {"node": path}) + "\n" for name, path in paths.items()} | {
+        "begin of other types": json.dumps({"t": 0.0, "event": "begin", "inputs": [1], "overrides": {}, "seed": []})
+        + "\n",
+        "inputs of other types": json.dumps({"t": 0.0, "event": "begin", "inputs": {"tries": [{}], "x": None}}) + "\n",
+        "long message": json.dumps(event | {"message": "a b " * 100_000, "of": 7}) + "\n",
+        "many values": json.dumps(event | {f"v{i}": i for i in range(10_000)}) + "\n",
+        "no event": "",
+    }
+    result = json.loads((RECORD / "result.json").read_text(encoding="utf-8"))
+    attempt = result["attempts"][0]
+    results = {name: json.dumps(result | {"attempts": [attempt | {"path": path}]}) for name, path in paths.items()} | {
+        "long chain": json.dumps(
+            result | {"chain": [{"path": "a", "type": "b", "at": 0.0, "why": "c d " * 50}] * 2_000}
+        ),
+        "many attempts": json.dumps(result | {"attempts": [attempt] * 5_000}),
+        "newer": json.dumps(result | {"schema": 10**30}),
+        "deep": "[" * 50_000,
+        "null": "null",
+    }
+    return {"ticks.jsonl": ticks, "events.jsonl": events, "result.json": results}
 
 
 def doubling_subtrees(levels: int) -> str:

@@ -1,4 +1,4 @@
-"""The readers of scenarios, cells and trees stand hostile files; `make fuzz` goes on where this ends."""
+"""The readers of scenarios, cells, trees and records stand hostile files; `make fuzz` goes on where this ends."""
 
 from fuzz_readers import fuzz
 

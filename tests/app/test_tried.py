@@ -1,8 +1,13 @@
-import pytest
+from collections import Counter
+from dataclasses import replace
+from pathlib import Path
 
-from app.record_reader import Event
-from app.tried import told_by_ticks
-from trees import Execution
+import pytest
+from toy_record import write_record
+
+from app.record_reader import Event, read_record
+from app.tried import attempts, told_by_ticks
+from trees import Execution, run_stats
 
 
 def test_a_cause_is_told_by_the_event_of_the_failure() -> None:
@@ -17,3 +22,19 @@ def test_a_cause_is_told_by_the_event_of_the_failure() -> None:
 def test_an_event_that_names_no_cause_names_none(values: dict[str, object]) -> None:
     [attempt] = told_by_ticks([Execution("a", 0.0, 1.0, "FAILURE")], [Event(1.0, "failed", "a", values)])
     assert attempt.cause is None
+
+
+def test_the_ticks_and_events_of_a_real_run_tell_the_attempts_of_its_result() -> None:
+    record = read_record(Path(__file__).parent / "record")
+    assert record.result is not None
+    assert attempts(replace(record, result=None)) == [*record.result.attempts]
+    assert {attempt.cause is not None for attempt in record.result.attempts if attempt.status == "FAILURE"} == {True}
+
+
+def test_explain_and_the_tree_s_picture_count_alike(tmp_path: Path) -> None:
+    record = read_record(write_record(tmp_path / "run"))
+    stats = run_stats((tick.t, tick.path, tick.status) for tick in record.ticks)
+    counted = Counter[str]()
+    for attempt in attempts(record):
+        counted[attempt.path] += attempt.times
+    assert counted == {path: stats[path].visits for path in counted}
