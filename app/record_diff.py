@@ -71,8 +71,9 @@ def _first_tick(a: Sequence[Tick], b: Sequence[Tick]) -> Iterator[str]:
     if paths:
         path = max(paths, key=lambda path: path.count("/"))
         yield f"first differing tick at {t:.2f} s: {path}: {first.get(path, '-')} | {second.get(path, '-')}"
-    else:  # a node that came and went in one tick of one run
-        yield f"first differing tick at {t:.2f} s: " + " | ".join(f"{x.path} {x.status}" if x else "none" for x in pair)
+    else:  # a node that came and went in one tick of one run, or ended again as before
+        told = (f"{x.path} {x.status}" if x and x.t == t else "none" for x in pair)
+        yield f"first differing tick at {t:.2f} s: " + " | ".join(told)
 
 
 def _course(run: RunRecord) -> list[Event]:

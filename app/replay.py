@@ -17,10 +17,10 @@ SLACK = 1e-9  # s, for a second that was typed
 
 @dataclass
 class Frame:
-    """One tick in which something changed: the nodes' changes and the events, in their order."""
+    """One tick in which something changed: the nodes' changes and ends, and the events, in their order."""
 
     t: float
-    changes: list[Tick] = field(default_factory=list)
+    nodes: list[Tick] = field(default_factory=list)
     events: list[Event] = field(default_factory=list)
 
 
@@ -36,16 +36,18 @@ class Row:
 class Replay:
     """The frames of a record up to second `end`, and the rows of its tree in tree order.
 
-    A node that ends again as it did before has not changed: a guard that is asked at every tick would be all there is.
+    A tick in which nodes only end as they did before is left out: a guard that is asked at every tick would fill all.
     """
 
     def __init__(self, record: RunRecord, end: float = math.inf) -> None:
         """Raises `Findings` for a tree.xml that cannot be read, and for a record in which nothing happened."""
         frames: dict[float, Frame] = {}
         last: dict[str, str] = {}
+        changed = {event.t for event in record.events}
         for tick in record.ticks:
+            frames.setdefault(tick.t, Frame(tick.t)).nodes.append(tick)
             if last.get(tick.path) != tick.status:
-                frames.setdefault(tick.t, Frame(tick.t)).changes.append(tick)
+                changed.add(tick.t)
             last[tick.path] = tick.status
         for event in record.events:
             frames.setdefault(event.t, Frame(event.t)).events.append(event)
@@ -53,12 +55,12 @@ class Replay:
             raise Findings(
                 [Finding(shown(record.folder), 1, "nothing happened in this run; there is nothing to replay")]
             )
-        self.frames = [frames[t] for t in sorted(frames) if t <= max(end, min(frames)) + SLACK]
+        self.frames = [frames[t] for t in sorted(changed) if t <= max(end, min(changed)) + SLACK]
         self.rows = _rows(record)
         self._times = [frame.t for frame in self.frames]
         self._history: dict[str, tuple[list[int], list[str]]] = {}
         for i, frame in enumerate(self.frames):
-            for tick in frame.changes:
+            for tick in frame.nodes:
                 at, statuses = self._history.setdefault(tick.path, ([], []))
                 at.append(i)
                 statuses.append(tick.status)
@@ -97,14 +99,14 @@ class Replay:
         """Index of the next frame in which a node fails whose path has `part` in it."""
         later = range(index + 1, len(self.frames))
         return next(
-            (i for i in later if any(t.status == "FAILURE" and part in t.path for t in self.frames[i].changes)), None
+            (i for i in later if any(t.status == "FAILURE" and part in t.path for t in self.frames[i].nodes)), None
         )
 
     def lines(self, begin: float, part: str) -> Iterator[str]:
         """Changes and events from second `begin` of the nodes whose path has `part` in it, a line each."""
         for frame in self.frames[bisect_left(self._times, begin - SLACK) :]:
             yield from (
-                printable(f"{frame.t:8.2f}  {tick.path}  {tick.status}") for tick in frame.changes if part in tick.path
+                printable(f"{frame.t:8.2f}  {tick.path}  {tick.status}") for tick in frame.nodes if part in tick.path
             )
             yield from (
                 printable(f"{frame.t:8.2f}  {event.node or '-'}  {event_text(event)}")

@@ -108,7 +108,7 @@ def _help(width: int) -> str:
 def _tree(replay: Replay, view: View, width: int, height: int) -> list[Text]:
     """As many lines of the tree as there is place, around the first node that changed."""
     nodes = [node for node in replay.rows if view.part in node.path]
-    changed = {tick.path for tick in replay.frames[view.index].changes}
+    changed = {tick.path for tick in replay.frames[view.index].nodes}
     focus = next((i for i, node in enumerate(nodes) if node.path in changed), 0)
     top = max(0, min(focus - height // 3, len(nodes) - height))
     names = [printable(node.path if view.part else "  " * node.depth + _own_name(node.path)) for node in nodes]

@@ -54,6 +54,17 @@ def test_the_first_tick_that_differs_is_told_by_its_deepest_node(tmp_path: Path)
     assert differ(a, b) == ["first differing tick at 0.50 s: root/mission/tries/one/try/grasp: FAILURE | RUNNING"]
 
 
+def test_an_end_like_the_one_before_counts(tmp_path: Path) -> None:
+    a, b = (write_record(tmp_path / name) for name in ("a", "b"))
+    text = (b / "ticks.jsonl").read_text().splitlines(keepends=True)
+    again = '{"t": 1.0, "path": "root/mission/tries/one/try/grasp", "status": "FAILURE"}\n'
+    assert again in text
+    (b / "ticks.jsonl").write_text("".join(line for line in text if line != again))
+    assert differ(a, b) == [
+        "first differing tick at 1.00 s: root/mission/tries/one/try/grasp FAILURE | root/stop RUNNING"
+    ]
+
+
 def test_a_run_that_goes_on_where_the_other_was_killed(tmp_path: Path) -> None:
     a, b = (write_record(tmp_path / name) for name in ("a", "b"))
     kill(b)

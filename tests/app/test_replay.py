@@ -67,6 +67,7 @@ def test_in_a_pipe_it_prints_lines(folder: Path) -> None:
     assert ran.stdout.splitlines() == [
         f"    0.50  {GRASP}  FAILURE",
         f"    0.50  {GRASP}  slip: by=gap, value=0.0443",
+        f"    1.00  {GRASP}  FAILURE",
     ]
     assert len(CliRunner().invoke(app, ["replay", str(folder)]).stdout.splitlines()) > 15
 
