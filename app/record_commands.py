@@ -6,7 +6,7 @@ import shutil
 import sys
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -120,7 +120,10 @@ def _read_both(*folders: Path) -> "list[RunRecord]":
 
 def _json(record: "RunRecord") -> str:
     from app.record import plain
+    from app.tried import attempts
 
     result = asdict(record.result) if record.result else None
-    value = {"run": record.begin, "result": result, "remarks": record.remarks}
+    value: dict[str, Any] = {"run": record.begin, "result": result, "remarks": record.remarks}
+    if result is None:
+        value["attempts"] = [asdict(attempt) for attempt in attempts(record)]
     return json.dumps(plain(value), indent=2, allow_nan=False)

@@ -203,6 +203,10 @@ def test_explain_prints_the_page_or_json(tmp_path: Path) -> None:
     assert value["result"] == json.loads((folder / "result.json").read_text())
     assert value["run"]["overrides"] == ["limits.tries=2"]
     assert value["remarks"] == []
+    kill(folder)
+    killed = json.loads(CliRunner().invoke(app, ["explain", str(folder), "--json"]).stdout)
+    assert killed["result"] is None
+    assert [attempt["path"].rsplit("/", 1)[-1] for attempt in killed["attempts"]] == ["start", "held", "grasp"]
     bad = CliRunner().invoke(app, ["explain", str(tmp_path)])
     assert (bad.exit_code, bad.stdout) == (2, "")
     assert "holds no run" in bad.stderr
