@@ -10,7 +10,6 @@ from interfaces.cause import CauseCode
 from interfaces.cell import KnownCell
 
 LOOK = '<LookAtStow name="look_at_stow"/>'
-HOLDING = '<Holding name="holding"/>'
 
 
 @pytest.fixture
@@ -55,12 +54,3 @@ def test_letting_go_opens_the_jaw_and_believes_nothing_held(stage: Stage) -> Non
     assert stage.motion.grippers["right"].told[0][0] == "open"
     assert not stage.motion.moves  # the arm waits until the jaw is open
     assert stage.services.belief.held is None
-
-
-@pytest.mark.parametrize(("held", "status"), [(RigidTransform.identity(), Status.SUCCESS), (None, Status.FAILURE)])
-def test_holding_says_what_is_believed_and_needs_no_cause(
-    stage: Stage, held: RigidTransform | None, status: Status
-) -> None:
-    stage.belief.held = held
-    assert stage.run(stage.tree(HOLDING), 0.0) is status
-    assert not stage.belief.causes
