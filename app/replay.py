@@ -9,6 +9,7 @@ from app.findings import Finding, Findings, nearest, printable, shown
 from app.record_reader import Event, RunRecord, Tick
 from app.resources import read_text
 from app.timeline import event_text
+from interfaces.quote import quoted
 from trees.element import TreeSyntaxError
 from trees.graph import Node, read_graph
 
@@ -87,7 +88,7 @@ class Replay:
             found.append(Finding("--from", 1, wrong))
         if not self.known(part):
             names = {path.rsplit("/", 1)[-1] for path in self._paths()}
-            found.append(Finding("--filter", 1, f"no node has {part!r} in its path; {nearest(part, names)}"))
+            found.append(Finding("--filter", 1, f"no node has {quoted(part)} in its path; {nearest(part, names)}"))
         if found:
             raise Findings(found)
 

@@ -11,6 +11,7 @@ from app.findings import printable
 from app.keys import keyboard
 from app.replay import Replay
 from app.timeline import event_text
+from interfaces.quote import quoted
 
 PAGE = 10  # changes
 HELP = (  # the first that fits is shown
@@ -77,7 +78,7 @@ def _typed(replay: Replay, view: View, key: str) -> View:
         return replace(view, typed=view.typed + key) if len(key) == 1 and key.isprintable() else view
     if view.prompt == "/":
         known = replay.known(view.typed)
-        return replace(closed, part=view.typed) if known else replace(closed, note=f"no node has {view.typed!r}")
+        return replace(closed, part=view.typed) if known else replace(closed, note=f"no node has {quoted(view.typed)}")
     if not re.fullmatch(r"\d*\.?\d+", view.typed):
         return replace(closed, note=f"{view.typed!r} is no number of seconds")
     return replace(closed, index=replay.at(float(view.typed)))

@@ -133,7 +133,7 @@ def _check_paths(path: Path, record: RunRecord, known: Collection[str]) -> None:
             missing.setdefault(tick.path, number)
     if missing:
         first, more = [*missing][:MOST_MISSING], len(missing) - MOST_MISSING
-        names = ", ".join(first) + (f" and {more} more nodes" if more > 0 else "")
+        names = ", ".join(map(quoted, first)) + (f" and {more} more nodes" if more > 0 else "")
         wrong = f"{shown(path)} is not the tree that ran: it has no {names}; name that tree, or leave TREE out"
         raise Findings([Finding(shown(record.folder / "ticks.jsonl"), missing[first[0]], wrong)])
 
