@@ -112,8 +112,8 @@ def test_a_run_of_another_tree_is_told_with_the_first_nodes_that_are_missing(her
     assert told.exit_code == 2
     assert told.stderr.startswith("run/ticks.jsonl:1: ")
     assert told.stderr.endswith(
-        "recovery.xml is not the tree that ran: it has no 'root', 'root/mission', 'root/mission/start' and 6 more nodes; "
-        "name that tree, or leave TREE out\n"
+        "recovery.xml is not the tree that ran: it has no 'root', 'root/mission', 'root/mission/start' "
+        "and 6 more nodes; name that tree, or leave TREE out\n"
     )
 
 
