@@ -1,4 +1,9 @@
-"""The outline of a patch of pixels: where the body ends, and where something before it begins."""
+"""The outline of a patch of pixels: where the body ends, and where something before it begins.
+
+A stereo camera has no reading beside the left edge of a near thing, in its shadow, nor of what is too near to measure,
+such as the hand that carries it. A gap that the body's own shadow explains leaves an edge in sight; any other covers
+it.
+"""
 
 from dataclasses import dataclass
 
@@ -11,6 +16,7 @@ FloatArray = NDArray[np.float64]
 STEPS = ((1, 0), (-1, 0), (0, 1), (0, -1))  # (right, down)
 LOOK_OUT = (2, 3, 4, 5, 6)  # pixels beyond the edge at which the depth is read: at it readings fly, or a shadow begins
 NEARER = 0.006  # m; choice: two deviations of the depth noise at 0.75 m, and less than a cable or finger stands before
+SHADOW_SLACK = 4  # pixels that a shadow may be longer: the noise of two depths
 AROUND = 9  # pixels; choice: neighbourhood whose readings tell the patch's own depth at its edge
 
 
@@ -22,10 +28,14 @@ class Outline:
     covered: NDArray[np.bool_]
 
 
-def outline(mask: NDArray[np.bool_], depth: NDArray[np.float32]) -> Outline:
-    """The outline of `mask` (H, W) with the depth readings (H, W) m, 0 for none, around it. The image's rim is none."""
+def outline(mask: NDArray[np.bool_], depth: NDArray[np.float32], shift: float) -> Outline:
+    """The outline of `mask` (H, W) with the depth readings (H, W) m, 0 for none, around it. The image's rim is none.
+
+    `shift` is focal length times baseline, pixels times metres.
+    """
     own = _own_depth(mask, depth)
     readings = np.where(depth > 0, depth, np.float32(np.inf))
+    gap, behind = _left_of(depth)
     height, width = mask.shape
     v, u = np.nonzero(mask)
     pixels, covered = [], []
@@ -35,10 +45,20 @@ def outline(mask: NDArray[np.bool_], depth: NDArray[np.float32]) -> Outline:
         edge = ~mask[b + dv, a + du]
         a, b = a[edge], b[edge]
         steps = np.array(LOOK_OUT)[:, None]
-        beyond = readings[np.clip(b + steps * dv, 0, height - 1), np.clip(a + steps * du, 0, width - 1)]
-        covered.append(beyond.min(axis=0) < own[b, a] - NEARER)
+        out = np.clip(b + steps * dv, 0, height - 1), np.clip(a + steps * du, 0, width - 1)
+        beyond, z = readings[out].min(axis=0), own[b, a]
+        shadow = gap[out][0] <= shift * (1.0 / z - 1.0 / behind[out][0]) + SHADOW_SLACK
+        covered.append((beyond < z - NEARER) | (np.isinf(beyond) & ~shadow))
         pixels.append(np.column_stack([a + du / 2, b + dv / 2]))
     return Outline(np.concatenate(pixels), np.concatenate(covered))
+
+
+def _left_of(depth: NDArray[np.float32]) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+    """How many pixels (H, W) left of each the next reading is, and the reading; the image's width and 0.01 m if none."""
+    columns = np.arange(depth.shape[1])
+    last = np.maximum.accumulate(np.where(depth > 0, columns, -1), axis=1)
+    reading = np.take_along_axis(depth, np.maximum(last, 0), axis=1)
+    return np.where(last < 0, depth.shape[1], columns - last), np.where(last < 0, np.float32(0.01), reading)
 
 
 def _own_depth(mask: NDArray[np.bool_], depth: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -16,8 +16,8 @@ from perception.camera_health import CameraHealth
 from perception.depth_scale import panel_scale
 from perception.estimate import Estimate, NoEstimate
 from perception.occupancy import ASSUMED_DEPTH, Occupancy, Spheres
-from perception.rgbd_pose import estimate
 from perception.segmentation import NotSeen
+from perception.technique import TechniqueName, make_technique
 from perception.track import ConnectorTrack
 
 # Where obstacles may matter: the space that the arms share with the cable.
@@ -40,9 +40,11 @@ class Perception:
         clock: Clock,
         pose_of: Callable[[RgbdFrame], RigidTransform],
         arm_spheres: Callable[[], list[Spheres]],
+        technique: TechniqueName = "fused",
     ) -> None:
         self._known, self._cameras, self._clock = known, cameras, clock
         self._pose_of, self._arm_spheres = pose_of, arm_spheres
+        self._technique = make_technique(technique, known)
         self._scale = dict.fromkeys(cameras, 1.0)
         self._health = {name: CameraHealth(name) for name in cameras}
         self._results: dict[str, tuple[int, Estimate | NoEstimate]] = {}
@@ -74,7 +76,7 @@ class Perception:
             return self._results[camera][1]
         frame = self.frame(camera)
         assert frame is not None
-        result = estimate(frame, self._pose_of(frame), self._known.connector, hint=self.hint)
+        result = self._technique.estimate(frame, self._pose_of(frame), axis=self.hint)
         self._results[camera] = (newest.number, result)
         self.track.feed(result)
         return result

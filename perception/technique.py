@@ -1,5 +1,6 @@
 """The ways to find the connector in a frame: one interface, chosen by name."""
 
+from collections.abc import Callable
 from typing import Literal, Protocol, get_args
 
 import numpy as np
@@ -9,9 +10,10 @@ from scipy.spatial.transform import RigidTransform
 from interfaces.cell import KnownCell
 from interfaces.frame import RgbdFrame
 from perception.estimate import Estimate, NoEstimate
+from perception.fused import Fused
 from perception.rgbd_pose import Rgbd
 
-TechniqueName = Literal["rgbd"]
+TechniqueName = Literal["rgbd", "fused"]
 TECHNIQUES: tuple[TechniqueName, ...] = get_args(TechniqueName)
 
 
@@ -36,5 +38,5 @@ class Technique(Protocol):
 
 def make_technique(name: TechniqueName, known: KnownCell) -> Technique:
     """The technique of that name."""
-    makers = {"rgbd": Rgbd}
+    makers: dict[TechniqueName, Callable[[KnownCell], Technique]] = {"rgbd": Rgbd, "fused": Fused}
     return makers[name](known)
