@@ -54,7 +54,7 @@ def outline(mask: NDArray[np.bool_], depth: NDArray[np.float32], shift: float) -
 
 
 def _left_of(depth: NDArray[np.float32]) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
-    """How many pixels (H, W) left of each the next reading is, and the reading; the image's width and 0.01 m if none."""
+    """How many pixels (H, W) left of each the next reading is, and the reading; none: the image's width, 0.01 m."""
     columns = np.arange(depth.shape[1])
     last = np.maximum.accumulate(np.where(depth > 0, columns, -1), axis=1)
     reading = np.take_along_axis(depth, np.maximum(last, 0), axis=1)
