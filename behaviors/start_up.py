@@ -1,4 +1,4 @@
-"""Before the work: correct the rear camera's depth by the known panel, and see what stands in the cell."""
+"""Before the work: see what stands in the cell."""
 
 from behaviors.leaf import Failed, Steps, StepsLeaf
 from interfaces.cause import CauseCode
@@ -7,7 +7,7 @@ PATIENCE = 2.0  # s that the camera has to give sound frames
 
 
 class StartUp(StepsLeaf):
-    """Waits for the rear camera, corrects its depth scale, and maps the obstacles that it sees.
+    """Waits for the rear camera, and maps the obstacles that it sees.
 
     FAILURE when the camera is not to be trusted: nobody would know what stands in the cell.
     """
@@ -20,8 +20,7 @@ class StartUp(StepsLeaf):
             if self.services.clock.now() > end:
                 raise Failed(CauseCode.CAMERA_FAILED, f"{perception.trouble('rear')}; nothing was mapped")
             yield None
-        scale = perception.correct_depth("rear")
         perception.look("rear")  # the plugged end, while no hand hides it
         voxels = perception.map_obstacles("rear")
         motion.set_obstacles(perception.occupancy.occupied_points(), perception.occupancy.h)
-        self.say("looked around", depth_scale=round(scale, 4), occupied_voxels=voxels)
+        self.say("looked around", occupied_voxels=voxels)

@@ -228,7 +228,6 @@ class ServiceRaises(ServiceFault):
     type: Literal["service_raises"] = Field(description="This fault.", examples=["service_raises"])
     service: Literal[
         "perception.look",
-        "perception.correct_depth",
         "perception.map_obstacles",
         "motion.move",
         "motion.carry",

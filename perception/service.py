@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import RigidTransform
 
-from interfaces.cell import KnownCell
+from interfaces.cell import FixedMount, KnownCell
 from interfaces.devices import Camera, Clock
 from interfaces.frame import RgbdFrame
 from perception.camera_health import CameraHealth
-from perception.depth_scale import panel_scale
 from perception.estimate import Estimate, NoEstimate
 from perception.occupancy import ASSUMED_DEPTH, Occupancy, Spheres
+from perception.registration import CARRIED, FIXED, register
 from perception.segmentation import NotSeen
 from perception.technique import TechniqueName, make_technique
 from perception.track import ConnectorTrack
@@ -45,7 +45,6 @@ class Perception:
         self._known, self._cameras, self._clock = known, cameras, clock
         self._pose_of, self._arm_spheres = pose_of, arm_spheres
         self._technique = make_technique(technique, known)
-        self._scale = dict.fromkeys(cameras, 1.0)
         self._health = {name: CameraHealth(name) for name in cameras}
         self._results: dict[str, tuple[int, Estimate | NoEstimate]] = {}
         self.track = ConnectorTrack()
@@ -53,11 +52,8 @@ class Perception:
         self.occupancy = Occupancy(*REGION, known.solids(), known.connector, VOXEL)
 
     def frame(self, camera: str) -> RgbdFrame | None:
-        """The newest frame, its depth corrected by what `correct_depth` found; None before the first."""
-        frame = self._cameras[camera].latest()
-        if frame is None or self._scale[camera] == 1.0:
-            return frame
-        return replace(frame, depth=frame.depth * np.float32(self._scale[camera]))
+        """The newest frame; None before the first."""
+        return self._cameras[camera].latest()
 
     def look(self, camera: str) -> Estimate | NoEstimate | None:
         """What the newest frame shows of the connector, None before the first; a new result enters the track.
@@ -74,9 +70,7 @@ class Perception:
             return missed
         if camera in self._results and self._results[camera][0] == newest.number:
             return self._results[camera][1]
-        frame = self.frame(camera)
-        assert frame is not None
-        result = self._technique.estimate(frame, self._pose_of(frame), axis=self.hint)
+        result = self._technique.estimate(newest, self._pose_of(newest), axis=self.hint)
         self._results[camera] = (newest.number, result)
         self.track.feed(result)
         return result
@@ -88,24 +82,18 @@ class Perception:
             health.feed(newest)
         return health.trouble(self._clock.now())
 
-    def correct_depth(self, camera: str) -> float:
-        """Read the depth scale off the back panel in the newest frame; the factor in force from now on."""
-        frame = self._cameras[camera].latest()
-        panel = next(box for box in self._known.boxes if box.name == "back_panel")
-        found = None if frame is None else panel_scale(frame, self._pose_of(frame), panel)
-        if found is not None:
-            self._scale[camera] = found
-        return self._scale[camera]
-
     def map_obstacles(self, camera: str) -> int:
-        """Take the newest frame into the occupancy; the number of occupied voxels.
+        """Take the newest frame into the occupancy, its camera set right by the known boxes; the number of full voxels.
 
         Only the rear camera's look makes a guess of what lies behind a surface: slanting looks would put it beside.
         """
         frame = self.frame(camera)
         if frame is not None:
             depth = ASSUMED_DEPTH if camera == "rear" else 0.0
-            self.occupancy.integrate(frame, self._pose_of(frame), self._arm_spheres(), depth)
+            errors = FIXED if isinstance(self._known.camera(camera).mount, FixedMount) else CARRIED
+            place = register(frame, self._pose_of(frame), self._known.boxes, errors)
+            scaled = replace(frame, depth=frame.depth * np.float32(place.scale))
+            self.occupancy.integrate(scaled, place.world_from_camera, self._arm_spheres(), depth)
         return len(self.occupancy.occupied_points())
 
     def map_new_obstacle(self, camera: str) -> int:

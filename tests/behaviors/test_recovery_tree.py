@@ -79,9 +79,6 @@ class Eyes(FakePerception):
         self.frames = lambda t: RgbdFrame("rear", 1, t, still, np.zeros((48, 64), np.float32), K)
         self.occupancy = SimpleNamespace(occupied_points=lambda guessed=True: np.empty((0, 3)), h=0.01)
 
-    def correct_depth(self, camera: str) -> float:
-        return 1.0
-
 
 class Play:
     """The recovery tree with its leaves; the end is lost, once, and hidden `slip` ticks after the carrying began.
