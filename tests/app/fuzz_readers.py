@@ -10,6 +10,7 @@ import random
 import re
 import resource
 import shutil
+import signal
 import sys
 import tempfile
 from collections import Counter
@@ -24,7 +25,8 @@ from app.findings import Findings
 
 RECORDED = KINDS[len(SHIPPED) :]
 FORMATS = ("ascii", "dot", "groot", "json", "mermaid", "svg")
-SECONDS = 5.0
+SECONDS = 5.0  # of computing: a busy machine makes no reader slow
+PATIENCE = 60.0  # s: a reader that waits for something computes nothing
 MEMORY = 2**30  # bytes more than the idle worker has
 FINDING = re.compile(r"[^\n]*:\d+: [^\n]*; [^\n]+")
 
@@ -116,7 +118,9 @@ def _work(pipe: Any, folder: str) -> None:
     while True:
         case = pipe.recv()
         written.clear()
+        signal.setitimer(signal.ITIMER_PROF, SECONDS)  # its signal ends the process
         verdict = read(case, Path(folder))
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
         outside = [name for name in written if not name.startswith(folder)]
         pipe.send(f"wrote {outside[0]}" if outside else verdict)
 
@@ -139,10 +143,12 @@ def fuzz(count: int, seed: int, progress: Callable[[int], None] = lambda _done: 
             process, ours = worker
             ours.send(case)
             try:
-                verdict = ours.recv() if ours.poll(SECONDS) else f"no end after {SECONDS:g} s"
+                verdict = ours.recv() if ours.poll(PATIENCE) else f"no end after {PATIENCE:g} s of waiting"
             except EOFError:
                 process.join()
                 verdict = f"the reader's process died with exit code {process.exitcode}"
+                if process.exitcode == -signal.SIGPROF:
+                    verdict = f"no end after {SECONDS:g} s of computing"
             if verdict.startswith(("no end", "the reader's")):
                 process.kill()
                 worker = None
