@@ -24,6 +24,7 @@ FloatArray = NDArray[np.float64]
 CORNER_NOISE = 0.15  # pixels: a corner's deviation, measured on renders by both renderers, sharp and blurred
 SPARE = 2.0  # coordinates of four corners beyond what a pose takes; more misfit than that means more noise
 CROP = 0.4  # of the tag's extent, beside it: room for the white border
+MOST_SHIFT = 2.0  # pixels; plain corners are up to 1.0 off: beyond, a line was drawn to the plate's bright rim
 ENLARGED = 2  # times; so the line fit takes slanting tags too: 200 of 200, where it took 196
 DEPTH_NOISE = 0.0055  # 1/m: a reading's deviation over its square; subpixel 0.2, focal length 666 px, baseline 0.055 m
 PATCH = 50.0  # pixels an independent reading; choice: a stereo matching window of some 8 pixels
@@ -161,8 +162,10 @@ def _corners(frame: RgbdFrame, number: int, near: FloatArray | None) -> FloatArr
     right, bottom = (plain.max(axis=0) + margin).astype(int)
     crop = cv2.resize(gray[v : bottom + 1, u : right + 1], None, fx=ENLARGED, fy=ENLARGED)
     refined = _detect(crop, number, cv2.aruco.CORNER_REFINE_APRILTAG)
-    # These corners count from the corner of a pixel, all others from its centre.
-    return refined[0] / ENLARGED - 0.5 + [u, v] if len(refined) == 1 else None
+    if len(refined) != 1:
+        return None
+    corners = refined[0] / ENLARGED - 0.5 + [u, v]  # these count from the corner of a pixel, all others from its centre
+    return corners if float(np.abs(corners - plain).max()) < MOST_SHIFT else None
 
 
 def _detect(gray: NDArray[np.uint8], number: int, refinement: int) -> list[FloatArray]:
