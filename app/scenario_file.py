@@ -265,6 +265,10 @@ def _on_base(top: Document, folder: Path) -> Document:
         raise Findings([Finding(*place, f"base is {name!r}; expected the name of a cell or a path to its file")])
     path = resolve("cell", name, folder, place)
     document = parse(read_text(path, place), shown(path))
+    if isinstance(document.value, dict) and "base" in document.value:
+        raise Findings(
+            [Finding(*place, f"{shown(path)!r} has a base itself; name that one, and give here what it adds")]
+        )
     lay_over(document, top)
     return document
 

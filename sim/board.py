@@ -20,7 +20,6 @@ SHARES = (
     0.9,
 )  # of the picture's width or height; choice: large ones show distortion, small ones reach into the corners
 TILT = np.deg2rad(45.0)  # choice: without tilt distance and focal length are one, beyond it the corners blur
-TRIES = 1000  # draws for a view
 LIGHT = LightState((-0.3, -0.5, -1.0), 0.45, 0.55)  # from behind the camera, in its optical frame
 
 
@@ -30,14 +29,14 @@ def board_poses(
     """Poses camera_from_board of `count` views with the whole board in the picture, tilted and spread over it.
 
     The board has `columns` x `rows` inner corners, its squares are `square` m wide. Its frame is in its middle, x to
-    the right, y up, z towards who looks at it. Raises ValueError for a board that does not fit into the picture.
+    the right, y up, z towards who looks at it.
     """
     return [_pose(k, (columns + 3) * square, (rows + 3) * square, rng) for _ in range(count)]
 
 
 def _pose(k: Intrinsics, width: float, height: float, rng: np.random.Generator) -> RigidTransform:
     corners = 0.5 * np.array([[x * width, y * height, 0.0] for x in (-1, 1) for y in (-1, 1)])
-    for _ in range(TRIES):
+    while True:  # a board in the middle fits
         distance = max(k.fx * width / k.width, k.fy * height / k.height) / rng.uniform(*SHARES)
         u, v = rng.uniform([0, 0], [k.width, k.height])
         place = distance * np.array([(u - k.cx) / k.fx, (v - k.cy) / k.fy, 1.0])
@@ -49,7 +48,6 @@ def _pose(k: Intrinsics, width: float, height: float, rng: np.random.Generator) 
         seen = np.column_stack([k.fx * x / z + k.cx, k.fy * y / z + k.cy])
         if z.min() > 0 and np.all((seen > MARGIN) & (seen < np.array([k.width, k.height]) - MARGIN)):
             return pose
-    raise ValueError(f"a board of {width:.3f} x {height:.3f} m does not fit into {k.width} x {k.height} pixels")
 
 
 def board_pictures(
