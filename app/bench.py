@@ -15,13 +15,16 @@ from scipy.spatial.transform import Rotation
 
 from app.attempts import Attempts
 from app.resources import shipped
-from app.scenario_file import load_scenario
+from app.scenario_file import load_cell, load_scenario
 from app.table import print_table
 from app.tick_log import TickLog
 from behaviors import LEAVES
+from interfaces.cell import TAG_DICTIONARY
+from interfaces.frame import RgbdFrame
 from perception.estimate import NoEstimate
 from perception.rgbd_pose import estimate
 from perception.segmentation import SegmentationParameters
+from perception.technique import make_technique
 from sim.cable import spring_torques
 from sim.renderer import make_renderer
 from sim.world import World
@@ -42,6 +45,8 @@ def main() -> None:
             "cable torques by numba / numpy and scipy": springs(scenario.cell.hidden.cable.links),
             f"848x480 picture by {world.renderer.name} / TinyRenderer": pictures(world),
             "colour and depth to pose / bare OpenCV calls": poses(world),
+            "848x480 tag to pose / bare detectMarkers": tags(848),
+            "640x480 tag to pose / bare detectMarkers": tags(640),
         }
         print_table(("pair", "ours ms", "other ms", "ratio"), [_line(name, *pair) for name, pair in rows.items()])
     finally:
@@ -120,13 +125,36 @@ def pictures(world: World) -> tuple[Call, Call]:
     return lambda: draw(world.renderer), lambda: draw(tiny)
 
 
-def poses(world: World) -> tuple[Call, Call]:
-    """The connector's pose from a rear frame, and OpenCV's own share of it: colour space, range, dilate, contours."""
+def first_frame(world: World) -> RgbdFrame:
+    """The rear camera's."""
     frame = world.cameras["rear"].latest()
     while frame is None:
         world.advance(0.05)
         frame = world.cameras["rear"].latest()
-    image, known = frame, world.cell.known
+    return frame
+
+
+def tags(width: int) -> tuple[Call, Call]:
+    """The connector's pose by its tag in a rear frame of `width` x 480 pixels, and OpenCV's search for tags alone."""
+    cell = load_cell(shipped("cell")["thesis_tags"])
+    spec = cell.known.camera("rear").model_copy(update={"width": width})
+    cameras = (spec, cell.known.camera("wrist"))
+    world = World(cell.model_copy(update={"known": cell.known.model_copy(update={"cameras": cameras})}), "zero", 0)
+    frame = first_frame(world)
+    world.close()
+    technique, pose = make_technique("fiducial", cell.known), spec.mount.world_from_camera  # type: ignore[union-attr]
+    detector = cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, TAG_DICTIONARY)))
+
+    def bare() -> Any:
+        return detector.detectMarkers(cv2.cvtColor(frame.rgb, cv2.COLOR_RGB2GRAY))
+
+    assert not isinstance(technique.estimate(frame, pose), NoEstimate)
+    return lambda: technique.estimate(frame, pose), bare
+
+
+def poses(world: World) -> tuple[Call, Call]:
+    """The connector's pose from a rear frame, and OpenCV's own share of it: colour space, range, dilate, contours."""
+    image, known = first_frame(world), world.cell.known
     world_from_camera = known.camera("rear").mount.world_from_camera  # type: ignore[union-attr]
     spans = SegmentationParameters.for_color(known.connector.color).ranges()
     kernel = np.ones((3, 3), np.uint8)

@@ -55,13 +55,13 @@ def test_what_is_wrong_is_told_where_it_stands(tmp_path: Path) -> None:
     assert findings(cell(tmp_path, text)) == [
         f"below.yaml:{line}: known.cable_length is 'long'; expected a number (above 0)",
         "mine.yaml:3: '1e3' is text to YAML, not a number; write 1.0e+3",
-        "mine.yaml:3: key 'center' is missing in known.connector.tag; expected 3 values, each a number in metres, such as "
-        "0.3 (at least -5, at most 5)",
+        "mine.yaml:3: key 'center' is missing in known.connector.tag; "
+        "expected 3 values, each a number in metres, such as 0.3 (at least -5, at most 5)",
         "mine.yaml:3: key 'plate' is missing in known.connector.tag; expected a number (above 0)",
         "mine.yaml:3: known.connector.radius is -1; expected a number in metres, such as 0.3 (above 0)",
         "mine.yaml:3: known.connector.tag.number is 50; expected a whole number (at least 0, at most 49)",
-        "mine.yaml:4: known.clip is 3; expected a mapping of seat, axis, capture_distance, capture_angle_deg, hold_force, "
-        "bracket, tag",
+        "mine.yaml:4: known.clip is 3; "
+        "expected a mapping of seat, axis, capture_distance, capture_angle_deg, hold_force, bracket, tag",
     ]
 
 
