@@ -115,24 +115,24 @@ def find_tag(frame: RgbdFrame, tag: Tag, near: FloatArray | None = None) -> TagP
     corners = _corners(frame, tag.number, near)
     if corners is None:
         return NoEstimate(frame.stamp, frame.camera, NotSeen.NO_TAG, f"no tag {tag.number} in the picture")
-    poses, misfits = _solve(corners, tag, frame.intrinsics)
-    pixels, readings = _readings(frame, corners)
-    by_size = float(poses[0].translation[2])
+    poses, squares, misfits = _solve(corners, tag, frame.intrinsics)
+    at, readings = _readings(frame, corners)
+    by_size = float(squares[0, :, 2].mean())
     if len(readings) and abs(float(np.median(readings)) / by_size - 1.0) > SIZE_ERROR:
         message = f"tag {tag.number} is {by_size:.2f} m away by its size, {np.median(readings):.2f} m by depth"
         return NoEstimate(frame.stamp, frame.camera, NotSeen.WRONG_SIZE, message)
     excess = max(1.0, float(misfits.min()) / SPARE)
-    misfits = misfits / excess + [_slant_misfit(pose, pixels, readings) for pose in poses]
+    misfits = misfits / excess + [_slant_misfit(square, at, readings) for square in squares]
     shares = np.exp(-0.5 * (misfits - misfits.min()))
     shares /= shares.sum()
     best = int(np.argmax(shares))
-    bodies = [pose * tag.body_from_tag.inv() for pose in poses]
-    covariance = excess * _covariance(poses[best], bodies[best].translation, tag, frame.intrinsics)
-    for body, share in zip(bodies, shares, strict=True):
-        apart = _between(bodies[best], body)
-        covariance += share * np.outer(apart, apart)
+    bodies = poses * tag.body_from_tag.inv()
+    body = bodies[best]
+    covariance = excess * _covariance(squares[best], body.translation, frame.intrinsics)
+    apart = np.hstack([bodies.translation - body.translation, (bodies.rotation * body.rotation.inv()).as_rotvec()])
+    covariance += (apart * shares[:, None]).T @ apart
     area = round(float(cv2.contourArea(corners.astype(np.float32))))
-    return TagPose(bodies[best], covariance, len(readings), area, 1.0 - float(shares[best]))
+    return TagPose(body, covariance, len(readings), area, 1.0 - float(shares[best]))
 
 
 @lru_cache(maxsize=2)
@@ -174,55 +174,55 @@ def _detect(gray: NDArray[np.uint8], number: int, refinement: int) -> list[Float
     return [corners[0].astype(np.float64) for corners, n in zip(found, seen, strict=False) if n == number]
 
 
-def _square(tag: Tag) -> FloatArray:
-    """The tag's corners (4, 3) m in its own frame, from its top left clockwise."""
-    return 0.5 * tag.size * np.array([[-1.0, 1.0, 0.0], [1.0, 1.0, 0.0], [1.0, -1.0, 0.0], [-1.0, -1.0, 0.0]])
-
-
-def _solve(corners: FloatArray, tag: Tag, k: Intrinsics) -> tuple[list[RigidTransform], FloatArray]:
-    """Both poses camera_from_tag of the square (IPPE), refined, and the misfit of each, squared and in deviations."""
-    square, matrix = _square(tag), np.array([[k.fx, 0.0, k.cx], [0.0, k.fy, k.cy], [0.0, 0.0, 1.0]])
-    _, turns, places, _ = cv2.solvePnPGeneric(square, corners, matrix, None, flags=cv2.SOLVEPNP_IPPE_SQUARE)
-    poses = []
-    for first_turn, first_place in zip(turns, places, strict=True):
-        turn, place = cv2.solvePnPRefineLM(square, corners, matrix, None, first_turn, first_place)
-        poses.append(RigidTransform.from_components(place.ravel(), Rotation.from_rotvec(turn.ravel())))
-    misses = [np.nan_to_num(project(pose.apply(square), k) - corners, nan=np.inf) for pose in poses]
-    return poses, np.array([(miss**2).sum() / CORNER_NOISE**2 for miss in misses])
+def _solve(corners: FloatArray, tag: Tag, k: Intrinsics) -> tuple[RigidTransform, FloatArray, FloatArray]:
+    """Both poses camera_from_tag of the square (IPPE), refined; its corners (2, 4, 3) m there, in the optical frame;
+    and the misfit of each (2,), squared and in deviations.
+    """
+    square = 0.5 * tag.size * np.array([[-1.0, 1.0, 0.0], [1.0, 1.0, 0.0], [1.0, -1.0, 0.0], [-1.0, -1.0, 0.0]])
+    matrix = np.array([[k.fx, 0.0, k.cx], [0.0, k.fy, k.cy], [0.0, 0.0, 1.0]])
+    _, *first, _ = cv2.solvePnPGeneric(square, corners, matrix, None, flags=cv2.SOLVEPNP_IPPE_SQUARE)
+    refined = [cv2.solvePnPRefineLM(square, corners, matrix, None, *start) for start in zip(*first, strict=True)]
+    turns, places = (np.array(part)[:, :, 0] for part in zip(*refined, strict=True))
+    rotations = Rotation.from_rotvec(turns)
+    squares = square @ rotations.as_matrix().transpose(0, 2, 1) + places[:, None]
+    misses = np.nan_to_num(project(squares.reshape(-1, 3), k).reshape(-1, 4, 2) - corners, nan=np.inf)
+    return RigidTransform.from_components(places, rotations), squares, (misses**2).sum(axis=(1, 2)) / CORNER_NOISE**2
 
 
 def _readings(frame: RgbdFrame, corners: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Rays (n, 3) at depth 1 and depth readings (n,) m on the tag; none if there are too few."""
-    mask = np.zeros(frame.depth.shape, np.uint8)
-    cv2.fillConvexPoly(mask, np.rint(corners).astype(np.int32), 1)
-    mask &= np.isfinite(frame.depth) & (frame.depth > 0)
-    if np.count_nonzero(mask) < MIN_READINGS:
+    whole = np.rint(corners).astype(np.int32)
+    left, top, width, height = cv2.boundingRect(whole)
+    window = np.s_[max(top, 0) : top + height, max(left, 0) : left + width]
+    depth, at = frame.depth[window], rays(frame.intrinsics)[window]
+    mask = np.zeros(depth.shape, np.uint8)
+    cv2.fillConvexPoly(mask, whole - np.maximum([left, top], 0), 1)
+    read = (mask > 0) & np.isfinite(depth) & (depth > 0)
+    if np.count_nonzero(read) < MIN_READINGS:
         return np.empty((0, 3)), np.empty(0)
-    return rays(frame.intrinsics)[mask > 0].astype(np.float64), frame.depth[mask > 0].astype(np.float64)
+    return at[read].astype(np.float64), depth[read].astype(np.float64)
 
 
-def _slant_misfit(camera_from_tag: RigidTransform, at: FloatArray, readings: FloatArray) -> float:
-    """How badly the tag's plane fits the readings, squared and in deviations. An offset of all of them is no misfit."""
+def _slant_misfit(square: FloatArray, at: FloatArray, readings: FloatArray) -> float:
+    """How badly the plane of `square` (4, 3) m fits the readings, squared and in deviations; an offset is no misfit."""
     if not len(readings):
         return 0.0
-    normal = camera_from_tag.rotation.apply([0.0, 0.0, 1.0])
+    normal = np.cross(square[1] - square[0], square[3] - square[0])
+    normal /= np.linalg.norm(normal)
     facing = at @ normal
-    plane = float(camera_from_tag.translation @ normal) / np.where(np.abs(facing) < 1e-3, 1e-3, facing)
-    miss = readings - plane
+    miss = readings - float(square[0] @ normal) / np.where(np.abs(facing) < 1e-3, 1e-3, facing)
     miss = (miss - np.median(miss)) / (DEPTH_NOISE * readings**2)
     return float(np.minimum(miss**2, 9.0).sum()) / PATCH
 
 
-def _covariance(pose: RigidTransform, center: FloatArray, tag: Tag, k: Intrinsics) -> FloatArray:
-    """Covariance (6, 6) of a body's `center` (3,) m and turn, optical frame, by what moves the tag's corners."""
-    points = pose.apply(_square(tag))
-    x, y, z = points.T
+def _covariance(square: FloatArray, center: FloatArray, k: Intrinsics) -> FloatArray:
+    """Covariance (6, 6) of a body's `center` (3,) m and turn, optical frame, by what moves the tag's corners (4, 3)."""
+    x, y, z = square.T
     zero = np.zeros(4)
-    by_point = np.stack(
-        [np.stack([k.fx / z, zero, -k.fx * x / z**2], -1), np.stack([zero, k.fy / z, -k.fy * y / z**2], -1)], 1
-    )
-    by_pose = np.concatenate([np.broadcast_to(np.eye(3), (4, 3, 3)), -_cross_matrices(points - center)], axis=2)
-    jacobian = (by_point @ by_pose).reshape(8, 6) / CORNER_NOISE
+    u = np.stack([k.fx / z, zero, -k.fx * x / z**2], axis=-1)
+    v = np.stack([zero, k.fy / z, -k.fy * y / z**2], axis=-1)
+    moved = np.concatenate([np.broadcast_to(np.eye(3), (4, 3, 3)), -_cross_matrices(square - center)], axis=2)
+    jacobian = (np.stack([u, v], axis=1) @ moved).reshape(8, 6) / CORNER_NOISE
     known = np.diag([0.0, 0.0, 0.0, *[TURN**-2] * 3])
     return np.asarray(np.linalg.inv(jacobian.T @ jacobian + known))
 
@@ -230,11 +230,6 @@ def _covariance(pose: RigidTransform, center: FloatArray, tag: Tag, k: Intrinsic
 def _cross_matrices(vectors: FloatArray) -> FloatArray:
     """Matrices (..., 3, 3) that times w give v x w for each v of `vectors` (..., 3)."""
     return np.asarray(np.cross(vectors[..., None, :], np.eye(3)).swapaxes(-1, -2))
-
-
-def _between(a: RigidTransform, b: RigidTransform) -> FloatArray:
-    """What leads from pose a to b (6,): m, then rad."""
-    return np.concatenate([b.translation - a.translation, (b.rotation * a.rotation.inv()).as_rotvec()])
 
 
 def _in_world(found: TagPose, world_from_camera: RigidTransform, position: float, angle: float) -> TagPose:
