@@ -10,6 +10,7 @@ from app.findings import Finding, Findings, nearest, shown
 from app.options import MOST_SEED
 from app.resources import resolve
 from app.scenario_file import load_cell
+from interfaces.quote import quoted
 
 
 def add_to(app: typer.Typer) -> None:
@@ -60,6 +61,6 @@ def calibrate(
     cameras = load_cell(resolve("cell", cell, Path())).known.cameras
     spec = next((c for c in cameras if c.name == camera), None)
     if spec is None:
-        message = f"no camera {camera!r}; {nearest(camera, [c.name for c in cameras])}"
+        message = f"no camera {quoted(camera)}; {nearest(camera, [c.name for c in cameras])}"
         raise Findings([Finding("--camera", 1, message)])
     steps.run(steps.rendered_pictures(spec, board, views, seed), board, "--views", out, draw, spec.intrinsics)

@@ -262,12 +262,12 @@ def _on_base(top: Document, folder: Path) -> Document:
     assert isinstance(top.value, dict)
     name, place = top.value.pop("base"), top.place(("base",))
     if not isinstance(name, str):
-        raise Findings([Finding(*place, f"base is {name!r}; expected the name of a cell or a path to its file")])
+        raise Findings([Finding(*place, f"base is {quoted(name)}; expected the name of a cell or a path to its file")])
     path = resolve("cell", name, folder, place)
     document = parse(read_text(path, place), shown(path))
     if isinstance(document.value, dict) and "base" in document.value:
         raise Findings(
-            [Finding(*place, f"{shown(path)!r} has a base itself; name that one, and give here what it adds")]
+            [Finding(*place, f"{quoted(shown(path))} has a base itself; name that one, and give here what it adds")]
         )
     lay_over(document, top)
     return document

@@ -75,5 +75,6 @@ def test_what_is_wrong_is_told_where_it_stands(tmp_path: Path) -> None:
         ("thesis_tags", "thesis_tags.yaml' has a base itself; name that one, and give here what it adds"),
     ],
 )
-def test_a_wrong_base_is_a_finding(tmp_path: Path, base: str, told: str) -> None:
+def test_a_wrong_base_is_a_finding(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, base: str, told: str) -> None:
+    monkeypatch.chdir(tmp_path)
     assert findings(cell(tmp_path, f"base: {base}\n"))[0].endswith(told)
