@@ -50,6 +50,8 @@ def calibrate(
     wrong = output.unwritable(out.parent) + (output.unwritable(draw) if draw else [])
     if out.is_dir():
         wrong.append(Finding(shown(out), 1, "is a folder; name a file"))
+    if draw is not None and images is not None and draw.resolve() == images.resolve():
+        wrong.append(Finding("--draw", 1, "is the folder of your pictures, which it would overwrite; name another"))
     if wrong:
         raise Findings(wrong)
     from app import calibrate as steps  # brings OpenCV and the physics

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import cv2
 import numpy as np
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 from interfaces.frame import Intrinsics
 
 FloatArray = NDArray[np.float64]
-Image = NDArray[np.uint8] | NDArray[np.float32]
+Channel = TypeVar("Channel", np.uint8, np.float32)
 
 # Corners from a stretched picture are less exact, and of our renders a third fail with it; a dull picture may need it.
 HARDER = cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_EXHAUSTIVE
@@ -74,7 +75,7 @@ def calibrate(
     )
 
 
-def undistorted(image: Image, intrinsics: Intrinsics, distortion: Sequence[float]) -> Image:
+def undistorted(image: NDArray[Channel], intrinsics: Intrinsics, distortion: Sequence[float]) -> NDArray[Channel]:
     """The picture that a camera with the same intrinsics and no distortion would take; 0 where the lens saw nothing.
 
     `image` is colour (H, W, 3) uint8, or depth (H, W) float32 metres, whose readings are moved and never mixed.
@@ -83,4 +84,4 @@ def undistorted(image: Image, intrinsics: Intrinsics, distortion: Sequence[float
     matrix = np.array([[k.fx, 0.0, k.cx], [0.0, k.fy, k.cy], [0.0, 0.0, 1.0]])
     size = (k.width, k.height)
     u, v = cv2.initUndistortRectifyMap(matrix, np.array(distortion), None, matrix, size, cv2.CV_32FC1)
-    return np.asarray(cv2.remap(image, u, v, cv2.INTER_LINEAR if image.ndim == 3 else cv2.INTER_NEAREST))
+    return np.asarray(cv2.remap(image, u, v, cv2.INTER_LINEAR if image.ndim == 3 else cv2.INTER_NEAREST), image.dtype)

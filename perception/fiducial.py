@@ -17,6 +17,7 @@ from interfaces.cell import TAG_DICTIONARY, Clip, Connector, KnownCell, Tag, Wri
 from interfaces.frame import Intrinsics, RgbdFrame
 from perception.camera_model import project, rays
 from perception.estimate import Estimate, NoEstimate
+from perception.registration import CARRIED, FIXED, CameraErrors
 from perception.segmentation import NotSeen
 
 FloatArray = NDArray[np.float64]
@@ -31,10 +32,6 @@ PATCH = 50.0  # pixels an independent reading; choice: a stereo matching window 
 MIN_READINGS = 20
 SIZE_ERROR = 0.05  # choice: two deviations of the depth's scale, 3 %, and as much again for the size
 TURN = 1.0  # rad; choice: what is known of the tilt beforehand, which a frontal view hardly shows
-FIXED, CARRIED = (
-    (0.002, 0.003),
-    (0.006, 0.008),
-)  # m each axis, rad: errors of a camera's pose; carried, of the arm's too
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,8 +100,7 @@ class Fiducial:
         found = find_tag(frame, body.tag, seen_near)
         if isinstance(found, NoEstimate):
             return found
-        errors = CARRIED if frame.camera in self._carried else FIXED
-        return _in_world(found, world_from_camera, *errors)
+        return _in_world(found, world_from_camera, CARRIED if frame.camera in self._carried else FIXED)
 
 
 def find_tag(frame: RgbdFrame, tag: Tag, near: FloatArray | None = None) -> TagPose | NoEstimate:
@@ -232,11 +228,11 @@ def _cross_matrices(vectors: FloatArray) -> FloatArray:
     return np.asarray(np.cross(vectors[..., None, :], np.eye(3)).swapaxes(-1, -2))
 
 
-def _in_world(found: TagPose, world_from_camera: RigidTransform, position: float, angle: float) -> TagPose:
-    """The same in the world, with a camera known to `position` m in each direction and `angle` rad about each axis."""
+def _in_world(found: TagPose, world_from_camera: RigidTransform, errors: CameraErrors) -> TagPose:
+    """The same in the world, by a camera whose pose has these errors."""
     pose = world_from_camera * found.pose
     turn = np.kron(np.eye(2), world_from_camera.rotation.as_matrix())
     sway = np.eye(6)
     sway[:3, 3:] = -_cross_matrices(pose.translation - world_from_camera.translation)
-    camera = sway @ np.diag([position**2] * 3 + [angle**2] * 3) @ sway.T
+    camera = sway @ np.diag([errors.position**2] * 3 + [errors.turn**2] * 3) @ sway.T
     return TagPose(pose, turn @ found.covariance @ turn.T + camera, found.readings, found.area, found.doubt)

@@ -113,6 +113,7 @@ def test_bad_options_are_findings(tmp_path: Path) -> None:
     assert "is no folder" in finding("-o", "file/x.yaml")
     (tmp_path / "folder").mkdir()
     assert "folder:1: is a folder; name a file" in finding("-o", "folder")
+    assert "--draw:1: is the folder of your pictures" in finding("--images", "folder", "--draw", "./folder")
     assert invoke("--square", "0").exit_code == 2
     assert invoke("--columns", "2").exit_code == 2
 

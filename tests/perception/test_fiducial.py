@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -15,6 +16,7 @@ from tag_scene import CONNECTOR, EYE, KNOWN, TAG, K, TagScene, facing, random_po
 from interfaces.cell import KnownCell
 from interfaces.frame import RgbdFrame
 from perception import fiducial
+from perception.calibration import undistorted
 from perception.camera_model import project
 from perception.estimate import Estimate, NoEstimate
 from perception.fiducial import Fiducial, TagPose, find_tag
@@ -196,6 +198,25 @@ def test_spoilt_frames_give_a_reason_or_a_pose_that_holds(
     if isinstance(result, TagPose):
         assert unlikely(between(result.pose, true), result.covariance) < 60.0
         assert np.isfinite(result.covariance).all()
+
+
+def test_a_bent_picture_made_straight_gives_the_pose(scene: TagScene) -> None:
+    lens, true = [-0.3, 0.1, 0.0, 0.0, 0.0], facing(np.array([0.3, -0.15, 0.7]), 0.4, 0.5, 0.2)
+    frame = scene.frame(true)
+    matrix = np.array([[K.fx, 0.0, K.cx], [0.0, K.fy, K.cy], [0.0, 0.0, 1.0]])
+    pixels = (
+        np.stack(np.meshgrid(np.arange(K.width), np.arange(K.height)), axis=-1).reshape(-1, 1, 2).astype(np.float32)
+    )
+    source = cv2.undistortPoints(pixels, matrix, np.array(lens), P=matrix).reshape(K.height, K.width, 2)
+    rgb, depth = (cv2.remap(image, source, None, cv2.INTER_LINEAR) for image in (frame.rgb, frame.depth))
+    bent = replace(frame, rgb=rgb, depth=depth)
+    straight = replace(frame, rgb=undistorted(rgb, K, lens), depth=undistorted(depth, K, lens))
+    errors = []
+    for shown in (bent, straight):
+        result = find_tag(shown, TAG)
+        errors.append(np.linalg.norm(between(result.pose, true)[:3]) if isinstance(result, TagPose) else np.inf)
+    assert errors[0] > 0.015
+    assert errors[1] < 0.008
 
 
 def test_noise_alone_is_no_tag() -> None:
