@@ -32,6 +32,7 @@ PATCH = 50.0  # pixels an independent reading; choice: a stereo matching window 
 MIN_READINGS = 20
 SIZE_ERROR = 0.05  # choice: two deviations of the depth's scale, 3 %, and as much again for the size
 TURN = 1.0  # rad; choice: what is known of the tilt beforehand, which a frontal view hardly shows
+CROSSES = np.cross(np.eye(3)[:, None], np.eye(3))  # (3, 3, 3): the products of the unit vectors
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,9 +110,10 @@ def find_tag(frame: RgbdFrame, tag: Tag, near: FloatArray | None = None) -> TagP
     Of several such tags that nearest in the image to the point `near` (3,) m, without it the largest.
     """
     corners = _corners(frame, tag.number, near)
-    if corners is None:
+    solved = None if corners is None else _solve(corners, tag, frame.intrinsics)
+    if corners is None or solved is None:
         return NoEstimate(frame.stamp, frame.camera, NotSeen.NO_TAG, f"no tag {tag.number} in the picture")
-    poses, squares, misfits = _solve(corners, tag, frame.intrinsics)
+    poses, squares, misfits = solved
     at, readings = _readings(frame, corners)
     by_size = float(squares[0, :, 2].mean())
     if len(readings) and abs(float(np.median(readings)) / by_size - 1.0) > SIZE_ERROR:
@@ -122,13 +124,18 @@ def find_tag(frame: RgbdFrame, tag: Tag, near: FloatArray | None = None) -> TagP
     shares = np.exp(-0.5 * (misfits - misfits.min()))
     shares /= shares.sum()
     best = int(np.argmax(shares))
-    bodies = poses * tag.body_from_tag.inv()
+    bodies = poses * _tag_from_body(tag)
     body = bodies[best]
     covariance = excess * _covariance(squares[best], body.translation, frame.intrinsics)
     apart = np.hstack([bodies.translation - body.translation, (bodies.rotation * body.rotation.inv()).as_rotvec()])
     covariance += (apart * shares[:, None]).T @ apart
     area = round(float(cv2.contourArea(corners.astype(np.float32))))
     return TagPose(body, covariance, len(readings), area, 1.0 - float(shares[best]))
+
+
+@lru_cache(maxsize=4)  # a pure function of a value
+def _tag_from_body(tag: Tag) -> RigidTransform:
+    return tag.body_from_tag.inv()
 
 
 @lru_cache(maxsize=2)
@@ -170,15 +177,18 @@ def _detect(gray: NDArray[np.uint8], number: int, refinement: int) -> list[Float
     return [corners[0].astype(np.float64) for corners, n in zip(found, seen, strict=False) if n == number]
 
 
-def _solve(corners: FloatArray, tag: Tag, k: Intrinsics) -> tuple[RigidTransform, FloatArray, FloatArray]:
-    """Both poses camera_from_tag of the square (IPPE), refined; its corners (2, 4, 3) m there, in the optical frame;
-    and the misfit of each (2,), squared and in deviations.
+def _solve(corners: FloatArray, tag: Tag, k: Intrinsics) -> tuple[RigidTransform, FloatArray, FloatArray] | None:
+    """The n poses camera_from_tag of the square (IPPE), refined; its corners (n, 4, 3) m there, in the optical frame;
+    and the misfit of each (n,), squared and in deviations. n is 2, for an exact square 1; None if there is no pose.
     """
     square = 0.5 * tag.size * np.array([[-1.0, 1.0, 0.0], [1.0, 1.0, 0.0], [1.0, -1.0, 0.0], [-1.0, -1.0, 0.0]])
     matrix = np.array([[k.fx, 0.0, k.cx], [0.0, k.fy, k.cy], [0.0, 0.0, 1.0]])
     _, *first, _ = cv2.solvePnPGeneric(square, corners, matrix, None, flags=cv2.SOLVEPNP_IPPE_SQUARE)
     refined = [cv2.solvePnPRefineLM(square, corners, matrix, None, *start) for start in zip(*first, strict=True)]
-    turns, places = (np.array(part)[:, :, 0] for part in zip(*refined, strict=True))
+    finite = [pose for pose in refined if np.isfinite(pose).all()]  # of an exact square the second is not
+    if not finite:
+        return None
+    turns, places = (np.array(part)[:, :, 0] for part in zip(*finite, strict=True))
     rotations = Rotation.from_rotvec(turns)
     squares = square @ rotations.as_matrix().transpose(0, 2, 1) + places[:, None]
     misses = np.nan_to_num(project(squares.reshape(-1, 3), k).reshape(-1, 4, 2) - corners, nan=np.inf)
@@ -225,7 +235,7 @@ def _covariance(square: FloatArray, center: FloatArray, k: Intrinsics) -> FloatA
 
 def _cross_matrices(vectors: FloatArray) -> FloatArray:
     """Matrices (..., 3, 3) that times w give v x w for each v of `vectors` (..., 3)."""
-    return np.asarray(np.cross(vectors[..., None, :], np.eye(3)).swapaxes(-1, -2))
+    return np.asarray(np.tensordot(vectors, CROSSES, 1).swapaxes(-1, -2))
 
 
 def _in_world(found: TagPose, world_from_camera: RigidTransform, errors: CameraErrors) -> TagPose:

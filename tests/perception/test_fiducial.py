@@ -234,9 +234,19 @@ def test_the_covariance_follows_the_corners_noise(scene: TagScene) -> None:
     square = (true * TAG.body_from_tag).apply([[-half, half, 0], [half, half, 0], [half, -half, 0], [-half, -half, 0]])
     corners, rng, errors = project(square, K), np.random.default_rng(2), []
     for _ in range(400):
-        poses, _, _ = fiducial._solve(corners + rng.normal(0, fiducial.CORNER_NOISE, (4, 2)), TAG, K)
+        solved = fiducial._solve(corners + rng.normal(0, fiducial.CORNER_NOISE, (4, 2)), TAG, K)
+        assert solved is not None
+        poses, _, _ = solved
         both = [between(pose * TAG.body_from_tag.inv(), true) for pose in poses]
         errors.append(min(both, key=lambda error: float(np.linalg.norm(error[3:]))))
     drawn = np.cov(np.array(errors).T)
     told = fiducial._covariance(square, true.translation, K)
     np.testing.assert_allclose(np.sqrt(np.diag(told)), np.sqrt(np.diag(drawn)), rtol=0.2)
+
+
+def test_an_exact_square_has_one_pose() -> None:
+    """OpenCV's second is not a number then."""
+    solved = fiducial._solve(np.array([[397.5, 152.5], [425.5, 152.5], [425.5, 180.5], [397.5, 180.5]]), TAG, K)
+    assert solved is not None
+    assert np.isfinite(solved[1]).all()
+    assert solved[1][0, :, 2].mean() == pytest.approx(TAG.size * K.fx / 28.0, rel=0.01)
