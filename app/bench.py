@@ -15,13 +15,16 @@ from scipy.spatial.transform import Rotation
 
 from app.attempts import Attempts
 from app.resources import shipped
-from app.scenario_file import load_scenario
+from app.scenario_file import load_cell, load_scenario
 from app.table import print_table
 from app.tick_log import TickLog
 from behaviors import LEAVES
+from interfaces.cell import TAG_DICTIONARY
+from interfaces.frame import RgbdFrame
 from perception.estimate import NoEstimate
 from perception.rgbd_pose import estimate
 from perception.segmentation import SegmentationParameters
+from perception.technique import make_technique
 from sim.cable import spring_torques
 from sim.renderer import make_renderer
 from sim.world import World
@@ -42,6 +45,8 @@ def main() -> None:
             "cable torques by numba / numpy and scipy": springs(scenario.cell.hidden.cable.links),
             f"848x480 picture by {world.renderer.name} / TinyRenderer": pictures(world),
             "colour and depth to pose / bare OpenCV calls": poses(world),
+            "848x480 tag to pose / bare OpenCV calls": tags(848),
+            "640x480 tag to pose / bare OpenCV calls": tags(640),
         }
         print_table(("pair", "ours ms", "other ms", "ratio"), [_line(name, *pair) for name, pair in rows.items()])
     finally:
@@ -120,13 +125,55 @@ def pictures(world: World) -> tuple[Call, Call]:
     return lambda: draw(world.renderer), lambda: draw(tiny)
 
 
-def poses(world: World) -> tuple[Call, Call]:
-    """The connector's pose from a rear frame, and OpenCV's own share of it: colour space, range, dilate, contours."""
+def first_frame(world: World) -> RgbdFrame:
+    """The rear camera's."""
     frame = world.cameras["rear"].latest()
     while frame is None:
         world.advance(0.05)
         frame = world.cameras["rear"].latest()
-    image, known = frame, world.cell.known
+    return frame
+
+
+def tags(width: int) -> tuple[Call, Call]:
+    """The connector's pose by its tag in a rear frame of `width` x 480 pixels, and OpenCV's own share of it.
+
+    That is the search, the fit of the edges, and both poses.
+    """
+    cell = load_cell(shipped("cell")["thesis_tags"])
+    spec = cell.known.camera("rear").model_copy(update={"width": width})
+    cameras = (spec, cell.known.camera("wrist"))
+    world = World(cell.model_copy(update={"known": cell.known.model_copy(update={"cameras": cameras})}), "zero", 0)
+    frame = first_frame(world)
+    world.close()
+    technique, pose = make_technique("fiducial", cell.known), spec.mount.world_from_camera  # type: ignore[union-attr]
+    dictionary, fitting = (
+        cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, TAG_DICTIONARY)),
+        cv2.aruco.DetectorParameters(),
+    )
+    fitting.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_APRILTAG
+    detector, fitter = cv2.aruco.ArucoDetector(dictionary), cv2.aruco.ArucoDetector(dictionary, fitting)
+    square, camera = np.array([[-1.0, 1, 0], [1, 1, 0], [1, -1, 0], [-1, -1, 0]]), np.diag([665.0, 665.0, 1.0])
+
+    def bare() -> Any:
+        gray = cv2.cvtColor(frame.rgb, cv2.COLOR_RGB2GRAY)
+        corners = next(c[0] for c, n in zip(*detector.detectMarkers(gray)[:2], strict=True) if n == 7)
+        left, top, wide, high = cv2.boundingRect(corners)
+        fitter.detectMarkers(
+            cv2.resize(gray[top - 10 : top + high + 10, left - 10 : left + wide + 10], None, fx=2, fy=2)
+        )
+        both = cv2.solvePnPGeneric(square, corners.astype(float), camera, None, flags=cv2.SOLVEPNP_IPPE_SQUARE)
+        return [
+            cv2.solvePnPRefineLM(square, corners.astype(float), camera, None, *start)
+            for start in zip(*both[1:3], strict=True)
+        ]
+
+    assert not isinstance(technique.estimate(frame, pose), NoEstimate)
+    return lambda: technique.estimate(frame, pose), bare
+
+
+def poses(world: World) -> tuple[Call, Call]:
+    """The connector's pose from a rear frame, and OpenCV's own share of it: colour space, range, dilate, contours."""
+    image, known = first_frame(world), world.cell.known
     world_from_camera = known.camera("rear").mount.world_from_camera  # type: ignore[union-attr]
     spans = SegmentationParameters.for_color(known.connector.color).ranges()
     kernel = np.ones((3, 3), np.uint8)

@@ -1,6 +1,6 @@
-"""Values laid over a parsed file: `--set key.path=value` from the command line, and what a case of `vary` changes."""
+"""Values laid over a parsed file: `--set key.path=value`, what a case of `vary` changes, a cell over its base."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from copy import deepcopy
 from dataclasses import dataclass
 
@@ -68,6 +68,30 @@ def apply(document: Document, assignments: Sequence[Assignment]) -> None:
             findings.append(Finding(*assignment.place, f"{assignment.told}: {error.args[0]}"))
     if findings:
         raise Findings(findings)
+
+
+def lay_over(document: Document, top: Document) -> None:
+    """Lay another file over `document` in place: mappings are joined, all other values replaced.
+
+    Raises `Findings` for all that cannot be placed.
+    """
+    parts = []
+    for path, value in _leaves(top.value):
+        places = {p[len(path) :]: place for p, place in top.places.items() if p[: len(path)] == path}
+        key = _dotted(path)
+        parts.append(Assignment(key, Document(value, places), key, top.place(path)))
+    apply(document, parts)
+    document.findings += top.findings
+    document.unread |= top.unread
+
+
+def _leaves(value: Value, path: Path = ()) -> Iterator[tuple[Path, Value]]:
+    """Every value below `value` that is no mapping, with its path."""
+    if isinstance(value, dict):
+        for key, below in value.items():
+            yield from _leaves(below, (*path, key))
+    else:
+        yield path, value
 
 
 def _apply_one(document: Document, assignment: Assignment) -> None:

@@ -8,7 +8,7 @@ from typing import Any, Literal, ParamSpec, TypeVar
 
 from app import vary
 from app.findings import Finding, Findings, nearest, shown
-from app.overrides import Assignment, apply, path_of, read
+from app.overrides import Assignment, apply, lay_over, path_of, read
 from app.placement import misplaced
 from app.resources import read_text, resolve
 from app.scenario_parts import check_inputs, check_names, names_of, tree_text
@@ -242,9 +242,12 @@ def _cell(document: Document, folder: Path, assignments: Sequence[Assignment]) -
 def load_cell(path: Path, assignments: Sequence[Assignment] = (), where: Place | None = None) -> Cell:
     """Read and check a cell file with values laid over it.
 
+    A cell may name another as its `base`, whose values it takes where it gives none; that one names no base in turn.
     Raises `Findings`, at `where` (the place that names the cell) when there is no such file.
     """
     document = parse(read_text(path, where), shown(path))
+    if isinstance(document.value, dict) and "base" in document.value:
+        document = _on_base(document, path.parent)
     _, found = _attempt(apply, document, assignments)
     cell, wrong = _attempt(validated, document, Cell)
     found += wrong
@@ -253,6 +256,21 @@ def load_cell(path: Path, assignments: Sequence[Assignment] = (), where: Place |
     if found or not cell:
         raise Findings(found)
     return cell
+
+
+def _on_base(top: Document, folder: Path) -> Document:
+    assert isinstance(top.value, dict)
+    name, place = top.value.pop("base"), top.place(("base",))
+    if not isinstance(name, str):
+        raise Findings([Finding(*place, f"base is {quoted(name)}; expected the name of a cell or a path to its file")])
+    path = resolve("cell", name, folder, place)
+    document = parse(read_text(path, place), shown(path))
+    if isinstance(document.value, dict) and "base" in document.value:
+        raise Findings(
+            [Finding(*place, f"{quoted(shown(path))} has a base itself; name that one, and give here what it adds")]
+        )
+    lay_over(document, top)
+    return document
 
 
 def _inconsistent(document: Document, cell: Cell) -> Iterator[Finding]:

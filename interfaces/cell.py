@@ -81,6 +81,27 @@ class Socket(Model):
         return Box(name=self.name, center=self.center, size=size, color=self.color)
 
 
+TAG_DICTIONARY = "DICT_4X4_50"  # of cv2.aruco; choice: the fewest cells, so the largest ones on a small plate
+
+
+class Tag(Model):
+    """An ArUco tag of `TAG_DICTIONARY` in the middle of a square white plate, fixed on a body.
+
+    In the body's frame it faces +y, and its own x points along x. A printed film of a fraction of a gram that gives way
+    to a hand: it is seen and weighs and stops nothing.
+    """
+
+    number: Annotated[int, Field(ge=0, le=49)]
+    size: Positive  # edge of the black square
+    plate: Positive  # edge of the plate, with the white border that the tag needs
+    center: Vector  # of its face, in the body's frame
+
+    @property
+    def body_from_tag(self) -> RigidTransform:
+        """Pose of the tag (x to its right, y to its top, z towards who looks at it) in the body's frame."""
+        return RigidTransform.from_components(self.center, Rotation.from_matrix([[1, 0, 0], [0, 0, 1], [0, -1, 0]]))
+
+
 class Clip(Model):
     """A snap-in clip that takes the connector's tip half: seat pose of the connector in it, and what it does."""
 
@@ -90,6 +111,7 @@ class Clip(Model):
     capture_angle_deg: Positive
     hold_force: Positive
     bracket: tuple[Box, ...]
+    tag: Tag | None = None  # in the seat's frame
 
     @property
     def world_from_seat(self) -> RigidTransform:
@@ -103,6 +125,7 @@ class Connector(Model):
     length: Positive
     radius: Positive
     color: Color
+    tag: Tag | None = None
 
 
 class ArmSpec(Model):

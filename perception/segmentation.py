@@ -19,6 +19,8 @@ class NotSeen(StrEnum):
     NO_CAMERA = "no_camera"  # the camera is not to be trusted
     NO_DEPTH = "no_depth"  # the patch has too few depth readings
     NOT_ITS_SHAPE = "not_its_shape"  # its colour, but not a cylinder of its size
+    NO_TAG = "no_tag"  # its tag is not in sight
+    WRONG_SIZE = "wrong_size"  # its tag's size in the image and the depth there disagree
 
 
 @dataclass(frozen=True)

@@ -10,10 +10,11 @@ from scipy.spatial.transform import RigidTransform
 from interfaces.cell import KnownCell
 from interfaces.frame import RgbdFrame
 from perception.estimate import Estimate, NoEstimate
+from perception.fiducial import Fiducial
 from perception.fused import Fused
 from perception.rgbd_pose import Rgbd
 
-TechniqueName = Literal["rgbd", "fused"]
+TechniqueName = Literal["rgbd", "fiducial", "fused"]
 TECHNIQUES: tuple[TechniqueName, ...] = get_args(TechniqueName)
 
 
@@ -37,6 +38,6 @@ class Technique(Protocol):
 
 
 def make_technique(name: TechniqueName, known: KnownCell) -> Technique:
-    """The technique of that name."""
-    makers: dict[TechniqueName, Callable[[KnownCell], Technique]] = {"rgbd": Rgbd, "fused": Fused}
+    """The technique of that name. Raises ValueError for a cell that has not what it needs."""
+    makers: dict[TechniqueName, Callable[[KnownCell], Technique]] = {"rgbd": Rgbd, "fiducial": Fiducial, "fused": Fused}
     return makers[name](known)

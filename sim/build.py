@@ -10,6 +10,7 @@ from interfaces.cell import Box, HiddenWorld, KnownCell, Socket
 from interfaces.scene import EARTH_GRAVITY, Gravity, Obstacle
 from sim.cable import CableBody
 from sim.fixtures import Hold
+from sim.printed import tag_boxes, visual
 
 LAY_SECONDS, SETTLE_SECONDS = 1.5, 2.5  # the cable is drawn from straight into its socket, then comes to rest
 BOX_FRICTION = 0.5
@@ -30,6 +31,9 @@ def build_boxes(client: int, known: KnownCell, obstacles: tuple[Obstacle, ...]) 
     """Body ids of all that stands fast: floor, panels, clip bracket, sockets, and `obstacle NAME` for the obstacles."""
     bodies = {box.name: _box(client, box) for box in (*known.boxes, *known.clip.bracket)}
     bodies |= {socket.name: _socket_block(client, socket) for socket in known.sockets}
+    if known.clip.tag is not None:
+        world_from_tag = known.clip.world_from_seat * known.clip.tag.body_from_tag
+        p.createMultiBody(0, -1, visual(client, tag_boxes(known.clip.tag), world_from_tag), physicsClientId=client)
     for obstacle in obstacles:
         turn = Rotation.from_euler("z", obstacle.yaw)
         for box in (obstacle.box, obstacle.stand):

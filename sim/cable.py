@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from interfaces.cell import Cable, Connector, pose_along
+from sim.printed import tag_boxes, visual
 
 FloatArray = NDArray[np.float64]
 
@@ -134,6 +135,9 @@ def _create_chain(client: int, cable: Cable, connector: Connector, connector_mas
     n, length = cable.links, cable.length / cable.links
     link = _shapes(client, p.GEOM_CAPSULE, cable.radius, length, length / 2, cable.color)
     end = _shapes(client, p.GEOM_CYLINDER, connector.radius, connector.length, 0.0, connector.color)
+    if connector.tag is not None:
+        body = (connector.radius, connector.length, connector.color)
+        end = end[0], visual(client, tag_boxes(connector.tag), connector.tag.body_from_tag, body)
     collisions, visuals = zip(*[link] * n, end, strict=True)
     origin = pose_along(cable.anchor, cable.anchor_axis)
     return int(

@@ -9,7 +9,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from interfaces.cell import Cell, FixedMount, Socket, WristMount, pose_along
+from interfaces.cell import Cell, FixedMount, Socket, Tag, WristMount, pose_along
 
 LENGTH = 1e-9  # metres
 coordinates = st.floats(-2.0, 2.0)
@@ -128,3 +128,9 @@ def test_a_wrong_cell_is_refused(data: Any, spoil: Callable[[Any], None], messag
 def test_values_do_not_change(thesis: Cell) -> None:
     with pytest.raises(ValidationError, match="frozen"):
         thesis.known.plugged_into = "back_1"
+
+
+def test_a_tag_faces_the_bodys_left_with_its_x_along_the_bodys() -> None:
+    tag = Tag(number=3, size=0.03, plate=0.04, center=(0.1, 0.02, 0.3))
+    np.testing.assert_allclose(tag.body_from_tag.translation, tag.center)
+    np.testing.assert_allclose(tag.body_from_tag.rotation.apply(np.eye(3)), [[1, 0, 0], [0, 0, -1], [0, 1, 0]])

@@ -1,0 +1,68 @@
+"""`regrasp calibrate`."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from app import output
+from app.findings import Finding, Findings, nearest, shown
+from app.options import MOST_SEED
+from app.resources import resolve
+from app.scenario_file import load_cell
+from interfaces.quote import quoted
+
+
+def add_to(app: typer.Typer) -> None:
+    """Make the command one of `app`."""
+    app.command("calibrate")(calibrate)
+
+
+def calibrate(
+    images: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="A folder of your pictures; without it, rendered ones.")
+    ] = None,
+    columns: Annotated[int, typer.Option(min=3, max=40, help="Inner corners of the board, across.")] = 9,
+    rows: Annotated[int, typer.Option(min=3, max=40, help="Inner corners of the board, down.")] = 6,
+    square: Annotated[float, typer.Option(min=0.001, max=1.0, help="Width of a square in metres.")] = 0.025,
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="FILE", help="The calibration file.")] = Path(
+        "calibration.yaml"
+    ),
+    draw: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Draw the corners and their residuals, a PNG a view.")
+    ] = None,
+    cell: Annotated[str, typer.Option(help="Rendered: the cell with the camera.")] = "thesis",
+    camera: Annotated[str, typer.Option(help="Rendered: which of its cameras.")] = "rear",
+    views: Annotated[int, typer.Option(min=5, max=200, help="Rendered: how many.")] = 20,
+    seed: Annotated[int, typer.Option(min=0, max=MOST_SEED, help="Rendered: draws where the board is held.")] = 0,
+) -> None:
+    """Find a camera's intrinsics from pictures of a checkerboard, and say how well they are known.
+
+    \b
+    Examples:
+      regrasp calibrate --draw calibration/           # in our own cell, against what is true there
+      regrasp calibrate --images photos/ --columns 9 --rows 6 --square 0.025 --out my_camera.yaml
+
+    Take ten or more sharp pictures, the board tilted in many ways and in every corner of the picture. The file, YAML,
+    holds width, height, fx, fy, cx, cy (pixels; 0, 0 is the middle of the first), OpenCV's distortion k1, k2, p1, p2,
+    k3, and the residual.
+    """
+    wrong = output.unwritable(out.parent) + (output.unwritable(draw) if draw else [])
+    if out.is_dir():
+        wrong.append(Finding(shown(out), 1, "is a folder; name a file"))
+    if draw is not None and images is not None and draw.resolve() == images.resolve():
+        wrong.append(Finding("--draw", 1, "is the folder of your pictures, which it would overwrite; name another"))
+    if wrong:
+        raise Findings(wrong)
+    from app import calibrate as steps  # brings OpenCV and the physics
+
+    board = steps.Board(columns, rows, square)
+    if images is not None:
+        steps.run(steps.pictures_in(images), board, shown(images), out, draw, None)
+        return
+    cameras = load_cell(resolve("cell", cell, Path())).known.cameras
+    spec = next((c for c in cameras if c.name == camera), None)
+    if spec is None:
+        message = f"no camera {quoted(camera)}; {nearest(camera, [c.name for c in cameras])}"
+        raise Findings([Finding("--camera", 1, message)])
+    steps.run(steps.rendered_pictures(spec, board, views, seed), board, "--views", out, draw, spec.intrinsics)

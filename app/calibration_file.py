@@ -1,0 +1,45 @@
+"""Calibration files: a camera's intrinsics as `regrasp calibrate` measured them."""
+
+from pathlib import Path
+from typing import Annotated
+
+import yaml
+from pydantic import Field
+
+from app.findings import shown
+from app.record import write_whole
+from app.resources import read_text
+from app.schema import validated
+from app.yaml_lines import parse
+from interfaces.cell import Model, NotNegative, Number, Positive
+from interfaces.frame import Intrinsics
+
+Pixels = Annotated[int, Field(ge=16, le=16384)]
+
+
+class CalibrationFile(Model):
+    """A pinhole camera; lengths in pixels, pixel (0, 0) is the centre of the top left pixel."""
+
+    width: Pixels
+    height: Pixels
+    fx: Positive
+    fy: Positive
+    cx: Number
+    cy: Number
+    distortion: tuple[Number, Number, Number, Number, Number]  # OpenCV's k1, k2, p1, p2, k3
+    rms: NotNegative  # of the corners' distances from where the board's should be
+
+    @property
+    def intrinsics(self) -> Intrinsics:
+        """The camera without its distortion: `perception.calibration.undistorted` makes its pictures fit."""
+        return Intrinsics(self.width, self.height, self.fx, self.fy, self.cx, self.cy)
+
+
+def load_calibration(path: Path) -> CalibrationFile:
+    """Read a calibration file. Raises `Findings` for all that is wrong in it."""
+    return validated(parse(read_text(path), shown(path)), CalibrationFile)
+
+
+def write_calibration(path: Path, calibration: CalibrationFile) -> None:
+    """Write it as YAML. Raises OSError where that cannot be."""
+    write_whole(path, yaml.safe_dump(calibration.model_dump(mode="json"), sort_keys=False, default_flow_style=None))
