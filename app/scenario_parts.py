@@ -24,7 +24,10 @@ def tree_text(value: TreeInput) -> str:
 
 def names_of(cell: Cell) -> dict[str, list[str]]:
     """What a tree may name of the cell, by kind."""
-    return {"socket": [socket.name for socket in cell.known.sockets]}
+    from perception.technique import TECHNIQUES  # late: it brings the compiler with it
+
+    techniques = [name for name in TECHNIQUES if name != "fiducial" or cell.known.connector.tag is not None]
+    return {"socket": [socket.name for socket in cell.known.sockets], "technique": techniques}
 
 
 def check_inputs(document: Document, tree: Path | None, cell: Cell | None) -> None:

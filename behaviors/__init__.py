@@ -14,6 +14,7 @@ from behaviors.spiral_search import SpiralSearch
 from behaviors.start_up import StartUp
 from behaviors.stow import LetGo, LookAtStow
 from behaviors.unplug import Unplug
+from behaviors.use_technique import UseTechnique
 
 LEAVES: dict[str, type[Leaf]] = {
     leaf.__name__: leaf
@@ -33,6 +34,7 @@ LEAVES: dict[str, type[Leaf]] = {
         SpiralSearch,
         StartUp,
         Unplug,
+        UseTechnique,
         WaitUntilStill,
     )
 }

@@ -40,11 +40,10 @@ class Perception:
         clock: Clock,
         pose_of: Callable[[RgbdFrame], RigidTransform],
         arm_spheres: Callable[[], list[Spheres]],
-        technique: TechniqueName = "fused",
     ) -> None:
         self._known, self._cameras, self._clock = known, cameras, clock
         self._pose_of, self._arm_spheres = pose_of, arm_spheres
-        self._technique = make_technique(technique, known)
+        self._technique = make_technique("fused", known)
         self._health = {name: CameraHealth(name) for name in cameras}
         self._results: dict[str, tuple[int, Estimate | NoEstimate]] = {}
         self.track = ConnectorTrack()
@@ -74,6 +73,10 @@ class Perception:
         self._results[camera] = (newest.number, result)
         self.track.feed(result)
         return result
+
+    def use(self, technique: TechniqueName) -> None:
+        """Look by this technique from now on. Raises ValueError for a cell that has not what it needs."""
+        self._technique, self._results = make_technique(technique, self._known), {}
 
     def trouble(self, camera: str) -> str | None:
         """Why a camera is not to be trusted now, in a sentence; None when all is well."""

@@ -142,6 +142,9 @@ class FakePerception:
         self.troubles: dict[str, str] = {}
         self.occupancy = SimpleNamespace(occupied_points=lambda: np.empty((0, 3)), h=0.01)
 
+    def use(self, technique: str) -> None:
+        """One technique is like the other."""
+
     def look(self, camera: str) -> Seen:
         self.looks.append(self.clock.t)
         result = self.shows(camera, np.floor(self.clock.t * 15 + 1e-6) / 15)
