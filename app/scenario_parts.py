@@ -26,7 +26,7 @@ def names_of(cell: Cell) -> dict[str, list[str]]:
     """What a tree may name of the cell, by kind."""
     from perception.technique import TECHNIQUES  # late: it brings the compiler with it
 
-    techniques = [name for name in TECHNIQUES if name != "fiducial" or cell.known.connector.tag is not None]
+    techniques: list[str] = [name for name in TECHNIQUES if name != "fiducial" or cell.known.connector.tag is not None]
     return {"socket": [socket.name for socket in cell.known.sockets], "technique": techniques}
 
 
