@@ -69,7 +69,8 @@ class Perception:
             return missed
         if camera in self._results and self._results[camera][0] == newest.number:
             return self._results[camera][1]
-        result = self._technique.estimate(newest, self._pose_of(newest), axis=self.hint)
+        near = self.track.position(self._clock.now())
+        result = self._technique.estimate(newest, self._pose_of(newest), axis=self.hint, near=near)
         self._results[camera] = (newest.number, result)
         self.track.feed(result)
         return result
