@@ -1,7 +1,7 @@
 """A simulated RGB-D camera."""
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from interfaces.cell import CameraSpec, Errors
-from interfaces.frame import RgbdFrame
+from interfaces.frame import Intrinsics, RgbdFrame
 from sim.depth_noise import DepthNoise
 from sim.picture import LightState
 from sim.renderer import Renderer
@@ -94,6 +94,23 @@ class SimCamera:
         """Ground truth: the `VisualItem.id` that each pixel of `latest()` shows, -1 for none; None before the first."""
         self.latest()
         return self._ids
+
+    def still(self, count: int) -> Iterator[RgbdFrame]:
+        """The next `count` frames if nothing moves: the picture drawn once, the depth noise of each frame."""
+        now, poses, joints = self._now(), self._visuals.snapshot(), self._joints() if self._joints else None
+        image = self._renderer.render(poses, self._true_pose(), self._intrinsics, self.light)
+        for i in range(count):
+            number, stamp = self._count + 1 + i, now + i / self.spec.rate
+            depth = self._noise.apply(image.depth, number)
+            yield RgbdFrame(self.name, number, stamp, image.rgb, depth, self._intrinsics, joints)
+
+    def ids(self, poses: NDArray[np.float32], intrinsics: Intrinsics) -> NDArray[np.int32]:
+        """Ground truth: the `VisualItem.id` in each pixel of a camera that stands where this one truly does."""
+        return self._renderer.render(poses, self._true_pose(), intrinsics, self.light).ids
+
+    def true_pose(self) -> RigidTransform:
+        """Ground truth: world_from_camera with the calibration's error in it."""
+        return self._true_pose()
 
     def _draw(self, exposure: _Exposure) -> tuple[RgbdFrame, NDArray[np.int32]]:
         image = self._renderer.render(exposure.poses, exposure.world_from_camera, self._intrinsics, exposure.light)

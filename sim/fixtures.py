@@ -14,6 +14,7 @@ from interfaces.cell import Clip
 
 FloatArray = NDArray[np.float64]
 
+STAND_FORCE = 3.0  # N that a stand's spring clip holds; choice: a light pull, twice what a slack cable presses with
 STIFF = 1e4  # N: the constraints' own limit, far over what the models release at
 FORCE_WINDOW = 5  # physics steps over which a force is averaged, so that one step's solver spike does not count
 LIP_TRAVEL = 0.010  # m over which the clip's force grows to its full value
@@ -70,13 +71,14 @@ class Hold:
 class SocketHold:
     """A plugged end: held stiffly until it is drawn back along `axis` (3,), the plug's way in, with `pull_out_force` N.
 
-    A force across the axis, as a closing jaw makes, does not free it. Measured: `getConstraintState` gives the world
-    force that the constraint answers with, so a pull along -axis reads as a force along +axis.
+    A force across the axis, as a closing jaw makes, does not free it; without an axis, on a stand, so large a force in
+    any direction does. Measured: `getConstraintState` gives the world force that the constraint answers with, so a pull
+    along -axis reads as a force along +axis.
     """
 
-    def __init__(self, hold: Hold, axis: FloatArray, pull_out_force: float) -> None:
+    def __init__(self, hold: Hold, axis: FloatArray | None, pull_out_force: float) -> None:
         self._hold: Hold | None = hold
-        self._axis = axis / np.linalg.norm(axis)
+        self._axis = None if axis is None else axis / np.linalg.norm(axis)
         self._limit = pull_out_force
 
     @property
@@ -86,7 +88,10 @@ class SocketHold:
 
     def step(self) -> None:
         """Look at the force after a physics step."""
-        if self._hold is not None and float(self._hold.force() @ self._axis) > self._limit:
+        if self._hold is None:
+            return
+        force = self._hold.force()
+        if float(np.linalg.norm(force) if self._axis is None else force @ self._axis) > self._limit:
             self._hold.release()
             self._hold = None
 

@@ -4,9 +4,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
+from interfaces.frame import Intrinsics
 from sim.world import World
 
 _LINK_SHIFT = 24
+FINER = 8  # choice: the edge of an obstacle is then a tenth of a percent of the connector wide
+FAR_OFF = -100.0  # m, out of every picture
 
 
 class GroundTruth:
@@ -53,10 +56,34 @@ class GroundTruth:
     def connector_pixels(self, camera: str) -> int:
         """Pixels of the connector in a camera's newest frame."""
         ids = self._world.cameras[camera].true_ids()
+        return 0 if ids is None else self._count(ids)
+
+    def hidden_share(self, camera: str) -> float:
+        """Share, 0 to 1, of what a camera would see of the connector now that the obstacles hide from it.
+
+        Counted in pixels `FINER` times as fine as the camera's, so that an edge between two of its pixels counts.
+        """
+        world, seen_by = self._world, self._world.cameras[camera]
+        closer = _around(seen_by.true_pose().inv().apply(world.connector_pose().translation), seen_by.spec.intrinsics)
+        with_all = world.visuals.snapshot()
+        without = with_all.copy()
+        obstacles = [body for name, body in world.boxes.items() if name.startswith("obstacle ")]
+        without[[item.body in obstacles for item in world.visuals.items], :, 3] = FAR_OFF
+        free, left = (self._count(seen_by.ids(poses, closer)) for poses in (without, with_all))
+        return 1.0 - left / free
+
+    def _count(self, ids: NDArray[np.int32]) -> int:
         cable = self._world.cable
-        wanted = cable.body + ((cable.connector_link + 1) << _LINK_SHIFT)
-        return 0 if ids is None else int(np.count_nonzero(ids == wanted))
+        return int(np.count_nonzero(ids == cable.body + ((cable.connector_link + 1) << _LINK_SHIFT)))
 
     def contact_peaks(self) -> dict[str, float]:
         """Largest normal force in N between an arm and each thing that it must not touch, so far."""
         return dict(self._world.contact_peaks)
+
+
+def _around(center: NDArray[np.float64], camera: Intrinsics) -> Intrinsics:
+    """A camera with `FINER` times the focal length whose picture is centred on a point (3,) m of the optical frame."""
+    fx, fy = FINER * camera.fx, FINER * camera.fy
+    x, y, z = center.tolist()
+    middle = (camera.width - 1) / 2, (camera.height - 1) / 2
+    return Intrinsics(camera.width, camera.height, fx, fy, middle[0] - fx * x / z, middle[1] - fy * y / z)

@@ -21,7 +21,7 @@ from sim.camera import SimCamera, camera_error
 from sim.depth_noise import DepthNoise
 from sim.fault_effects import effect_of
 from sim.faults import Fault, Moments
-from sim.fixtures import ClipHold, SocketHold
+from sim.fixtures import STAND_FORCE, ClipHold, SocketHold
 from sim.phase import PhaseWatch
 from sim.renderer import LightState, RendererName, make_renderer
 from sim.visuals import Visuals
@@ -31,7 +31,10 @@ CONTACT_EVERY = 4  # physics steps between looks at the arms' contacts
 
 
 class World:
-    """One run's world. `seed` draws every error and noise; the same arguments give the same bits."""
+    """One run's world. `seed` draws every error and noise; the same arguments give the same bits.
+
+    `connector_at` is where the connector starts, world_from_connector, on a stand instead of in its socket.
+    """
 
     def __init__(
         self,
@@ -42,6 +45,7 @@ class World:
         faults: tuple[AnyFault, ...] = (),
         renderer: RendererName = "auto",
         gui: bool = False,
+        connector_at: RigidTransform | None = None,
     ) -> None:
         self.cell, self.gravity = cell, gravity
         self.client: int = p.connect(p.GUI if gui else p.DIRECT)
@@ -55,7 +59,7 @@ class World:
         self._named = filter_collisions(
             self.client, cell.known, self.boxes, {arm.body: name for name, arm in self.arms.items()}, self.cable
         )
-        self.socket = self._plug()
+        self.socket = self._plug(connector_at)
         self.clip = self._build_clip()
         self.contact_peaks: dict[str, float] = {}
         self._connector, self._velocity, self._rate = self.cable.connector_state()
@@ -86,6 +90,12 @@ class World:
     def notice(self, node: str) -> None:
         """Take note that the node of this tree path was entered now: a fault may wait for it."""
         self._moments.nodes.setdefault(node, self.now())
+
+    def place_obstacle(self, name: str, center: FloatArray) -> None:
+        """Put an obstacle's box, which has no stand, elsewhere: its middle at `center` (3,) m."""
+        body = self.boxes[f"obstacle {name}"]
+        turn = p.getBasePositionAndOrientation(body, physicsClientId=self.client)[1]
+        p.resetBasePositionAndOrientation(body, center.tolist(), turn, physicsClientId=self.client)
 
     def set_light(self, light: LightState) -> None:
         """Light the cell so from now on."""
@@ -193,13 +203,15 @@ class World:
         )
         return cable
 
-    def _plug(self) -> SocketHold:
-        """Lay the straight cable into its socket and let it come to rest, before time begins."""
+    def _plug(self, stand: RigidTransform | None) -> SocketHold:
+        """Lay the straight cable into its socket, or on a stand, and let it come to rest, before time begins."""
         known = self.cell.known
         socket = known.socket(known.plugged_into)
-        goal = socket.world_from_plug(known.connector.length)
+        goal = socket.world_from_plug(known.connector.length) if stand is None else stand
         hold = lay_cable(self.client, self.cable, goal, self.step_seconds)
-        return SocketHold(hold, np.asarray(socket.axis), socket.pull_out_force)
+        if stand is None:
+            return SocketHold(hold, np.asarray(socket.axis), socket.pull_out_force)
+        return SocketHold(hold, None, STAND_FORCE)
 
     def _build_clip(self) -> ClipHold:
         return ClipHold(
