@@ -89,7 +89,7 @@ class Scene:
     """A world with the connector in one of the `CONFIGURATIONS`. Close it, or use it in a `with`."""
 
     def __init__(self, cell: Cell, configuration: str, seed: int, renderer: RendererName = "auto") -> None:
-        self.configuration = CONFIGURATIONS[configuration]
+        self.configuration, self.seed = CONFIGURATIONS[configuration], seed
         mount = cell.known.camera("rear").mount
         assert isinstance(mount, FixedMount)
         self.world_from_camera = mount.world_from_camera

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
-from interfaces.cell import Box
+from interfaces.cell import Box, Color
 
 Gravity = Literal["zero", "earth"]
 EARTH_GRAVITY = 9.81  # m/s2
@@ -16,3 +16,15 @@ class Obstacle:
     box: Box
     yaw: float
     stand: Box | None
+
+
+@dataclass(frozen=True)
+class Prop:
+    """A thing that is seen and stops nothing. `size` in m: a box's edges; a ball's radius; a rod's length and radius.
+
+    Its frame is at its middle, a rod lies along x.
+    """
+
+    kind: Literal["box", "ball", "rod"]
+    size: tuple[float, ...]
+    color: Color

@@ -7,13 +7,14 @@ import pybullet as p
 from scipy.spatial.transform import RigidTransform, Rotation, Slerp
 
 from interfaces.cell import Box, HiddenWorld, KnownCell, Socket
-from interfaces.scene import EARTH_GRAVITY, Gravity, Obstacle
+from interfaces.scene import EARTH_GRAVITY, Gravity, Obstacle, Prop
 from sim.cable import CableBody
 from sim.fixtures import Hold
 from sim.printed import tag_boxes, visual
 
 LAY_SECONDS, SETTLE_SECONDS = 1.5, 2.5  # the cable is drawn from straight into its socket, then comes to rest
 BOX_FRICTION = 0.5
+OUT_OF_SIGHT = RigidTransform.from_translation([0.2, 0.0, -0.4])  # below the floor, near: shadows are drawn as finely
 CLAMPED_LINKS = 4  # so many links at the cable's fixed end may pass through the socket and panel that they start in
 
 
@@ -40,6 +41,11 @@ def build_boxes(client: int, known: KnownCell, obstacles: tuple[Obstacle, ...]) 
             if box is not None:
                 bodies[f"obstacle {box.name}"] = _box(client, box, turn)
     return bodies
+
+
+def build_props(client: int, props: tuple[Prop, ...]) -> list[int]:
+    """Body ids of things that are only seen, out of sight."""
+    return [_prop(client, prop) for prop in props]
 
 
 def filter_collisions(
@@ -86,6 +92,20 @@ def _box(client: int, box: Box, turn: Rotation | None = None) -> int:
     body = p.createMultiBody(0, collision, visual, box.center, turn.as_quat().tolist(), physicsClientId=client)
     p.changeDynamics(body, -1, lateralFriction=BOX_FRICTION, physicsClientId=client)
     return int(body)
+
+
+def _prop(client: int, prop: Prop) -> int:
+    match prop.kind:
+        case "box":
+            shape = {"shapeType": p.GEOM_BOX, "halfExtents": [s / 2 for s in prop.size]}
+        case "ball":
+            shape = {"shapeType": p.GEOM_SPHERE, "radius": prop.size[0]}
+        case "rod":
+            along_x = p.getQuaternionFromEuler([0.0, np.pi / 2, 0.0])
+            shape = {"shapeType": p.GEOM_CYLINDER, "length": prop.size[0], "radius": prop.size[1]}
+            shape["visualFrameOrientation"] = along_x
+    visual = p.createVisualShape(**shape, rgbaColor=[*prop.color, 1], physicsClientId=client)
+    return int(p.createMultiBody(0, -1, visual, OUT_OF_SIGHT.translation.tolist(), physicsClientId=client))
 
 
 def _socket_block(client: int, socket: Socket) -> int:

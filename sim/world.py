@@ -13,9 +13,9 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from interfaces.cell import Cell, WristMount
 from interfaces.fault import AnyFault
-from interfaces.scene import Gravity, Obstacle
+from interfaces.scene import Gravity, Obstacle, Prop
 from sim.arm import SimArm
-from sim.build import build_boxes, configure, filter_collisions, lay_cable
+from sim.build import OUT_OF_SIGHT, build_boxes, build_props, configure, filter_collisions, lay_cable
 from sim.cable import CableBody, build_cable
 from sim.camera import SimCamera, camera_error
 from sim.depth_noise import DepthNoise
@@ -33,7 +33,8 @@ CONTACT_EVERY = 4  # physics steps between looks at the arms' contacts
 class World:
     """One run's world. `seed` draws every error and noise; the same arguments give the same bits.
 
-    `connector_at` is where the connector starts, world_from_connector, on a stand instead of in its socket.
+    `connector_at` is where the connector starts, world_from_connector, on a stand instead of in its socket; `props` lie
+    out of sight until they are placed.
     """
 
     def __init__(
@@ -46,6 +47,7 @@ class World:
         renderer: RendererName = "auto",
         gui: bool = False,
         connector_at: RigidTransform | None = None,
+        props: tuple[Prop, ...] = (),
     ) -> None:
         self.cell, self.gravity = cell, gravity
         self.client: int = p.connect(p.GUI if gui else p.DIRECT)
@@ -54,6 +56,7 @@ class World:
         errors_rng, light_rng = (np.random.default_rng(s) for s in np.random.SeedSequence([seed, 1]).spawn(2))
         configure(self.client, cell.hidden, gravity)
         self.boxes = build_boxes(self.client, cell.known, obstacles)
+        self._props = build_props(self.client, props)
         self.arms = self._build_arms(errors_rng)
         self.cable = self._build_cable()
         self._named = filter_collisions(
@@ -96,6 +99,14 @@ class World:
         body = self.boxes[f"obstacle {name}"]
         turn = p.getBasePositionAndOrientation(body, physicsClientId=self.client)[1]
         p.resetBasePositionAndOrientation(body, center.tolist(), turn, physicsClientId=self.client)
+
+    def place_prop(self, number: int, pose: RigidTransform | None) -> None:
+        """Put the prop of that number at `pose`, world_from_prop, or out of sight."""
+        at = OUT_OF_SIGHT if pose is None else pose
+        turn = at.rotation.as_quat().tolist()
+        p.resetBasePositionAndOrientation(
+            self._props[number], at.translation.tolist(), turn, physicsClientId=self.client
+        )
 
     def set_light(self, light: LightState) -> None:
         """Light the cell so from now on."""

@@ -1,0 +1,132 @@
+"""One trial of the pose study: a technique looks at a scene, its mean pose is held against the truth and grasped."""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial.transform import RigidTransform
+
+from app.pose_grasp import grasp
+from app.pose_scenes import CAMERA, Scene
+from interfaces.cell import Cell, KnownCell, pose_along
+from interfaces.frame import RgbdFrame
+from perception.estimate import Estimate
+from perception.technique import Technique, make_technique
+
+LOOK_SECONDS, MEAN_SECONDS = 5.0, 3.0  # to identify it, and then over which poses are averaged: the thesis's
+FAR = 0.10  # m from the truth; choice: what is seen further than a connector's length away is something else
+
+Maker = Callable[[str, KnownCell], Technique]
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What a technique made of one configuration with one seed. None: not known, or not tried."""
+
+    technique: str
+    configuration: str
+    seed: int
+    identified: bool
+    seconds: float | None = None  # until it was
+    estimates: int = 0  # of the frames in the mean
+    error_m: float | None = None
+    axis_error_deg: float | None = None  # between the axes' lines
+    way_round: bool | None = None  # cable and tip are told apart
+    grasped: bool | None = None
+    why: str = ""  # not identified, or not grasped
+    unintended_force: float | None = None  # N, the largest of the arm against what it must not touch
+
+    def __str__(self) -> str:
+        if self.error_m is None:
+            return f"{self.technique} not identified"
+        grasped = {None: "", True: ", grasped", False: ", not grasped"}[self.grasped]
+        return f"{self.technique} {1e3 * self.error_m:.1f} mm{grasped}"
+
+
+@dataclass(frozen=True)
+class Looked:
+    """A technique's mean pose, or why it has none."""
+
+    world_from_connector: RigidTransform | None
+    seconds: float | None
+    estimates: int
+    why: str
+
+
+def make(name: str, known: KnownCell) -> Technique:
+    """The technique of that name. Raises KeyError."""
+    return make_technique(name, known)  # type: ignore[arg-type]  # names come checked from the command line
+
+
+def run_trials(
+    cell: Cell, configuration: str, seed: int, techniques: Sequence[str], grasps: bool, maker: Maker = make
+) -> list[Trial]:
+    """A trial of each technique, on the same frames; each grasps in a scene of its own that is built alike."""
+    with Scene(cell, configuration, seed) as scene:
+        trials = [_look(scene, name, maker) for name in techniques]
+    if not grasps:
+        return [trial for trial, _ in trials]
+    return [_grasp(cell, trial, pose) for trial, pose in trials]
+
+
+def _look(scene: Scene, technique: str, maker: Maker) -> tuple[Trial, RigidTransform | None]:
+    rate = scene.world.cameras[CAMERA].spec.rate
+    frames = scene.frames(round((LOOK_SECONDS + MEAN_SECONDS) * rate))
+    truth = scene.truth.connector_pose()
+    seen = looked(maker(technique, scene.world.cell.known), frames, scene.world_from_camera, truth)
+    trial = Trial(technique, scene.configuration.name, scene.seed, False, why=seen.why)
+    pose = seen.world_from_connector
+    if pose is None:
+        return trial, None
+    cosine = float(pose.rotation.apply([1.0, 0.0, 0.0]) @ truth.rotation.apply([1.0, 0.0, 0.0]))
+    trial = replace(
+        trial,
+        identified=True,
+        seconds=seen.seconds,
+        estimates=seen.estimates,
+        error_m=float(np.linalg.norm(pose.translation - truth.translation)),
+        axis_error_deg=float(np.rad2deg(np.arccos(min(1.0, abs(cosine))))),
+        way_round=cosine > 0,
+    )
+    return trial, pose
+
+
+def looked(
+    technique: Technique, frames: Iterable[RgbdFrame], world_from_camera: RigidTransform, truth: RigidTransform
+) -> Looked:
+    """The mean over `MEAN_SECONDS` from the first estimate within `LOOK_SECONDS`; one `FAR` from `truth` is none."""
+    seen: list[Estimate] = []
+    start, why = 0.0, "no frame"
+    for number, frame in enumerate(frames):
+        start = frame.stamp if number == 0 else start
+        end = seen[0].stamp + MEAN_SECONDS if seen else start + LOOK_SECONDS
+        if frame.stamp >= end - 1e-9:
+            break
+        found = technique.estimate(frame, world_from_camera)
+        if not isinstance(found, Estimate):
+            why = found.message
+        elif (away := float(np.linalg.norm(found.position - truth.translation))) > FAR:
+            why = f"what was identified is {away:.2f} m from the connector"
+        else:
+            seen.append(found)
+    if not seen:
+        return Looked(None, None, 0, why)
+    return Looked(_mean(seen), seen[0].stamp - start, len(seen), "")
+
+
+def _mean(seen: Sequence[Estimate]) -> RigidTransform:
+    """world_from_connector: mean position and mean line of the axis, pointing where most do."""
+    x, y, z = np.mean([e.position for e in seen], axis=0).tolist()
+    axes = np.array([e.axis for e in seen])
+    signs = np.where(axes @ axes[0] >= 0, 1.0, -1.0)
+    ax, ay, az = ((signs @ axes) * (1.0 if signs.sum() >= 0 else -1.0)).tolist()
+    return pose_along((x, y, z), (ax, ay, az))
+
+
+def _grasp(cell: Cell, trial: Trial, pose: RigidTransform | None) -> Trial:
+    if pose is None:
+        return replace(trial, grasped=False)
+    with Scene(cell, trial.configuration, trial.seed) as scene:
+        why = grasp(scene, pose, trial.seed)
+        forces = [force for name, force in scene.world.contact_peaks.items() if name.startswith("right arm")]
+    return replace(trial, grasped=not why, why=why, unintended_force=round(max(forces, default=0.0), 2))
