@@ -11,7 +11,7 @@ from app.pose_scenes import CONFIGURATIONS, HEADLINE
 from app.pose_trial import Trial
 from app.study import wilson
 
-# Hwang 2024, table 5: mean error in mm of the RGB-D technique by the share hidden, which its configurations 3, 6-9 have.
+# Hwang 2024, table 5: mean error in mm of the RGB-D technique by the share hidden, in its configurations 3 and 6 to 9.
 THESIS_RGBD = {"3": 4.4, "6": 8.8, "7": 13.6, "8": 17.0, "9": 35.7}
 WIDTH = 0.8  # of a group of techniques, in configurations
 

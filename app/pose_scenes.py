@@ -5,7 +5,7 @@ socket: a spring clip that lets go at 3 N, whichever way it is pulled. Scenes 6 
 foam piece. A seed moves the connector a little, and draws the cell's errors, light and noise.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Self
@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
+from app.findings import Findings
 from app.overrides import read
 from app.resources import resolve
 from app.scenario_file import load_cell
@@ -62,7 +63,7 @@ _ALL = (
     Configuration("1", 35.0, 0.0, 0.06),
     Configuration("2", 0.0, 0.0, 0.06),
     Configuration("3", 25.0, 30.0, 0.06),
-    Configuration("4", 80.0, 0.0, 0.02),
+    Configuration("4", 80.0, 9.0, 0.02),
     Configuration("5", 0.0, 90.0, 0.0, faces_away=True),
     *(Configuration(name, 25.0, 30.0, 0.06, hidden=share) for name, share in _HIDDEN.items()),
     *(Configuration(f"{name} shadow", 25.0, 30.0, 0.06, hidden=share, shadow=True) for name, share in _HIDDEN.items()),
@@ -71,9 +72,11 @@ CONFIGURATIONS = {c.name: c for c in _ALL}
 HEADLINE = tuple(c.name for c in _ALL if not c.shadow)
 
 
-def study_cell(name: str = "thesis") -> Cell:
-    """The cell of that name, or file, with the cable slack. Raises `Findings`."""
-    assignments, _ = read([f"hidden.cable.stiffness.zero={STIFFNESS}"])
+def study_cell(name: str = "thesis", overrides: Sequence[str] = ()) -> Cell:
+    """The cell of that name, or file, with the cable slack and "key.path=value" texts laid over. Raises `Findings`."""
+    assignments, wrong = read([f"hidden.cable.stiffness.zero={STIFFNESS}", *overrides])
+    if wrong:
+        raise Findings(wrong)
     return load_cell(resolve("cell", name, Path()), assignments)
 
 

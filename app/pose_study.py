@@ -5,7 +5,6 @@ import io
 import json
 import math
 import statistics
-import sys
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, fields
 from functools import partial
@@ -14,14 +13,13 @@ from typing import Any
 
 from app.pose_negatives import Negative, run_negatives
 from app.pose_scenes import CONFIGURATIONS, HEADLINE
+from app.pose_tasks import run_tasks
 from app.pose_trial import Maker, Trial, make, run_trials
-from app.processes import run_each
 from app.record import plain, versions, write_whole
 from app.study import wilson
 from app.table import print_table
 from interfaces.cell import Cell
 
-FILES = ("pose.json", "pose.csv", "errors.png", "shares.png")
 # Hwang 2024, table 3: of 27 trials identified and grasped, mean error and its standard deviation in m.
 THESIS: dict[str, dict[str, Any]] = {
     "fiducial": {"identified": [13, 27], "grasped": [13, 27], "mean_error_m": 0.02881, "std_m": 6.0e-5},
@@ -58,65 +56,25 @@ def run_pose(
                 run_trials, cell, name, seed, techniques, grasps, maker
             )
         tasks[f"no connector seed {seed}"] = partial(run_negatives, cell, seed, techniques, maker)
-    results: dict[int, Sequence[Trial | Negative]] = {}
-    code = _run(tasks, jobs, results, lambda: _write(out, _figures(results, techniques, seeds, tasks), results))
-    figures = _figures(results, techniques, seeds, tasks)
-    _write(out, figures, results)
-    if out is not None and results:
+    found, code = run_tasks(tasks, jobs, lambda some: _write(out, some, techniques, seeds))
+    _write(out, found, techniques, seeds)
+    trials = _trials(found)
+    if out is not None and trials:
         from app.pose_plots import draw  # late: it brings matplotlib
 
-        draw(out, _trials(results), techniques, THESIS)
-    _print(figures)
+        draw(out, trials, techniques, THESIS)
+    _print({name: of_technique(name, found) for name in techniques})
     return code
 
 
-def _run(
-    tasks: dict[str, Task], jobs: int, results: dict[int, Sequence[Trial | Negative]], keep: Callable[[], None]
-) -> int:
-    names, code = list(tasks), 0
-    each = run_each(list(tasks.values()), jobs)
-    try:
-        for number, done in enumerate(each, 1):
-            told = f"[{number}/{len(tasks)}] {names[done.number]}: "
-            if done.value is None:
-                told, code = told + done.error, 1
-            else:
-                results[done.number] = done.value
-                told += ", ".join(str(part) for part in done.value)
-                keep()
-            print(told, file=sys.stderr, flush=True)
-    except KeyboardInterrupt:
-        print(f"interrupted; {len(results)} of {len(tasks)} scenes were done", file=sys.stderr)
-        code = 130
-    finally:
-        each.close()
-    return code
+def _trials(found: Sequence[Trial | Negative]) -> list[Trial]:
+    return [part for part in found if isinstance(part, Trial)]
 
 
-def _trials(results: dict[int, Sequence[Trial | Negative]]) -> list[Trial]:
-    return [part for number in sorted(results) for part in results[number] if isinstance(part, Trial)]
-
-
-def _figures(
-    results: dict[int, Sequence[Trial | Negative]], techniques: Sequence[str], seeds: range, tasks: dict[str, Task]
-) -> dict[str, Any]:
-    """The content of pose.json."""
-    trials = _trials(results)
-    negatives = [part for found in results.values() for part in found if isinstance(part, Negative)]
-    return {
-        "schema": 1,
-        "seeds": list(seeds),
-        "scenes": len(results),
-        "planned": len(tasks),
-        "versions": versions(),
-        "thesis": THESIS,
-        "techniques": {name: _of_technique(name, trials, negatives) for name in techniques},
-    }
-
-
-def _of_technique(name: str, trials: Sequence[Trial], negatives: Sequence[Negative]) -> dict[str, Any]:
-    own = [trial for trial in trials if trial.technique == name]
-    blanks = [negative for negative in negatives if negative.technique == name]
+def of_technique(name: str, found: Sequence[Trial | Negative]) -> dict[str, Any]:
+    """A technique's figures: of the headline's configurations together, and of each that was tried."""
+    own = [trial for trial in _trials(found) if trial.technique == name]
+    blanks = [part for part in found if isinstance(part, Negative) and part.technique == name]
     by_name = {c: [t for t in own if t.configuration == c] for c in CONFIGURATIONS}
     return {
         **summary([t for t in own if t.configuration in HEADLINE]),
@@ -142,15 +100,22 @@ def summary(trials: Sequence[Trial]) -> dict[str, Any]:
     }
 
 
-def _write(out: Path | None, figures: dict[str, Any], results: dict[int, Sequence[Trial | Negative]]) -> None:
+def _write(out: Path | None, found: Sequence[Trial | Negative], techniques: Sequence[str], seeds: range) -> None:
     if out is None:
         return
     out.mkdir(parents=True, exist_ok=True)
+    figures = {
+        "schema": 1,
+        "seeds": list(seeds),
+        "versions": versions(),
+        "thesis": THESIS,
+        "techniques": {name: of_technique(name, found) for name in techniques},
+    }
     write_whole(out / "pose.json", json.dumps(plain(figures), indent=2, allow_nan=False) + "\n")
     rows = io.StringIO(newline="")
     writer = csv.DictWriter(rows, [field.name for field in fields(Trial)], lineterminator="\n")
     writer.writeheader()
-    writer.writerows(asdict(trial) for trial in _trials(results))
+    writer.writerows(asdict(trial) for trial in _trials(found))
     write_whole(out / "pose.csv", rows.getvalue())
 
 
@@ -164,8 +129,8 @@ _BY_CONFIGURATION = (
 )  # fmt: skip
 
 
-def _print(figures: dict[str, Any]) -> None:
-    print_table(_HEADER, [_line(name, found) for name, found in figures["techniques"].items()])
+def _print(techniques: dict[str, dict[str, Any]]) -> None:
+    print_table(_HEADER, [_line(name, found) for name, found in techniques.items()])
     print()
     lines = [
         (
@@ -178,7 +143,7 @@ def _print(figures: dict[str, Any]) -> None:
             _count(found["way_round"]),
             _count(found["unintended_contacts"]),
         )
-        for name, all_found in figures["techniques"].items()
+        for name, all_found in techniques.items()
         for configuration, found in all_found["by_configuration"].items()
     ]
     print_table(_BY_CONFIGURATION, lines)

@@ -29,7 +29,9 @@ class Trial:
     identified: bool
     seconds: float | None = None  # until it was
     estimates: int = 0  # of the frames in the mean
-    error_m: float | None = None
+    error_m: float | None = None  # from the connector's middle
+    along_m: float | None = None  # its part along the axis, towards the tip
+    toward_m: float | None = None  # its part towards the camera: 9 mm for a technique that sees the surface
     axis_error_deg: float | None = None  # between the axes' lines
     way_round: bool | None = None  # cable and tip are told apart
     grasped: bool | None = None
@@ -78,13 +80,18 @@ def _look(scene: Scene, technique: str, maker: Maker) -> tuple[Trial, RigidTrans
     pose = seen.world_from_connector
     if pose is None:
         return trial, None
-    cosine = float(pose.rotation.apply([1.0, 0.0, 0.0]) @ truth.rotation.apply([1.0, 0.0, 0.0]))
+    axis = truth.rotation.apply([1.0, 0.0, 0.0])
+    cosine = float(pose.rotation.apply([1.0, 0.0, 0.0]) @ axis)
+    away = pose.translation - truth.translation
+    sight = truth.translation - scene.world_from_camera.translation
     trial = replace(
         trial,
         identified=True,
         seconds=seen.seconds,
         estimates=seen.estimates,
-        error_m=float(np.linalg.norm(pose.translation - truth.translation)),
+        error_m=float(np.linalg.norm(away)),
+        along_m=float(away @ axis),
+        toward_m=float(-away @ sight / np.linalg.norm(sight)),
         axis_error_deg=float(np.rad2deg(np.arccos(min(1.0, abs(cosine))))),
         way_round=cosine > 0,
     )

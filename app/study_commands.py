@@ -1,16 +1,17 @@
-"""`regrasp study`: many episodes, counted."""
+"""`regrasp study`: many episodes or scenes, counted."""
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from app import output
-from app.findings import Finding, Findings, shown
+from app.findings import Finding, Findings, nearest, shown
 from app.options import Sets, parse_seeds
 
-app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Run many episodes and count.")
+app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Run many episodes or scenes and count.")
 
 
 @app.command("demo")
@@ -27,16 +28,93 @@ def demo(
       regrasp study demo --seeds 0:20 --jobs 2 --out results/demo
     """
     chosen = parse_seeds(seeds)
-    wrong = output.findings(out) if out else []
-    if out and (out / "demo.json").exists():
-        wrong.append(Finding(shown(out), 1, "already holds a study; name another folder"))
-    if wrong:
+    if wrong := _unfit(out, "demo.json"):
         raise Findings(wrong)
     from app.study import run_demo
 
     raise typer.Exit(run_demo(chosen, jobs, out, sets or []))
 
 
-@app.callback()
-def _group() -> None:
-    """Keeps `demo` a word of its own while it is the only study."""
+Techniques = Annotated[str | None, typer.Option(metavar="A,B", help="Techniques to try; default all.")]
+CellName = Annotated[str, typer.Option(help="A shipped cell's name, or a path to a .yaml file.")]
+
+
+@app.command("pose")
+def pose(
+    seeds: Annotated[str, typer.Option(metavar="A:B", help="Trials: seeds from A up to, not including, B.")] = "0:3",
+    techniques: Techniques = None,
+    configurations: Annotated[
+        str | None, typer.Option(metavar="A,B", help="Configurations to try; default all.")
+    ] = None,
+    no_grasp: Annotated[bool, typer.Option("--no-grasp", help="Only look: a tenth of the time.")] = False,
+    cell: CellName = "thesis",
+    jobs: Annotated[int, typer.Option(min=1, help="Scenes side by side.")] = os.cpu_count() or 1,
+    out: Annotated[Path | None, typer.Option(help="Folder of pose.json, pose.csv and the plots.")] = None,
+) -> None:
+    """The thesis's pose experiment: nine configurations, found, measured against the truth, and grasped.
+
+    \b
+    Examples:
+      regrasp study pose --seeds 0:3 --out results/pose
+      regrasp study pose --techniques rgbd --configurations 3,6,7,8,9 --no-grasp
+
+    \b
+    app/POSE.md shows the configurations and says how a trial goes. Exit code: 0 done, 1 a scene broke off,
+    2 bad input, 130 Ctrl-C.
+    """
+    chosen, wrong = parse_seeds(seeds), _unfit(out, "pose.json")
+    names = _techniques(techniques, wrong)
+    from app.pose_scenes import CONFIGURATIONS, study_cell
+
+    shown_ones = _listed("--configurations", configurations, tuple(CONFIGURATIONS), wrong)
+    if wrong:
+        raise Findings(wrong)
+    from app.pose_study import run_pose
+
+    scenes = study_cell(cell)
+    raise typer.Exit(run_pose(scenes, names, chosen, jobs, out, configurations=shown_ones, grasps=not no_grasp))
+
+
+@app.command("coverage")
+def coverage(
+    seeds: Annotated[str, typer.Option(metavar="A:B", help="Scenes: seeds from A up to, not including, B.")] = "0:200",
+    techniques: Techniques = None,
+    cell: CellName = "thesis",
+    jobs: Annotated[int, typer.Option(min=1, help="Scenes side by side.")] = os.cpu_count() or 1,
+    out: Annotated[Path | None, typer.Option(help="Folder of coverage.json.")] = None,
+) -> None:
+    """Whether covariances mean something: how often the truth lies in an estimate's 95 % region, ten frames a seed.
+
+    \b
+    Example:
+      regrasp study coverage --seeds 0:200 --techniques rgbd
+    """
+    chosen, wrong = parse_seeds(seeds), _unfit(out, "coverage.json")
+    names = _techniques(techniques, wrong)
+    if wrong:
+        raise Findings(wrong)
+    from app.pose_coverage import run_coverage
+    from app.pose_scenes import study_cell
+
+    raise typer.Exit(run_coverage(study_cell(cell), names, chosen, jobs, out))
+
+
+def _unfit(out: Path | None, file: str) -> list[Finding]:
+    """Why a study's `file` cannot be written to `out`."""
+    if out is None:
+        return []
+    taken = [Finding(shown(out), 1, "already holds a study; name another folder")] if (out / file).exists() else []
+    return output.findings(out) + taken
+
+
+def _techniques(text: str | None, wrong: list[Finding]) -> list[str]:
+    from perception.technique import TECHNIQUES  # late: it brings the arithmetic
+
+    return _listed("--techniques", text, TECHNIQUES, wrong)
+
+
+def _listed(option: str, text: str | None, known: Sequence[str], wrong: list[Finding]) -> list[str]:
+    """The names of "A,B", each once, all that are known without a text; those that are not go to `wrong`."""
+    names = list(known) if text is None else list(dict.fromkeys(name.strip() for name in text.split(",")))
+    wrong += [Finding(option, 1, f"no {name!r}; {nearest(name, known)}") for name in names if name not in known]
+    return names

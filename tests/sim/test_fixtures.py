@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from interfaces.cell import Cell
-from sim.fixtures import LIP_TRAVEL, ClipHold, Hold, SocketHold
+from sim.fixtures import LIP_TRAVEL, STAND_FORCE, ClipHold, Hold, SocketHold
 
 RAMP = 2.0  # N/s
 LET_GO = 1.0  # N around the stated force
@@ -177,3 +177,16 @@ def test_a_single_steps_spike_does_not_unplug(plug: Plug) -> None:
         plug.advance(plug.step, force=np.array([40.0 if i == 50 else 0.0, 0.0, 0.0]))
         socket.step()
     assert socket.holds
+
+
+@pytest.mark.parametrize("direction", [*DIRECTIONS, (0.0, 1.0, 0.0), (0.0, -1.0, 0.0)])
+@pytest.mark.parametrize(("share", "stays"), [(0.95, True), (1.05, False)])
+def test_a_stand_lets_go_at_its_force_whichever_way(
+    plug: Plug, direction: tuple[float, float, float], share: float, stays: bool
+) -> None:
+    stand = SocketHold(Hold(plug.client, plug.body, -1, RigidTransform.identity()), None, STAND_FORCE)
+    for _ in range(480):
+        plug.advance(plug.step, force=share * STAND_FORCE * np.asarray(direction))
+        stand.step()
+    assert stand.holds == stays
+    assert (float(np.linalg.norm(plug.state()[0].translation)) < 1e-4) == stays  # m

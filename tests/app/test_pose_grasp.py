@@ -1,0 +1,36 @@
+import pytest
+from scipy.spatial.transform import RigidTransform
+
+from app.pose_grasp import grasp
+from app.pose_scenes import Scene, study_cell
+from interfaces.cell import pose_along
+
+SMALL = [f"known.cameras.{i}.{key}={size}" for i in (0, 1) for key, size in (("width", 212), ("height", 120))]
+
+
+def believed(scene: Scene, off: float = 0.0) -> RigidTransform:
+    """The true pose with another roll, raised by `off` m."""
+    pose = scene.truth.connector_pose()
+    x, y, z = pose.translation.tolist()
+    ax, ay, az = pose.rotation.apply([1.0, 0.0, 0.0]).tolist()
+    return pose_along((x, y, z + off), (ax, ay, az))
+
+
+@pytest.mark.parametrize("name", ["2", "4"])
+def test_the_right_pose_is_grasped(name: str) -> None:
+    with Scene(study_cell(overrides=SMALL), name, 0) as scene:
+        assert grasp(scene, believed(scene), 0) == ""
+        assert scene.truth.held()
+        assert not scene.truth.plugged()  # drawn off the stand
+
+
+def test_a_wrong_pose_is_not_grasped() -> None:
+    with Scene(study_cell(overrides=SMALL), "2", 0) as scene:
+        assert grasp(scene, believed(scene, 0.05), 0).startswith("grasp_empty: the jaw closed on nothing")
+        assert scene.truth.plugged()
+
+
+def test_a_pose_out_of_reach_is_said() -> None:
+    with Scene(study_cell(overrides=SMALL), "2", 0) as scene:
+        away = RigidTransform.from_translation([0.6, 0.6, 0.9]) * believed(scene)
+        assert grasp(scene, away, 0).startswith("out_of_reach: ")
