@@ -22,37 +22,37 @@ FOLLOWED = 0.04  # m that the connector must have come along; choice: it may sli
 HELD_SECONDS = 2.0
 
 
-def grasp(scene: Scene, pose: RigidTransform, seed: int) -> str:
-    """Why the right arm could not take the connector believed at `pose` out of the stand, or '' if it could.
-
-    Grasped, drawn back 5 cm and held for 2 s, by ground truth; the scene's things move. `seed` is the planner's.
-    """
-    services = _services(scene, seed)
-    services.belief.connector = pose
-    for leaf in (StartUp(name="start_up"), Regrasp(name="regrasp")):
-        leaf.setup(services=services)
-        if not _succeeds(leaf, scene):
-            cause = services.belief.causes[-1]
-            return f"{cause.code.value}: {cause.message}"
-    return _drawn_back(services, scene)
-
-
-def _services(scene: Scene, seed: int) -> Services:
+def services_of(scene: Scene) -> Services:
+    """A robot in the scene, which has looked at nothing yet."""
     world, known = scene.world, scene.world.cell.known
     grippers = {name: arm.gripper for name, arm in world.arms.items()}
-    motion = Motion(known, world.arms, grippers, world, seed * 1000)
+    motion = Motion(known, world.arms, grippers, world, scene.seed * 1000)
     perception = Perception(known, world.cameras, world, motion.camera_pose, motion.spheres)
     silent = structlog.make_filtering_bound_logger(logging.CRITICAL)
     return Services(known, world, motion, perception, structlog.wrap_logger(None, wrapper_class=silent))
 
 
-def _succeeds(leaf: Leaf, scene: Scene) -> bool:
-    """Tick a leaf to its end while the world runs."""
+def grasp(scene: Scene, services: Services, pose: RigidTransform) -> str:
+    """Why the right arm could not take the connector believed at `pose` out of the stand, or '' if it could.
+
+    Grasped, drawn back 5 cm and held for 2 s, by ground truth; the scene's things move.
+    """
+    services.belief.connector = pose
+    why = done(scene, services, StartUp(name="start_up")) or done(scene, services, Regrasp(name="regrasp"))
+    return why or _drawn_back(services, scene)
+
+
+def done(scene: Scene, services: Services, leaf: Leaf) -> str:
+    """Tick a leaf to its end while the world runs; why it failed, or ''."""
+    leaf.setup(services=services)
     leaf.tick_once()
     while leaf.status is Status.RUNNING:
         scene.world.advance(TICK)
         leaf.tick_once()
-    return bool(leaf.status is Status.SUCCESS)
+    if leaf.status is Status.SUCCESS:
+        return ""
+    cause = services.belief.causes[-1]
+    return f"{cause.code.value}: {cause.message}"
 
 
 def _drawn_back(services: Services, scene: Scene) -> str:

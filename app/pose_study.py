@@ -11,6 +11,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from app.pose_both import BOTH
 from app.pose_negatives import Negative, run_negatives
 from app.pose_scenes import CONFIGURATIONS, HEADLINE
 from app.pose_tasks import run_tasks
@@ -39,13 +40,14 @@ def run_pose(
     *,
     configurations: Sequence[str] = tuple(CONFIGURATIONS),
     grasps: bool = True,
+    both: bool = False,
     maker: Maker = make,
 ) -> int:
     """Each technique in every configuration with every seed, and on ten pictures a seed that show no connector.
 
     Progress goes to stderr, tables to stdout; with `out`, the figures go to out/pose.json and out/pose.csv, which are
     whole after every scene, and are drawn in the end. Returns the exit code: 0, 130 after Ctrl-C, 1 when a scene broke
-    off. `maker` makes a technique of its name.
+    off. With `both` cameras each technique has a second row. `maker` makes a technique of its name.
 
     Raises OSError when `out` cannot be written.
     """
@@ -56,14 +58,15 @@ def run_pose(
                 run_trials, cell, name, seed, techniques, grasps, maker
             )
         tasks[f"no connector seed {seed}"] = partial(run_negatives, cell, seed, techniques, maker)
-    found, code = run_tasks(tasks, jobs, lambda some: _write(out, some, techniques, seeds))
-    _write(out, found, techniques, seeds)
+    rows = [*techniques, *(f"{name}, {BOTH}" for name in techniques if both)]
+    found, code = run_tasks(tasks, jobs, lambda some: _write(out, some, rows, seeds))
+    _write(out, found, rows, seeds)
     trials = _trials(found)
     if out is not None and trials:
         from app.pose_plots import draw  # late: it brings matplotlib
 
-        draw(out, trials, techniques, THESIS)
-    _print({name: of_technique(name, found) for name in techniques})
+        draw(out, trials, rows, THESIS)
+    _print({name: of_technique(name, found) for name in rows})
     return code
 
 

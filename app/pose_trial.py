@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import RigidTransform
 
-from app.pose_grasp import grasp
+from app.pose_grasp import grasp, services_of
 from app.pose_scenes import CAMERA, Scene
 from interfaces.cell import Cell, KnownCell, pose_along
 from interfaces.frame import RgbdFrame
@@ -51,7 +51,7 @@ class Looked:
 
     world_from_connector: RigidTransform | None
     seconds: float | None
-    estimates: int
+    estimates: tuple[Estimate, ...]
     why: str
 
 
@@ -65,37 +65,41 @@ def run_trials(
 ) -> list[Trial]:
     """A trial of each technique, on the same frames; each grasps in a scene of its own that is built alike."""
     with Scene(cell, configuration, seed) as scene:
-        trials = [_look(scene, name, maker) for name in techniques]
-    if not grasps:
-        return [trial for trial, _ in trials]
-    return [_grasp(cell, trial, pose) for trial, pose in trials]
+        looks = [look(scene, maker(name, cell.known)) for name in techniques]
+        truth = scene.truth.connector_pose()
+    trials = []
+    for name, seen in zip(techniques, looks, strict=True):
+        trial = measured(Trial(name, configuration, seed, False), seen, truth, scene.world_from_camera)
+        trials.append(_grasp(cell, trial, seen.world_from_connector) if grasps else trial)
+    return trials
 
 
-def _look(scene: Scene, technique: str, maker: Maker) -> tuple[Trial, RigidTransform | None]:
-    rate = scene.world.cameras[CAMERA].spec.rate
-    frames = scene.frames(round((LOOK_SECONDS + MEAN_SECONDS) * rate))
-    truth = scene.truth.connector_pose()
-    seen = looked(maker(technique, scene.world.cell.known), frames, scene.world_from_camera, truth)
-    trial = Trial(technique, scene.configuration.name, scene.seed, False, why=seen.why)
+def look(scene: Scene, technique: Technique) -> Looked:
+    """What a technique makes of the rear camera's frames."""
+    frames = scene.frames(round((LOOK_SECONDS + MEAN_SECONDS) * scene.world.cameras[CAMERA].spec.rate))
+    return looked(technique, frames, scene.world_from_camera, scene.truth.connector_pose())
+
+
+def measured(trial: Trial, seen: Looked, truth: RigidTransform, world_from_camera: RigidTransform) -> Trial:
+    """The trial with what was `seen` held against the truth."""
     pose = seen.world_from_connector
     if pose is None:
-        return trial, None
+        return replace(trial, why=seen.why)
     axis = truth.rotation.apply([1.0, 0.0, 0.0])
     cosine = float(pose.rotation.apply([1.0, 0.0, 0.0]) @ axis)
     away = pose.translation - truth.translation
-    sight = truth.translation - scene.world_from_camera.translation
-    trial = replace(
+    sight = truth.translation - world_from_camera.translation
+    return replace(
         trial,
         identified=True,
         seconds=seen.seconds,
-        estimates=seen.estimates,
+        estimates=len(seen.estimates),
         error_m=float(np.linalg.norm(away)),
         along_m=float(away @ axis),
         toward_m=float(-away @ sight / np.linalg.norm(sight)),
         axis_error_deg=float(np.rad2deg(np.arccos(min(1.0, abs(cosine))))),
         way_round=cosine > 0,
     )
-    return trial, pose
 
 
 def looked(
@@ -117,11 +121,11 @@ def looked(
         else:
             seen.append(found)
     if not seen:
-        return Looked(None, None, 0, why)
-    return Looked(_mean(seen), seen[0].stamp - start, len(seen), "")
+        return Looked(None, None, (), why)
+    return Looked(mean(seen), seen[0].stamp - start, tuple(seen), "")
 
 
-def _mean(seen: Sequence[Estimate]) -> RigidTransform:
+def mean(seen: Sequence[Estimate]) -> RigidTransform:
     """world_from_connector: mean position and mean line of the axis, pointing where most do."""
     x, y, z = np.mean([e.position for e in seen], axis=0).tolist()
     axes = np.array([e.axis for e in seen])
@@ -134,6 +138,6 @@ def _grasp(cell: Cell, trial: Trial, pose: RigidTransform | None) -> Trial:
     if pose is None:
         return replace(trial, grasped=False)
     with Scene(cell, trial.configuration, trial.seed) as scene:
-        why = grasp(scene, pose, trial.seed)
-        forces = [force for name, force in scene.world.contact_peaks.items() if name.startswith("right arm")]
-    return replace(trial, grasped=not why, why=why, unintended_force=round(max(forces, default=0.0), 2))
+        why = grasp(scene, services_of(scene), pose)
+        force = max(scene.truth.contact_peaks().values(), default=0.0)
+    return replace(trial, grasped=not why, why=why, unintended_force=round(force, 2))

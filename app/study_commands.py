@@ -47,6 +47,9 @@ def pose(
         str | None, typer.Option(metavar="A,B", help="Configurations to try; default all.")
     ] = None,
     no_grasp: Annotated[bool, typer.Option("--no-grasp", help="Only look: a tenth of the time.")] = False,
+    both_cameras: Annotated[
+        bool, typer.Option("--both-cameras", help="A second row each: the wrist camera looks, too.")
+    ] = False,
     cell: CellName = "thesis",
     jobs: Annotated[int, typer.Option(min=1, help="Scenes side by side.")] = os.cpu_count() or 1,
     out: Annotated[Path | None, typer.Option(help="Folder of pose.json, pose.csv and the plots.")] = None,
@@ -71,8 +74,17 @@ def pose(
         raise Findings(wrong)
     from app.pose_study import run_pose
 
-    scenes = study_cell(cell)
-    raise typer.Exit(run_pose(scenes, names, chosen, jobs, out, configurations=shown_ones, grasps=not no_grasp))
+    code = run_pose(
+        study_cell(cell),
+        names,
+        chosen,
+        jobs,
+        out,
+        configurations=shown_ones,
+        grasps=not no_grasp,
+        both=both_cameras,
+    )
+    raise typer.Exit(code)
 
 
 @app.command("coverage")

@@ -1,7 +1,7 @@
 import pytest
 from scipy.spatial.transform import RigidTransform
 
-from app.pose_grasp import grasp
+from app.pose_grasp import grasp, services_of
 from app.pose_scenes import Scene, study_cell
 from interfaces.cell import pose_along
 
@@ -19,18 +19,20 @@ def believed(scene: Scene, off: float = 0.0) -> RigidTransform:
 @pytest.mark.parametrize("name", ["2", "4"])
 def test_the_right_pose_is_grasped(name: str) -> None:
     with Scene(study_cell(overrides=SMALL), name, 0) as scene:
-        assert grasp(scene, believed(scene), 0) == ""
+        assert grasp(scene, services_of(scene), believed(scene)) == ""
         assert scene.truth.held()
         assert not scene.truth.plugged()  # drawn off the stand
 
 
 def test_a_wrong_pose_is_not_grasped() -> None:
     with Scene(study_cell(overrides=SMALL), "2", 0) as scene:
-        assert grasp(scene, believed(scene, 0.05), 0).startswith("grasp_empty: the jaw closed on nothing")
+        assert grasp(scene, services_of(scene), believed(scene, 0.05)).startswith(
+            "grasp_empty: the jaw closed on nothing"
+        )
         assert scene.truth.plugged()
 
 
 def test_a_pose_out_of_reach_is_said() -> None:
     with Scene(study_cell(overrides=SMALL), "2", 0) as scene:
         away = RigidTransform.from_translation([0.6, 0.6, 0.9]) * believed(scene)
-        assert grasp(scene, away, 0).startswith("out_of_reach: ")
+        assert grasp(scene, services_of(scene), away).startswith("out_of_reach: ")

@@ -1,0 +1,99 @@
+"""The pose study with both cameras: after the rear camera's look, the left arm brings its own to the best view."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.spatial.transform import RigidTransform
+
+from app.pose_grasp import done, grasp, services_of
+from app.pose_scenes import Scene
+from app.pose_trial import MEAN_SECONDS, Looked, Maker, Trial, look, looked, make, mean, measured
+from behaviors.hand import EYE
+from behaviors.leaf import Steps
+from behaviors.look import LOOK_MARGIN, LookLeaf
+from behaviors.services import Services
+from behaviors.start_up import StartUp
+from interfaces.cell import Cell, pose_along
+from perception.estimate import Estimate
+from perception.technique import Technique
+
+BOTH = "both cameras"  # what stands behind the technique's name
+SETTLE_SECONDS = 0.5  # until the arm swings no more
+
+
+class BestView(LookLeaf):
+    """Brings the wrist camera to where it sees the whole of the connector that is believed in."""
+
+    def steps(self) -> Steps:
+        """See the class."""
+        connector = self.services.belief.connector
+        assert connector is not None
+        _, goals = self.best_view(connector)
+        yield self.services.motion.move(EYE, goals, margin=LOOK_MARGIN, tight=False)
+        yield from self.wait(SETTLE_SECONDS)
+
+
+class PutAway(LookLeaf):
+    """Brings the left arm to sleep."""
+
+    def steps(self) -> Steps:
+        """See the class."""
+        yield from self.go_to_sleep(EYE)
+
+
+def run_both(
+    cell: Cell, configuration: str, seed: int, techniques: Sequence[str], grasps: bool, maker: Maker = make
+) -> list[Trial]:
+    """A trial of each technique with both cameras, each in a scene of its own."""
+    return [_trial(cell, configuration, seed, name, grasps, maker) for name in techniques]
+
+
+def _trial(cell: Cell, configuration: str, seed: int, name: str, grasps: bool, maker: Maker) -> Trial:
+    trial = Trial(f"{name}, {BOTH}", configuration, seed, False)
+    with Scene(cell, configuration, seed) as scene:
+        services = services_of(scene)
+        seen = look(scene, maker(name, cell.known))
+        if seen.world_from_connector is None:
+            return replace(trial, why=seen.why, grasped=False if grasps else None)
+        pose, missed = _with_wrist(scene, services, maker(name, cell.known), seen)
+        both = replace(seen, world_from_connector=pose)
+        trial = measured(trial, both, scene.truth.connector_pose(), scene.world_from_camera)
+        if not grasps:
+            return replace(trial, why=missed)
+        why = done(scene, services, PutAway(name="put_away")) or grasp(scene, services, pose)
+        force = max(scene.truth.contact_peaks().values(), default=0.0)
+    return replace(trial, grasped=not why, why=why or missed, unintended_force=round(force, 2))
+
+
+def _with_wrist(scene: Scene, services: Services, technique: Technique, rear: Looked) -> tuple[RigidTransform, str]:
+    """The pose by both cameras, and why it is the rear camera's alone if it is."""
+    assert rear.world_from_connector is not None
+    services.belief.connector = rear.world_from_connector
+    why = done(scene, services, StartUp(name="start_up")) or done(scene, services, BestView(name="best_view"))
+    if why:
+        return rear.world_from_connector, why
+    frames = list(scene.frames(round(MEAN_SECONDS * scene.world.cameras["wrist"].spec.rate), "wrist"))
+    pose = services.motion.camera_pose(frames[0])
+    wrist = looked(technique, frames, pose, scene.truth.connector_pose())
+    if not wrist.estimates:
+        return rear.world_from_connector, f"wrist camera: {wrist.why}"
+    return merged([rear.estimates, wrist.estimates]), ""
+
+
+def merged(looks: Sequence[Sequence[Estimate]]) -> RigidTransform:
+    """world_from_connector by several looks, each the mean of its estimates and weighed by its mean covariance.
+
+    Frames of one look share the errors that matter, so that their number adds no weight.
+    """
+    means = [mean(seen) for seen in looks]
+    covariances = [np.mean([e.covariance for e in seen], axis=0) for seen in looks]
+    weights = [np.linalg.inv(c[:3, :3]) for c in covariances]
+    total = sum(w @ m.translation for w, m in zip(weights, means, strict=True))
+    x, y, z = np.linalg.solve(np.sum(weights, axis=0), total).tolist()
+    axes = np.array([m.rotation.apply([1.0, 0.0, 0.0]) for m in means])
+    # The turns across the axis alone: those about it, of which nothing is known, are the largest eigenvalue.
+    sure = np.array([1.0 / np.linalg.eigvalsh(c[3:, 3:])[:2].sum() for c in covariances])
+    line = (sure * np.where(axes @ axes[np.argmax(sure)] >= 0, 1.0, -1.0)) @ axes
+    ax, ay, az = line.tolist()
+    return pose_along((x, y, z), (ax, ay, az))
