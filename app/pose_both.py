@@ -8,13 +8,13 @@ from scipy.spatial.transform import RigidTransform
 
 from app.pose_grasp import done, grasp, services_of
 from app.pose_scenes import Scene
-from app.pose_trial import MEAN_SECONDS, Looked, Maker, Trial, look, looked, make, mean, measured
+from app.pose_trial import MEAN_SECONDS, Looked, Setup, Trial, look, looked, mean, measured
 from behaviors.hand import EYE
 from behaviors.leaf import Steps
 from behaviors.look import LOOK_MARGIN, LookLeaf
 from behaviors.services import Services
 from behaviors.start_up import StartUp
-from interfaces.cell import Cell, pose_along
+from interfaces.cell import pose_along
 from perception.estimate import Estimate
 from perception.technique import Technique
 
@@ -42,24 +42,22 @@ class PutAway(LookLeaf):
         yield from self.go_to_sleep(EYE)
 
 
-def run_both(
-    cell: Cell, configuration: str, seed: int, techniques: Sequence[str], grasps: bool, maker: Maker = make
-) -> list[Trial]:
+def run_both(setup: Setup, configuration: str, seed: int) -> list[Trial]:
     """A trial of each technique with both cameras, each in a scene of its own."""
-    return [_trial(cell, configuration, seed, name, grasps, maker) for name in techniques]
+    return [_trial(setup, configuration, seed, name) for name in setup.techniques]
 
 
-def _trial(cell: Cell, configuration: str, seed: int, name: str, grasps: bool, maker: Maker) -> Trial:
+def _trial(setup: Setup, configuration: str, seed: int, name: str) -> Trial:
     trial = Trial(f"{name}, {BOTH}", configuration, seed, False)
-    with Scene(cell, configuration, seed) as scene:
+    with setup.scene(configuration, seed) as scene:
         services = services_of(scene)
-        seen = look(scene, maker(name, cell.known))
+        seen = look(scene, setup.technique(name))
         if seen.world_from_connector is None:
-            return replace(trial, why=seen.why, grasped=False if grasps else None)
-        pose, missed = _with_wrist(scene, services, maker(name, cell.known), seen)
+            return replace(trial, why=seen.why, grasped=False if setup.grasps else None)
+        pose, missed = _with_wrist(scene, services, setup.technique(name), seen)
         both = replace(seen, world_from_connector=pose)
         trial = measured(trial, both, scene.truth.connector_pose(), scene.world_from_camera)
-        if not grasps:
+        if not setup.grasps:
             return replace(trial, why=missed)
         why = done(scene, services, PutAway(name="put_away")) or grasp(scene, services, pose)
         force = max(scene.truth.contact_peaks().values(), default=0.0)

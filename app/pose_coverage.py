@@ -12,13 +12,12 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform
 from scipy.stats import chi2
 
-from app.pose_scenes import HEADLINE, Scene
+from app.pose_scenes import HEADLINE
 from app.pose_tasks import run_tasks
-from app.pose_trial import Maker, make
+from app.pose_trial import Setup
 from app.record import plain, versions, write_whole
 from app.study import wilson
 from app.table import print_table
-from interfaces.cell import Cell
 from perception.estimate import Estimate
 
 FRAMES = 10  # of a seed: 200 seeds give 2,000
@@ -52,9 +51,7 @@ class Look:
         return f"{self.technique} {inside} of {len(self.covers)} inside"
 
 
-def run_coverage(
-    cell: Cell, techniques: Sequence[str], seeds: range, jobs: int, out: Path | None, *, maker: Maker = make
-) -> int:
+def run_coverage(setup: Setup, seeds: range, jobs: int, out: Path | None) -> int:
     """Ten frames of every seed, which also chooses the configuration, to each technique by itself, without a mean.
 
     Progress goes to stderr, a table to stdout, the figures to out/coverage.json. Returns the exit code as `run_tasks`.
@@ -62,24 +59,20 @@ def run_coverage(
     Raises OSError when `out` cannot be written.
     """
     chosen = {seed: HEADLINE[seed % len(HEADLINE)] for seed in seeds}
-    tasks = {
-        f"configuration {name} seed {seed}": partial(look, cell, name, seed, techniques, maker)
-        for seed, name in chosen.items()
-    }
-    looks, code = run_tasks(tasks, jobs, lambda some: _write(out, some, techniques, seeds))
-    _write(out, looks, techniques, seeds)
-    print_table(_HEADER, [_line(name, coverage(name, looks)) for name in techniques])
+    tasks = {f"configuration {name} seed {seed}": partial(look, setup, name, seed) for seed, name in chosen.items()}
+    looks, code = run_tasks(tasks, jobs, lambda some: _write(out, some, setup.techniques, seeds))
+    _write(out, looks, setup.techniques, seeds)
+    print_table(_HEADER, [_line(name, coverage(name, looks)) for name in setup.techniques])
     return code
 
 
-def look(cell: Cell, configuration: str, seed: int, techniques: Sequence[str], maker: Maker = make) -> list[Look]:
+def look(setup: Setup, configuration: str, seed: int) -> list[Look]:
     """What each technique gives in the first frames of a scene, every frame new to it."""
-    with Scene(cell, configuration, seed) as scene:
+    with setup.scene(configuration, seed) as scene:
         frames, truth = list(scene.frames(FRAMES)), scene.truth.connector_pose()
-        known = scene.world.cell.known
         found = []
-        for name in techniques:
-            estimates = [maker(name, known).estimate(frame, scene.world_from_camera) for frame in frames]
+        for name in setup.techniques:
+            estimates = [setup.technique(name).estimate(frame, scene.world_from_camera) for frame in frames]
             covers = tuple(
                 Cover(name, configuration, seed, *distances(e, truth), *errors(e, truth))
                 for e in estimates

@@ -1,13 +1,13 @@
 """Pictures without the connector: a black plug in its socket, and look-alikes. What is identified there is false."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from app.pose_scenes import CAMERA
-from app.pose_trial import Maker, make
+from app.pose_trial import Setup
 from interfaces.cell import Cell, Color, FixedMount
 from interfaces.frame import RgbdFrame
 from interfaces.scene import Prop
@@ -35,16 +35,16 @@ class Negative:
         return f"{self.technique} {self.false} of {self.frames} false"
 
 
-def run_negatives(cell: Cell, seed: int, techniques: Sequence[str], maker: Maker = make) -> list[Negative]:
+def run_negatives(setup: Setup, seed: int) -> list[Negative]:
     """Each technique on the same `FRAMES` pictures of one seed."""
-    mount = cell.known.camera("rear").mount
+    mount = setup.cell.known.camera("rear").mount
     assert isinstance(mount, FixedMount)
-    made = {name: maker(name, cell.known) for name in techniques}
-    false = dict.fromkeys(techniques, 0)
-    for frame in negative_frames(cell, seed):
+    made = {name: setup.technique(name) for name in setup.techniques}
+    false = dict.fromkeys(setup.techniques, 0)
+    for frame in negative_frames(setup.cell, seed, setup.renderer):
         for name, technique in made.items():
             false[name] += isinstance(technique.estimate(frame, mount.world_from_camera), Estimate)
-    return [Negative(name, seed, FRAMES, false[name]) for name in techniques]
+    return [Negative(name, seed, FRAMES, false[name]) for name in setup.techniques]
 
 
 def negative_frames(cell: Cell, seed: int, renderer: RendererName = "auto") -> Iterator[RgbdFrame]:

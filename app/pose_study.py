@@ -11,15 +11,14 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from app.pose_both import BOTH
+from app.pose_both import BOTH, run_both
 from app.pose_negatives import Negative, run_negatives
 from app.pose_scenes import CONFIGURATIONS, HEADLINE
 from app.pose_tasks import run_tasks
-from app.pose_trial import Maker, Trial, make, run_trials
+from app.pose_trial import Setup, Trial, run_trials
 from app.record import plain, versions, write_whole
 from app.study import wilson
 from app.table import print_table
-from interfaces.cell import Cell
 
 # Hwang 2024, table 3: of 27 trials identified and grasped, mean error and its standard deviation in m.
 THESIS: dict[str, dict[str, Any]] = {
@@ -32,33 +31,30 @@ Task = Callable[[], Sequence[Trial | Negative]]
 
 
 def run_pose(
-    cell: Cell,
-    techniques: Sequence[str],
+    setup: Setup,
     seeds: range,
     jobs: int,
     out: Path | None,
-    *,
     configurations: Sequence[str] = tuple(CONFIGURATIONS),
-    grasps: bool = True,
     both: bool = False,
-    maker: Maker = make,
 ) -> int:
     """Each technique in every configuration with every seed, and on ten pictures a seed that show no connector.
 
     Progress goes to stderr, tables to stdout; with `out`, the figures go to out/pose.json and out/pose.csv, which are
-    whole after every scene, and are drawn in the end. Returns the exit code: 0, 130 after Ctrl-C, 1 when a scene broke
-    off. With `both` cameras each technique has a second row. `maker` makes a technique of its name.
+    whole after every scene, and are drawn in the end. With `both` cameras each technique has a second row. Returns the
+    exit code: 0, 130 after Ctrl-C, 1 when a scene broke off.
 
     Raises OSError when `out` cannot be written.
     """
     tasks: dict[str, Task] = {}
     for seed in seeds:
         for name in configurations:
-            tasks[f"configuration {name} seed {seed}"] = partial(
-                run_trials, cell, name, seed, techniques, grasps, maker
-            )
-        tasks[f"no connector seed {seed}"] = partial(run_negatives, cell, seed, techniques, maker)
-    rows = [*techniques, *(f"{name}, {BOTH}" for name in techniques if both)]
+            title = f"configuration {name} seed {seed}"
+            tasks[title] = partial(run_trials, setup, name, seed)
+            if both:
+                tasks[f"{title}, {BOTH}"] = partial(run_both, setup, name, seed)
+        tasks[f"no connector seed {seed}"] = partial(run_negatives, setup, seed)
+    rows = [*setup.techniques, *(f"{name}, {BOTH}" for name in setup.techniques if both)]
     found, code = run_tasks(tasks, jobs, lambda some: _write(out, some, rows, seeds))
     _write(out, found, rows, seeds)
     trials = _trials(found)

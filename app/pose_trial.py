@@ -12,6 +12,7 @@ from interfaces.cell import Cell, KnownCell, pose_along
 from interfaces.frame import RgbdFrame
 from perception.estimate import Estimate
 from perception.technique import Technique, make_technique
+from sim.renderer import RendererName
 
 LOOK_SECONDS, MEAN_SECONDS = 5.0, 3.0  # to identify it, and then over which poses are averaged: the thesis's
 FAR = 0.10  # m from the truth; choice: what is seen further than a connector's length away is something else
@@ -60,17 +61,34 @@ def make(name: str, known: KnownCell) -> Technique:
     return make_technique(name, known)  # type: ignore[arg-type]  # names come checked from the command line
 
 
-def run_trials(
-    cell: Cell, configuration: str, seed: int, techniques: Sequence[str], grasps: bool, maker: Maker = make
-) -> list[Trial]:
+@dataclass(frozen=True)
+class Setup:
+    """What all scenes of a study have in common. `maker` makes a technique of its name."""
+
+    cell: Cell
+    techniques: Sequence[str]
+    grasps: bool = True
+    renderer: RendererName = "auto"
+    maker: Maker = make
+
+    def scene(self, configuration: str, seed: int) -> Scene:
+        """A new scene; close it."""
+        return Scene(self.cell, configuration, seed, self.renderer)
+
+    def technique(self, name: str) -> Technique:
+        """A new technique, which has seen nothing."""
+        return self.maker(name, self.cell.known)
+
+
+def run_trials(setup: Setup, configuration: str, seed: int) -> list[Trial]:
     """A trial of each technique, on the same frames; each grasps in a scene of its own that is built alike."""
-    with Scene(cell, configuration, seed) as scene:
-        looks = [look(scene, maker(name, cell.known)) for name in techniques]
+    with setup.scene(configuration, seed) as scene:
+        looks = [look(scene, setup.technique(name)) for name in setup.techniques]
         truth = scene.truth.connector_pose()
     trials = []
-    for name, seen in zip(techniques, looks, strict=True):
+    for name, seen in zip(setup.techniques, looks, strict=True):
         trial = measured(Trial(name, configuration, seed, False), seen, truth, scene.world_from_camera)
-        trials.append(_grasp(cell, trial, seen.world_from_connector) if grasps else trial)
+        trials.append(_grasp(setup, trial, seen.world_from_connector) if setup.grasps else trial)
     return trials
 
 
@@ -134,10 +152,10 @@ def mean(seen: Sequence[Estimate]) -> RigidTransform:
     return pose_along((x, y, z), (ax, ay, az))
 
 
-def _grasp(cell: Cell, trial: Trial, pose: RigidTransform | None) -> Trial:
+def _grasp(setup: Setup, trial: Trial, pose: RigidTransform | None) -> Trial:
     if pose is None:
         return replace(trial, grasped=False)
-    with Scene(cell, trial.configuration, trial.seed) as scene:
+    with setup.scene(trial.configuration, trial.seed) as scene:
         why = grasp(scene, services_of(scene), pose)
         force = max(scene.truth.contact_peaks().values(), default=0.0)
     return replace(trial, grasped=not why, why=why, unintended_force=round(force, 2))

@@ -3,7 +3,7 @@
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -36,6 +36,7 @@ def demo(
 
 
 Techniques = Annotated[str | None, typer.Option(metavar="A,B", help="Techniques to try; default all.")]
+Renderer = Annotated[Literal["auto", "moderngl", "tiny"], typer.Option(help="What draws the pictures.")]
 CellName = Annotated[str, typer.Option(help="A shipped cell's name, or a path to a .yaml file.")]
 
 
@@ -51,6 +52,7 @@ def pose(
         bool, typer.Option("--both-cameras", help="A second row each: the wrist camera looks, too.")
     ] = False,
     cell: CellName = "thesis",
+    renderer: Renderer = "auto",
     jobs: Annotated[int, typer.Option(min=1, help="Scenes side by side.")] = os.cpu_count() or 1,
     out: Annotated[Path | None, typer.Option(help="Folder of pose.json, pose.csv and the plots.")] = None,
 ) -> None:
@@ -73,18 +75,10 @@ def pose(
     if wrong:
         raise Findings(wrong)
     from app.pose_study import run_pose
+    from app.pose_trial import Setup
 
-    code = run_pose(
-        study_cell(cell),
-        names,
-        chosen,
-        jobs,
-        out,
-        configurations=shown_ones,
-        grasps=not no_grasp,
-        both=both_cameras,
-    )
-    raise typer.Exit(code)
+    setup = Setup(study_cell(cell), names, grasps=not no_grasp, renderer=renderer)
+    raise typer.Exit(run_pose(setup, chosen, jobs, out, shown_ones, both_cameras))
 
 
 @app.command("coverage")
@@ -92,6 +86,7 @@ def coverage(
     seeds: Annotated[str, typer.Option(metavar="A:B", help="Scenes: seeds from A up to, not including, B.")] = "0:200",
     techniques: Techniques = None,
     cell: CellName = "thesis",
+    renderer: Renderer = "auto",
     jobs: Annotated[int, typer.Option(min=1, help="Scenes side by side.")] = os.cpu_count() or 1,
     out: Annotated[Path | None, typer.Option(help="Folder of coverage.json.")] = None,
 ) -> None:
@@ -107,8 +102,9 @@ def coverage(
         raise Findings(wrong)
     from app.pose_coverage import run_coverage
     from app.pose_scenes import study_cell
+    from app.pose_trial import Setup
 
-    raise typer.Exit(run_coverage(study_cell(cell), names, chosen, jobs, out))
+    raise typer.Exit(run_coverage(Setup(study_cell(cell), names, renderer=renderer), chosen, jobs, out))
 
 
 def _unfit(out: Path | None, file: str) -> list[Finding]:

@@ -4,6 +4,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from app.pose_both import merged, run_both
 from app.pose_scenes import study_cell
+from app.pose_trial import Setup
 from perception.estimate import Estimate, pose_covariance
 
 X = np.array([1.0, 0.0, 0.0])
@@ -30,7 +31,7 @@ def test_the_surer_look_says_which_end_is_which() -> None:
 
 
 def test_the_wrist_camera_helps_where_the_rear_camera_sees_a_part() -> None:
-    (trial,) = run_both(study_cell(), "4", 0, ["rgbd"], grasps=False)
+    (trial,) = run_both(Setup(study_cell(), ["rgbd"], grasps=False), "4", 0)
     assert trial.technique == "rgbd, both cameras"
     assert (trial.identified, trial.why) == (True, "")
     assert trial.error_m is not None

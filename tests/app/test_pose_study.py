@@ -14,7 +14,7 @@ from app.pose_coverage import run_coverage
 from app.pose_negatives import FRAMES, Negative, negative_frames
 from app.pose_scenes import study_cell
 from app.pose_study import of_technique, run_pose
-from app.pose_trial import Trial
+from app.pose_trial import Setup, Trial
 from interfaces.cell import FixedMount, KnownCell
 from interfaces.frame import RgbdFrame
 from perception.camera_model import project
@@ -45,8 +45,8 @@ def maker(name: str, known: KnownCell) -> Technique:
 
 
 def test_a_study_of_one_scene(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    cell = study_cell(overrides=SMALL)
-    code = run_pose(cell, ["rgbd", "blind"], range(1, 2), 1, tmp_path, configurations=["2"], maker=maker)
+    setup = Setup(study_cell(overrides=SMALL), ["rgbd", "blind"], maker=maker)
+    code = run_pose(setup, range(1, 2), 1, tmp_path, configurations=["2"], both=True)
     assert code == 0
     found = json.loads((tmp_path / "pose.json").read_text())
     rgbd, blind = found["techniques"]["rgbd"], found["techniques"]["blind"]
@@ -62,7 +62,9 @@ def test_a_study_of_one_scene(tmp_path: Path, capfd: pytest.CaptureFixture[str])
     assert found["thesis"]["rgbd"]["grasped"] == [20, 27]
 
     rows = list(csv.DictReader((tmp_path / "pose.csv").open()))
-    assert [(r["technique"], r["configuration"], r["seed"]) for r in rows] == [("rgbd", "2", "1"), ("blind", "2", "1")]
+    techniques = ["rgbd", "blind", "rgbd, both cameras", "blind, both cameras"]
+    assert [(r["technique"], r["configuration"], r["seed"]) for r in rows] == [(name, "2", "1") for name in techniques]
+    assert found["techniques"]["rgbd, both cameras"]["grasped"][1] == 1
     assert rows[1]["why"] == "blind"
     assert float(rows[0]["error_m"]) == rgbd["mean_error_m"]
     for name in ("errors.png", "shares.png"):
@@ -70,7 +72,7 @@ def test_a_study_of_one_scene(tmp_path: Path, capfd: pytest.CaptureFixture[str])
 
     out, err = capfd.readouterr()
     assert "74.1 %" in out
-    assert "[2/2]" in err
+    assert "[3/3]" in err
 
 
 def test_figures_of_a_technique() -> None:
@@ -108,8 +110,8 @@ def test_negatives_show_no_connector_but_much_of_its_colour() -> None:
 
 
 def test_coverage_of_two_seeds(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    cell = study_cell(overrides=SMALL)
-    assert run_coverage(cell, ["rgbd", "blind"], range(1, 3), 1, tmp_path, maker=maker) == 0
+    setup = Setup(study_cell(overrides=SMALL), ["rgbd", "blind"], maker=maker)
+    assert run_coverage(setup, range(1, 3), 1, tmp_path) == 0
     found = json.loads((tmp_path / "coverage.json").read_text())["techniques"]
     assert found["rgbd"]["estimates"] == [20, 20]
     assert found["rgbd"]["position"][1] == found["rgbd"]["axis"][1] == 20
