@@ -52,6 +52,14 @@ def test_behind_an_obstacle_no_pixels(cell: Cell, world: World) -> None:
     hidden = World(cell, "zero", seed=1, obstacles=(Obstacle(box, 0.0, None),), renderer="tiny")
     hidden.advance(0.2)
     assert GroundTruth(hidden).connector_pixels("rear") == 0
+    assert GroundTruth(hidden).hidden_share("rear") == 1.0
+    shares = []
+    for aside in np.linspace(0.0, 0.14, 8):  # the wall's left edge passes the connector
+        hidden.place_obstacle("wall", middle - [0.0, aside, 0.0])
+        shares.append(GroundTruth(hidden).hidden_share("rear"))
+    assert shares == sorted(shares, reverse=True)
+    assert any(0.2 < share < 0.8 for share in shares)
+    assert shares[-1] == 0.0
     hidden.close()
 
 

@@ -12,11 +12,11 @@ import pytest
 from hand import draw as pull
 from hand import drive, kinematics, nearest, take_hold
 from numpy.typing import NDArray
-from scipy.spatial.transform import RigidTransform
+from scipy.spatial.transform import RigidTransform, Rotation
 
 from interfaces.cell import Box, Cell
 from interfaces.devices import Clock
-from interfaces.scene import Obstacle
+from interfaces.scene import Obstacle, Prop
 from sim.ground_truth import GroundTruth
 from sim.world import World
 
@@ -176,6 +176,41 @@ def test_obstacles_stand_where_they_were_put(cell: Cell) -> None:
     np.testing.assert_allclose(np.subtract(upper, lower), [0.08, 0.12, 0.36], atol=5e-3)
     np.testing.assert_allclose(np.add(upper, lower) / 2, box.center, atol=1e-6)
     assert "obstacle leg" in world.boxes
+    world.close()
+
+
+def test_a_connector_may_start_on_a_stand(cell: Cell) -> None:
+    asked = RigidTransform.from_components([0.38, 0.06, 0.29], Rotation.from_euler("zy", [100.0, -20.0], degrees=True))
+    world = World(cell, "zero", seed=1, renderer="tiny", connector_at=asked)
+    off = asked.inv() * world.connector_pose()
+    assert world.socket.holds
+    assert float(np.linalg.norm(off.translation)) < 1e-3
+    assert float(off.rotation.magnitude()) < np.deg2rad(1.0)
+    push(world, np.array([0.0, 0.0, 12.0]), 0.05)
+    assert not GroundTruth(world).plugged()
+    world.close()
+
+
+def test_props_are_seen_where_they_are_placed_and_stop_nothing(cell: Cell) -> None:
+    props = (Prop("ball", (0.03,), (0.0, 1.0, 0.0)), Prop("rod", (0.2, 0.02), (0.0, 1.0, 0.0)))
+    world = World(cell, "zero", seed=1, renderer="tiny", props=props)
+    rear = world.cameras["rear"]
+
+    def green() -> NDArray[np.intp]:
+        rgb = next(rear.still(1)).rgb
+        return np.argwhere((rgb[..., 1] > 60) & (rgb[..., 0] < 30) & (rgb[..., 2] < 30))
+
+    assert len(green()) == 0
+    world.place_prop(0, RigidTransform.from_translation(world.connector_pose().translation))
+    ball = green()
+    assert len(ball) > 50
+    before = world.connector_pose().translation
+    world.advance(0.2)
+    assert float(np.linalg.norm(world.connector_pose().translation - before)) < 1e-4
+    world.place_prop(0, None)
+    world.place_prop(1, RigidTransform.from_components([0.3, 0.0, 0.3], Rotation.from_euler("z", 90, degrees=True)))
+    rod = green()
+    assert np.ptp(rod[:, 1]) > 2 * np.ptp(rod[:, 0])  # along the image's rows
     world.close()
 
 
