@@ -5,6 +5,7 @@ import statistics
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -51,18 +52,21 @@ class Look:
         return f"{self.technique} {inside} of {len(self.covers)} inside"
 
 
-def run_coverage(setup: Setup, seeds: range, jobs: int, out: Path | None) -> int:
+def run_coverage(setups: Sequence[Setup], seeds: range, jobs: int, out: Path | None) -> int:
     """Ten frames of every seed, which also chooses the configuration, to each technique by itself, without a mean.
 
     Progress goes to stderr, a table to stdout, the figures to out/coverage.json. Returns the exit code as `run_tasks`.
 
     Raises OSError when `out` cannot be written.
     """
-    chosen = {seed: HEADLINE[seed % len(HEADLINE)] for seed in seeds}
-    tasks = {f"configuration {name} seed {seed}": partial(look, setup, name, seed) for seed, name in chosen.items()}
-    looks, code = run_tasks(tasks, jobs, lambda some: _write(out, some, setup.techniques, seeds))
-    _write(out, looks, setup.techniques, seeds)
-    print_table(_HEADER, [_line(name, coverage(name, looks)) for name in setup.techniques])
+    tasks = {}
+    for seed, setup in product(seeds, setups):
+        name = HEADLINE[seed % len(HEADLINE)]
+        tasks[f"{', '.join(setup.techniques)} in configuration {name} seed {seed}"] = partial(look, setup, name, seed)
+    techniques = [name for setup in setups for name in setup.techniques]
+    looks, code = run_tasks(tasks, jobs, lambda some: _write(out, some, techniques, seeds))
+    _write(out, looks, techniques, seeds)
+    print_table(_HEADER, [_line(name, coverage(name, looks)) for name in techniques])
     return code
 
 

@@ -50,7 +50,7 @@ def run_negatives(setup: Setup, seed: int) -> list[Negative]:
 def negative_frames(cell: Cell, seed: int, renderer: RendererName = "auto") -> Iterator[RgbdFrame]:
     """The rear camera's `FRAMES` pictures of one seed."""
     rng = np.random.default_rng([seed, 6])
-    black = cell.known.connector.model_copy(update={"color": cell.hidden.cable.color})
+    black = cell.known.connector.model_copy(update={"color": cell.hidden.cable.color, "tag": None})
     props = look_alikes(cell, rng)
     without = cell.model_copy(update={"known": cell.known.model_copy(update={"connector": black})})
     world = World(without, "zero", seed, renderer=renderer, props=props)

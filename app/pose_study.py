@@ -8,6 +8,7 @@ import statistics
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, fields
 from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +32,7 @@ Task = Callable[[], Sequence[Trial | Negative]]
 
 
 def run_pose(
-    setup: Setup,
+    setups: Sequence[Setup],
     seeds: range,
     jobs: int,
     out: Path | None,
@@ -47,14 +48,15 @@ def run_pose(
     Raises OSError when `out` cannot be written.
     """
     tasks: dict[str, Task] = {}
-    for seed in seeds:
+    for seed, setup in product(seeds, setups):
         for name in configurations:
-            title = f"configuration {name} seed {seed}"
+            title = f"{', '.join(setup.techniques)} in configuration {name} seed {seed}"
             tasks[title] = partial(run_trials, setup, name, seed)
             if both:
                 tasks[f"{title}, {BOTH}"] = partial(run_both, setup, name, seed)
-        tasks[f"no connector seed {seed}"] = partial(run_negatives, setup, seed)
-    rows = [*setup.techniques, *(f"{name}, {BOTH}" for name in setup.techniques if both)]
+        tasks[f"{', '.join(setup.techniques)} without connector seed {seed}"] = partial(run_negatives, setup, seed)
+    techniques = [name for setup in setups for name in setup.techniques]
+    rows = [*techniques, *(f"{name}, {BOTH}" for name in techniques if both)]
     found, code = run_tasks(tasks, jobs, lambda some: _write(out, some, rows, seeds))
     _write(out, found, rows, seeds)
     trials = _trials(found)

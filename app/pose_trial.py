@@ -6,8 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import RigidTransform
 
+from app.findings import Finding, Findings
 from app.pose_grasp import grasp, services_of
-from app.pose_scenes import CAMERA, Scene
+from app.pose_scenes import CAMERA, Scene, study_cell
 from interfaces.cell import Cell, KnownCell, pose_along
 from interfaces.frame import RgbdFrame
 from perception.estimate import Estimate
@@ -16,6 +17,8 @@ from sim.renderer import RendererName
 
 LOOK_SECONDS, MEAN_SECONDS = 5.0, 3.0  # to identify it, and then over which poses are averaged: the thesis's
 FAR = 0.10  # m from the truth; choice: what is seen further than a connector's length away is something else
+
+CELLS = {"fiducial": "thesis_tags"}  # the others' is the thesis's: a tag hides a part of the connector
 
 Maker = Callable[[str, KnownCell], Technique]
 
@@ -78,6 +81,23 @@ class Setup:
     def technique(self, name: str) -> Technique:
         """A new technique, which has seen nothing."""
         return self.maker(name, self.cell.known)
+
+
+def setups_of(
+    techniques: Sequence[str], cell: str | None = None, *, grasps: bool = True, renderer: RendererName = "auto"
+) -> list[Setup]:
+    """The techniques by the cells that they need, or all in the `cell` of that name. Raises `Findings`."""
+    cells: dict[str, list[str]] = {}
+    for name in techniques:
+        cells.setdefault(cell or CELLS.get(name, "thesis"), []).append(name)
+    setups = [Setup(study_cell(name), names, grasps, renderer) for name, names in cells.items()]
+    for setup in setups:
+        for name in setup.techniques:
+            try:
+                setup.technique(name)
+            except ValueError as error:
+                raise Findings([Finding("--cell", 1, f"{name} cannot work in it: {error}")]) from None
+    return setups
 
 
 def run_trials(setup: Setup, configuration: str, seed: int) -> list[Trial]:

@@ -37,7 +37,10 @@ def demo(
 
 Techniques = Annotated[str | None, typer.Option(metavar="A,B", help="Techniques to try; default all.")]
 Renderer = Annotated[Literal["auto", "moderngl", "tiny"], typer.Option(help="What draws the pictures.")]
-CellName = Annotated[str, typer.Option(help="A shipped cell's name, or a path to a .yaml file.")]
+CellName = Annotated[
+    str | None,
+    typer.Option("--cell", help="A cell's name, or a .yaml file; for fiducial thesis_tags, else thesis."),
+]
 
 
 @app.command("pose")
@@ -51,7 +54,7 @@ def pose(
     both_cameras: Annotated[
         bool, typer.Option("--both-cameras", help="A second row each: the wrist camera looks, too.")
     ] = False,
-    cell: CellName = "thesis",
+    cell: CellName = None,
     renderer: Renderer = "auto",
     jobs: Annotated[int, typer.Option(min=1, help="Scenes side by side.")] = os.cpu_count() or 1,
     out: Annotated[Path | None, typer.Option(help="Folder of pose.json, pose.csv and the plots.")] = None,
@@ -69,23 +72,23 @@ def pose(
     """
     chosen, wrong = parse_seeds(seeds), _unfit(out, "pose.json")
     names = _techniques(techniques, wrong)
-    from app.pose_scenes import CONFIGURATIONS, study_cell
+    from app.pose_scenes import CONFIGURATIONS
 
     shown_ones = _listed("--configurations", configurations, tuple(CONFIGURATIONS), wrong)
     if wrong:
         raise Findings(wrong)
     from app.pose_study import run_pose
-    from app.pose_trial import Setup
+    from app.pose_trial import setups_of
 
-    setup = Setup(study_cell(cell), names, grasps=not no_grasp, renderer=renderer)
-    raise typer.Exit(run_pose(setup, chosen, jobs, out, shown_ones, both_cameras))
+    setups = setups_of(names, cell, grasps=not no_grasp, renderer=renderer)
+    raise typer.Exit(run_pose(setups, chosen, jobs, out, shown_ones, both_cameras))
 
 
 @app.command("coverage")
 def coverage(
     seeds: Annotated[str, typer.Option(metavar="A:B", help="Scenes: seeds from A up to, not including, B.")] = "0:200",
     techniques: Techniques = None,
-    cell: CellName = "thesis",
+    cell: CellName = None,
     renderer: Renderer = "auto",
     jobs: Annotated[int, typer.Option(min=1, help="Scenes side by side.")] = os.cpu_count() or 1,
     out: Annotated[Path | None, typer.Option(help="Folder of coverage.json.")] = None,
@@ -101,10 +104,9 @@ def coverage(
     if wrong:
         raise Findings(wrong)
     from app.pose_coverage import run_coverage
-    from app.pose_scenes import study_cell
-    from app.pose_trial import Setup
+    from app.pose_trial import setups_of
 
-    raise typer.Exit(run_coverage(Setup(study_cell(cell), names, renderer=renderer), chosen, jobs, out))
+    raise typer.Exit(run_coverage(setups_of(names, cell, renderer=renderer), chosen, jobs, out))
 
 
 def _unfit(out: Path | None, file: str) -> list[Finding]:

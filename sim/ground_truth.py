@@ -1,6 +1,7 @@
 """The truth of a world, for the judge of expectations, studies and tests. The robot's software never reads it."""
 
 import numpy as np
+import pybullet as p
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
@@ -59,16 +60,18 @@ class GroundTruth:
         return 0 if ids is None else self._count(ids)
 
     def hidden_share(self, camera: str) -> float:
-        """Share, 0 to 1, of what a camera would see of the connector now that the obstacles hide from it.
+        """Share, 0 to 1, of what a camera would see of the connector, its tag aside, that the obstacles hide now.
 
         Counted in pixels `FINER` times as fine as the camera's, so that an edge between two of its pixels counts.
         """
         world, seen_by = self._world, self._world.cameras[camera]
         closer = _around(seen_by.true_pose().inv().apply(world.connector_pose().translation), seen_by.spec.intrinsics)
-        with_all = world.visuals.snapshot()
+        items, end = world.visuals.items, (world.cable.body, world.cable.connector_link)
+        with_all = world.visuals.snapshot().copy()
+        with_all[[(i.body, i.link) == end and i.kind == p.GEOM_BOX for i in items], :, 3] = FAR_OFF  # a tag
         without = with_all.copy()
         obstacles = [body for name, body in world.boxes.items() if name.startswith("obstacle ")]
-        without[[item.body in obstacles for item in world.visuals.items], :, 3] = FAR_OFF
+        without[[item.body in obstacles for item in items], :, 3] = FAR_OFF
         free, left = (self._count(seen_by.ids(poses, closer)) for poses in (without, with_all))
         return 1.0 - left / free
 

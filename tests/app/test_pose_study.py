@@ -46,7 +46,7 @@ def maker(name: str, known: KnownCell) -> Technique:
 
 def test_a_study_of_one_scene(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     setup = Setup(study_cell(overrides=SMALL), ["rgbd", "blind"], maker=maker)
-    code = run_pose(setup, range(1, 2), 1, tmp_path, configurations=["2"], both=True)
+    code = run_pose([setup], range(1, 2), 1, tmp_path, configurations=["2"], both=True)
     assert code == 0
     found = json.loads((tmp_path / "pose.json").read_text())
     rgbd, blind = found["techniques"]["rgbd"], found["techniques"]["blind"]
@@ -111,7 +111,7 @@ def test_negatives_show_no_connector_but_much_of_its_colour() -> None:
 
 def test_coverage_of_two_seeds(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     setup = Setup(study_cell(overrides=SMALL), ["rgbd", "blind"], maker=maker)
-    assert run_coverage(setup, range(1, 3), 1, tmp_path) == 0
+    assert run_coverage([setup], range(1, 3), 1, tmp_path) == 0
     found = json.loads((tmp_path / "coverage.json").read_text())["techniques"]
     assert found["rgbd"]["estimates"] == [20, 20]
     assert found["rgbd"]["position"][1] == found["rgbd"]["axis"][1] == 20
@@ -126,6 +126,7 @@ def test_coverage_of_two_seeds(tmp_path: Path, capfd: pytest.CaptureFixture[str]
         (["pose", "--techniques", "rgdb"], "--techniques:1: no 'rgdb'; did you mean 'rgbd'?"),
         (["pose", "--configurations", "3,x"], "--configurations:1: no 'x'; there are 1, 2, 3, 4"),
         (["pose", "--cell", "thesys"], "no cell named 'thesys'; did you mean 'thesis'?"),
+        (["pose", "--techniques", "fiducial", "--cell", "thesis"], "--cell:1: fiducial cannot work in it: "),
         (["pose", "--seeds", "3:3"], "'3:3' is no range of seeds"),
         (["coverage", "--techniques", ""], "--techniques:1: no ''"),
     ],
