@@ -22,7 +22,7 @@ from behaviors import LEAVES
 from interfaces.cell import TAG_DICTIONARY
 from interfaces.frame import RgbdFrame
 from perception.estimate import NoEstimate
-from perception.rgbd_pose import estimate
+from perception.rgbd_pose import Rgbd
 from perception.segmentation import SegmentationParameters
 from perception.technique import make_technique
 from sim.cable import spring_torques
@@ -184,8 +184,9 @@ def poses(world: World) -> tuple[Call, Call]:
         mask = cv2.dilate(masks[0] if len(masks) == 1 else cv2.bitwise_or(*masks), kernel)
         return cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
 
-    assert not isinstance(estimate(image, world_from_camera, known.connector), NoEstimate)
-    return lambda: estimate(image, world_from_camera, known.connector), bare
+    technique = Rgbd(known)
+    assert not isinstance(technique.estimate(image, world_from_camera), NoEstimate)
+    return lambda: technique.estimate(image, world_from_camera), bare
 
 
 if __name__ == "__main__":

@@ -13,7 +13,6 @@ from motion.kinematics import ArmKinematics
 from motion.straight import straight_line
 from perception.estimate import Estimate
 from perception.mean_pose import mean_pose
-from perception.rgbd_pose import WHOLE_SHARE
 
 # m before the clip along the hand's own axis, from where it goes straight in; more would press the cable
 BEFORE = 0.025
@@ -89,10 +88,9 @@ class Insert(HandLeaf):
         if not long or belief.held is None:
             self.say("the hand hides the connector", frames=len(seen))
             return
-        pose, _ = mean_pose(long)
+        pose, whole = mean_pose(long)
         found = self.services.motion.tool(HAND).inv() * pose
-        # The fingers hide the cable's side: unless all of the length shows, where the part lies on it is a guess.
-        whole = max(e.extent for e in long) > WHOLE_SHARE * self.services.known.connector.length
+        # The fingers hide the cable's side: unless an end shows, where the part lies on the length is a guess.
         if not whole:
             found = _turned_in_the_jaw(belief.held, found)
         shift = float(np.linalg.norm(found.translation - belief.held.translation))

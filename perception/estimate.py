@@ -10,6 +10,7 @@ from perception.segmentation import NotSeen
 
 FloatArray = NDArray[np.float64]
 
+LEFT = np.array([0.0, 1.0, 0.0])  # the sign of the axis where nothing tells it: plugs of the cell point to +y
 ROLL_VARIANCE = np.pi**2 / 3  # rad^2 of an angle of which nothing is known: a cylinder's about its axis
 
 

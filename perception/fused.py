@@ -17,10 +17,9 @@ from interfaces.frame import Intrinsics, RgbdFrame
 from perception.cable_end import cable_leaves
 from perception.camera_model import project
 from perception.cylinder import COARSE, FINE, Fit, Sight, depth_misses, fit, nearest_on_rays, thinned
-from perception.estimate import ROLL_VARIANCE, Estimate, NoEstimate
+from perception.estimate import LEFT, ROLL_VARIANCE, Estimate, NoEstimate
 from perception.outline import outline
 from perception.registration import CARRIED, FIXED, Registration, register
-from perception.rgbd_pose import LEFT, pca_axis
 from perception.segmentation import NotSeen, SegmentationParameters, color_mask
 
 FloatArray = NDArray[np.float64]
@@ -237,7 +236,7 @@ def _starts(sight: Sight, connector: Connector) -> list[tuple[FloatArray, FloatA
     flat = offsets - np.outer(offsets @ view, view)
     values, vectors = np.linalg.eigh(flat.T @ flat)
     ways = [vectors[:, -1]] if values[-1] > SIDE_SEEN**2 * values[-2] else [vectors[:, -1], vectors[:, -2]]
-    axes = [pca_axis(sight.points)]
+    axes = [np.linalg.eigh(offsets.T @ offsets)[1][:, -1]]
     axes += [np.cos(tilt) * way + np.sin(tilt) * view for way in ways for tilt in TILTS]
     starts = []
     for axis in axes:
