@@ -4,6 +4,7 @@ import io
 import statistics
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import cv2
@@ -21,6 +22,7 @@ from app.tick_log import TickLog
 from behaviors import LEAVES
 from interfaces.cell import TAG_DICTIONARY
 from interfaces.frame import RgbdFrame
+from perception.detector import Detector, fitted, shipped_network
 from perception.estimate import NoEstimate
 from perception.rgbd_pose import Rgbd
 from perception.segmentation import SegmentationParameters
@@ -36,6 +38,7 @@ Call = Callable[[], Any]
 
 def main() -> None:
     """Print a table: milliseconds of ours and of the other, and their ratio."""
+    cv2.setNumThreads(1)  # a robot has other work for its cores
     scenario = load_scenario("no_obstacle")
     world = World(scenario.cell, "zero", 0)
     try:
@@ -47,6 +50,8 @@ def main() -> None:
             "colour and depth to pose / bare OpenCV calls": poses(world),
             "848x480 tag to pose / bare OpenCV calls": tags(848),
             "640x480 tag to pose / bare OpenCV calls": tags(640),
+            "848x480 to pose by detector / its network's bare forward": detections(world, 848),
+            "640x480 to pose by detector / its network's bare forward": detections(world, 640),
         }
         print_table(("pair", "ours ms", "other ms", "ratio"), [_line(name, *pair) for name, pair in rows.items()])
     finally:
@@ -187,6 +192,26 @@ def poses(world: World) -> tuple[Call, Call]:
     technique = Rgbd(known)
     assert not isinstance(technique.estimate(image, world_from_camera), NoEstimate)
     return lambda: technique.estimate(image, world_from_camera), bare
+
+
+def detections(world: World, width: int) -> tuple[Call, Call]:
+    """The connector's pose by the network from the middle `width` columns of a rear frame, and the network alone."""
+    frame, known = first_frame(world), world.cell.known
+    world_from_camera = known.camera("rear").mount.world_from_camera  # type: ignore[union-attr]
+    first = (frame.intrinsics.width - width) // 2
+    k = replace(frame.intrinsics, width=width, cx=frame.intrinsics.cx - first)
+    there = slice(first, first + width)
+    rgb, depth = np.ascontiguousarray(frame.rgb[:, there]), np.ascontiguousarray(frame.depth[:, there])
+    image, detector = replace(frame, rgb=rgb, depth=depth, intrinsics=k), Detector(known)
+    network = cv2.dnn.readNetFromONNX(np.frombuffer(shipped_network(), np.uint8))
+    blob = cv2.dnn.blobFromImage(fitted(rgb)[0], 1 / 255)
+
+    def bare() -> Any:
+        network.setInput(blob)
+        return network.forward()
+
+    assert not isinstance(detector.estimate(image, world_from_camera), NoEstimate)
+    return lambda: detector.estimate(image, world_from_camera), bare
 
 
 if __name__ == "__main__":

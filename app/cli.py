@@ -10,7 +10,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from app import calibrate_commands, output, record_commands, scenario_commands, study_commands, tree_commands
+from app import (
+    calibrate_commands,
+    detector_commands,
+    output,
+    record_commands,
+    scenario_commands,
+    study_commands,
+    tree_commands,
+)
 from app.findings import Finding, Findings, printable
 from app.options import MOST_SEED, Sets
 from app.progress import shown_progress
@@ -58,6 +66,7 @@ app.add_typer(scenario_commands.app, name="scenarios")
 app.add_typer(study_commands.app, name="study")
 record_commands.add_to(app)
 calibrate_commands.add_to(app)
+detector_commands.add_to(app)
 
 
 def _version(wanted: bool) -> None:

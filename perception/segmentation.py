@@ -21,6 +21,7 @@ class NotSeen(StrEnum):
     NOT_ITS_SHAPE = "not_its_shape"  # its colour, but not a cylinder of its size
     NO_TAG = "no_tag"  # its tag is not in sight
     WRONG_SIZE = "wrong_size"  # its tag's size in the image and the depth there disagree
+    LOW_SCORE = "low_score"  # the network is not sure enough of any box
 
 
 @dataclass(frozen=True)

@@ -9,12 +9,13 @@ from scipy.spatial.transform import RigidTransform
 
 from interfaces.cell import KnownCell
 from interfaces.frame import RgbdFrame
+from perception.detector import Detector
 from perception.estimate import Estimate, NoEstimate
 from perception.fiducial import Fiducial
 from perception.fused import Fused
 from perception.rgbd_pose import Rgbd
 
-TechniqueName = Literal["rgbd", "fiducial", "fused"]
+TechniqueName = Literal["rgbd", "fiducial", "detector", "fused"]
 TECHNIQUES: tuple[TechniqueName, ...] = get_args(TechniqueName)
 
 
@@ -39,5 +40,10 @@ class Technique(Protocol):
 
 def make_technique(name: TechniqueName, known: KnownCell) -> Technique:
     """The technique of that name. Raises ValueError for a cell that has not what it needs."""
-    makers: dict[TechniqueName, Callable[[KnownCell], Technique]] = {"rgbd": Rgbd, "fiducial": Fiducial, "fused": Fused}
+    makers: dict[TechniqueName, Callable[[KnownCell], Technique]] = {
+        "rgbd": Rgbd,
+        "fiducial": Fiducial,
+        "detector": Detector,
+        "fused": Fused,
+    }
     return makers[name](known)

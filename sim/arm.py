@@ -64,7 +64,7 @@ class SimArm:
         self._trajectory: Trajectory | None = None
         self._started = 0.0
         self._servo: FloatArray = np.array(spec.sleep, float)
-        self._place(self._servo)
+        self.place(self._servo)
         self.gripper = SimGripper(client, self.body, self.links, self.now, gripper, errors, rng)
 
     def reading(self) -> JointReading:
@@ -173,7 +173,8 @@ class SimArm:
         """Which servos (6,) cannot be at `q` (6,) rad within a step: none, but by a fault."""
         return np.abs(q - self._servo) > self._speed_share * SPEED * self._dt + 1e-9
 
-    def _place(self, q: FloatArray) -> None:
+    def place(self, q: FloatArray) -> None:
+        """Put the joints at `q` (6,) rad at once: where a run begins, and for pictures without physics."""
         self._reset_joints(q + self.offsets)
         self._servo = q
         self._drive(q, np.zeros(6))

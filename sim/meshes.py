@@ -1,5 +1,7 @@
 """Triangles of visual items, for the renderer."""
 
+from functools import lru_cache
+
 import numpy as np
 import pybullet as p
 import trimesh
@@ -16,7 +18,7 @@ def corners(item: VisualItem) -> NDArray[np.float32]:
     """Positions and unit normals of the item's triangle corners in its visual frame: (3 n, 6), metres."""
     kind, size = item.kind, item.size
     if kind == p.GEOM_MESH:
-        return _from_file(item.file, np.array(size))
+        return _from_file(item.file, size)
     if kind == p.GEOM_BOX:
         box = trimesh.creation.box(size)
         return _rows(box.triangles, np.repeat(box.face_normals[:, None], 3, axis=1))
@@ -60,9 +62,10 @@ def _lathe(outline: FloatArray, normals: FloatArray) -> NDArray[np.float32]:
     return np.ascontiguousarray(kept.reshape(-1, 6), np.float32)
 
 
-def _from_file(file: str, scale: FloatArray) -> NDArray[np.float32]:
+@lru_cache(maxsize=64)  # both arms' files; smoothing them takes most of a renderer's making
+def _from_file(file: str, scale: tuple[float, float, float]) -> NDArray[np.float32]:
     mesh = trimesh.load(file, force="mesh")
-    vertices, faces = _merge(np.asarray(mesh.vertices) * scale, np.asarray(mesh.faces))
+    vertices, faces = _merge(np.asarray(mesh.vertices) * np.array(scale), np.asarray(mesh.faces))
     merged = trimesh.Trimesh(vertices, faces, process=False)
     faces_normals = np.asarray(merged.face_normals)
     return _rows(vertices[faces], _smooth(faces, faces_normals, np.asarray(merged.area_faces)))

@@ -1,0 +1,162 @@
+"""`regrasp train-detector` and `evaluate-detector`: the network of the technique `detector`."""
+
+import json
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from app import output
+from app.findings import Finding, Findings, shown
+from app.options import MOST_SEED
+from app.resources import resolve
+
+if TYPE_CHECKING:
+    from interfaces.cell import Cell
+
+TRAINING_SEED, HELD_OUT_SEED = 0, 1_000_000  # choice: far apart, so that no one trains on what is held out
+_Cell = Annotated[str, typer.Option("--cell", help="A shipped cell's name, or a path to a .yaml file.")]
+_Seed = Annotated[int, typer.Option(min=0, max=MOST_SEED, help="Draws the pictures and all else.")]
+
+
+def add_to(app: typer.Typer) -> None:
+    """Mount the commands."""
+    app.command()(train_detector)
+    app.command()(evaluate_detector)
+
+
+def train_detector(
+    out: Annotated[Path, typer.Option(help="The folder for detector.onnx and evaluation.json.")],
+    cell: _Cell = "thesis",
+    pictures: Annotated[int, typer.Option(min=24, help="Random pictures to train on.")] = 3600,
+    steps: Annotated[int, typer.Option(min=1, help="Training steps of 32 parts of pictures each.")] = 5000,
+    held_out: Annotated[int, typer.Option(min=1, help="Pictures of each class to evaluate on at the end.")] = 150,
+    seed: _Seed = TRAINING_SEED,
+) -> None:
+    """Train the network of the technique `detector` on random pictures of a cell, then evaluate it.
+
+    Needs the extra `train` (torch, onnx). Ctrl-C keeps the best network so far. To use it, put its detector.onnx in the
+    place of perception/detector.onnx.
+
+    \b
+    Example:
+      regrasp train-detector --out results/detector
+    """
+    wrong = output.unwritable(out)
+    if (out / "detector.onnx").exists():
+        wrong.append(Finding(shown(out), 1, "already holds detector.onnx; name another folder"))
+    try:
+        import onnx  # noqa: F401 - torch exports through it
+        import torch  # noqa: F401
+    except ImportError as error:
+        wrong.append(Finding("train-detector", 1, f"{error.name} is not installed; pip install 'regrasp[train]'"))
+    if wrong:
+        raise Findings(wrong)
+    loaded = _load(cell)
+    from app.detector_data import make_pictures
+    from app.detector_train import train
+
+    out.mkdir(parents=True, exist_ok=True)
+    with _progress("drawing pictures", pictures) as tell:
+        drawn = make_pictures(loaded, seed, pictures, tell)
+    with _progress("training", steps) as tell:
+        train(drawn, seed, steps, lambda model, _score: _write(out / "detector.onnx", model), tell)
+    evaluate_detector(out / "detector.onnx", cell, held_out, out=out / "evaluation.json")
+
+
+def evaluate_detector(
+    model: Annotated[Path | None, typer.Argument(help="An ONNX file; default the shipped network.")] = None,
+    cell: _Cell = "thesis",
+    held_out: Annotated[int, typer.Option(min=1, help="Pictures of each class of occlusion, and without any.")] = 150,
+    seed: _Seed = HELD_OUT_SEED,
+    out: Annotated[Path | None, typer.Option(metavar="FILE", help="Write the figures as JSON, too.")] = None,
+) -> None:
+    """Say how well the network finds the connector in pictures unlike those of its training.
+
+    They show another layout of the cell, other light, things and look-alikes, drawn by PyBullet's renderer; the
+    connector is hidden by up to 70 %, and absent in as many pictures as each class of occlusion has.
+
+    \b
+    Example:
+      regrasp evaluate-detector results/detector/detector.onnx --out evaluation.json
+    """
+    wrong = output.unwritable(out.parent) if out else []
+    if model is not None and not model.is_file():
+        wrong.append(Finding(shown(model), 1, "is no file; name an ONNX file that `regrasp train-detector` made"))
+    if wrong:
+        raise Findings(wrong)
+    loaded = _load(cell)
+    from app.detector_score import answer, held_out_shots, summary
+
+    detector = _detector(loaded, model)
+    with _progress("drawing held-out pictures", 5 * held_out) as tell:
+        shots = held_out_shots(loaded, seed, held_out, tell=tell)
+    figures = summary([answer(detector, shot, loaded, number) for number, shot in enumerate(shots)])
+    if out is not None:
+        _write(out, (json.dumps(figures, indent=2) + "\n").encode())
+    _print(figures)
+
+
+def _load(cell: str) -> "Cell":
+    from app.scenario_file import load_cell
+
+    return load_cell(resolve("cell", cell, Path()))
+
+
+def _detector(cell: "Cell", model: Path | None) -> Any:
+    """The detector with that network. Raises `Findings` if the file holds none."""
+    import cv2
+
+    from perception.detector import Detector
+
+    try:
+        return Detector(cell.known, model.read_bytes() if model else None)
+    except cv2.error:
+        message = "holds no network; name an ONNX file that `regrasp train-detector` made"
+        raise Findings([Finding(shown(model) if model else "detector.onnx", 1, message)]) from None
+
+
+def _write(path: Path, data: bytes) -> None:
+    """Whole or not at all."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_name(path.name + ".part")
+    part.write_bytes(data)
+    part.replace(path)
+
+
+def _print(figures: dict[str, Any]) -> None:
+    from app.study import wilson
+    from app.table import print_table
+
+    lines = [
+        (name, f"{right}/{all_}", "{:.1f} to {:.1f} %".format(*(100 * x for x in wilson(right, all_))))
+        for name, (right, all_) in (*figures["recall_by_occlusion"].items(), ("all", figures["recall"]))
+    ]
+    print_table(("hidden", f"found at {figures['min_score']}", "95 % interval"), lines)
+    false, empty = figures["empty_pictures_with_a_box"]
+    angle, place = figures["angle_error_deg"]["50%"], figures["position_error_m"]["50%"]
+    typer.echo(f"AP50 {figures['ap50']:.3f}; a false box in {false} of {empty} pictures without the connector")
+    if angle is not None and place is not None:
+        typer.echo(f"median error: axis in the image {angle:.1f} degrees, position {1000 * place:.1f} mm")
+
+
+@contextmanager
+def _progress(what: str, total: int) -> Iterator[Callable[..., None]]:
+    """A callback (done, words) that shows how far it is on stderr: a bar on a terminal, else a line every tenth."""
+    from rich.console import Console
+    from rich.progress import Progress
+
+    console = Console(stderr=True, highlight=False, markup=False, soft_wrap=True)
+    if console.is_terminal:
+        with Progress(console=console, transient=True) as progress:
+            task = progress.add_task(what, total=total)
+            yield lambda done, words="": progress.update(task, completed=done, description=f"{what} {words}")
+        return
+
+    def line(done: int, words: str = "") -> None:
+        if done * 10 // total > (done - 1) * 10 // total:
+            console.print(f"{what}: {done} of {total} {words}".rstrip())
+
+    yield line

@@ -1,0 +1,208 @@
+"""The connector found by a small network of our own (Hwang 2024, section 3.2.2, has a YOLOv5 in its place).
+
+The network is a CenterNet (Zhou et al. 2019): a map of how likely each cell holds the middle of a connector's visible
+part, and maps of that part's box and of the axis' direction. `regrasp train-detector` makes the file.
+"""
+
+from dataclasses import dataclass
+from importlib.resources import files
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import RigidTransform
+
+from interfaces.cell import KnownCell
+from interfaces.frame import RgbdFrame
+from perception.camera_model import project, rays
+from perception.estimate import Estimate, NoEstimate, pose_covariance
+from perception.rgbd_pose import LEFT, MIN_POINTS, min_max_axis, rotation_about, without_outliers
+from perception.segmentation import NoSegment, NotSeen, SegmentationParameters, segment
+
+FloatArray = NDArray[np.float64]
+Box = tuple[float, float, float, float]
+
+WIDTH, HEIGHT = 432, 240  # px of the network's input: half a camera's image, and whole numbers of its 16 px cells
+STRIDE = 4  # px of the input that a cell of the output covers
+MIN_SCORE = 0.4  # choice: the most right and fewest false boxes among look-alikes (harmonic mean), by tenths
+MOST = 10  # boxes looked at in an image; choice: more than a cell holds
+OVERLAP = 0.5  # intersection over union at which two boxes are one; choice: that of AP50
+WINDOW = 0.3  # of the box's edges: where depth is read; choice: most of a slanting connector's box is beside it
+# Of position on each axis (m), of a borrowed axis and of the network's own (rad): on pictures as `evaluate-detector`
+# draws, 95 % of the errors of right boxes lie within 1.96 of these (2.45 for an axis, which has two). The front is
+# taken for the middle, the visible part for the whole, and the depth scale is off.
+POSITION_DEVIATION, BORROWED_DEVIATION, OWN_DEVIATION = 0.0155, 0.3, 0.55
+FAR = 10.0  # m; choice: stereo cameras of this size read no farther
+MOST_POINTS = 2000  # choice: as at 0.6 m; ten times as many, from nearby, tell no more
+MIN_READINGS = 5  # choice: fewer make no cluster
+CLUSTER = 0.02  # m; readings this near to their median are one surface; choice: the connector's thickness
+
+
+@dataclass(frozen=True)
+class Detection:
+    """A connector in an image.
+
+    `score` 0 to 1; `box` (u0, v0, u1, v1) px around its visible part, edges of pixels: pixel u covers u -0.5 to u +0.5;
+    `angle`: rad, of its axis in the image from u to v, -pi/2 to pi/2; `in_plane`: the length of its unit axis in the
+    image, 1 for one across the view, 0 for one along it.
+    """
+
+    score: float
+    box: Box
+    angle: float
+    in_plane: float
+
+    @property
+    def middle(self) -> tuple[float, float]:
+        """The box's middle (u, v), px."""
+        return (self.box[0] + self.box[2]) / 2, (self.box[1] + self.box[3]) / 2
+
+    @property
+    def edges(self) -> tuple[float, float]:
+        """The box's width and height, px."""
+        return self.box[2] - self.box[0], self.box[3] - self.box[1]
+
+    def pixels(self, shape: tuple[int, ...], share: float = 1.0) -> tuple[slice, slice]:
+        """Rows and columns of an image of that shape (H, W) in the box, or in so much of its edges about its middle."""
+        (u, v), (width, height) = self.middle, self.edges
+        ranges = []
+        for at, edge, size in ((v, height, shape[0]), (u, width, shape[1])):
+            reach = max(share * edge / 2, 1.0)
+            ranges.append(
+                slice(int(np.clip(np.ceil(at - reach), 0, size)), int(np.clip(np.floor(at + reach) + 1, 0, size)))
+            )
+        return ranges[0], ranges[1]
+
+
+class Detector:
+    """The thesis's learned technique as a `perception.technique.Technique`: the network knows what it was trained on.
+
+    As there, the middle of the box gives the place in the image, the mean of a cluster of depth readings the depth, and
+    the orientation is borrowed from the RGB-D technique, here looking into the box alone. Where that sees nothing the
+    axis is the network's own, taken to lie across the view. `model` holds an ONNX file; None takes the shipped one.
+    """
+
+    def __init__(self, known: KnownCell, model: bytes | None = None) -> None:
+        data = shipped_network() if model is None else model
+        self._net = cv2.dnn.readNetFromONNX(np.frombuffer(data, np.uint8))
+        self._color = SegmentationParameters.for_color(known.connector.color)
+
+    def detect(self, rgb: NDArray[np.uint8], min_score: float = MIN_SCORE) -> list[Detection]:
+        """The connectors in `rgb` (H, W, 3) that score at least so, the likeliest first."""
+        return decode(*self._answer(rgb), min_score)
+
+    def estimate(
+        self,
+        frame: RgbdFrame,
+        world_from_camera: RigidTransform,
+        *,
+        axis: FloatArray | None = None,
+        near: FloatArray | None = None,
+    ) -> Estimate | NoEstimate:
+        """See `Technique.estimate`."""
+        maps, scale = self._answer(frame.rgb)
+        good = decode(maps, scale, MIN_SCORE)
+        if not good:
+            message = f"the likeliest box scores {maps[0].max():.2f}, {MIN_SCORE} is needed"
+            return NoEstimate(frame.stamp, frame.camera, NotSeen.LOW_SCORE, message)
+        box = (
+            good[0]
+            if near is None
+            else _nearest(good, project(world_from_camera.inv().apply([near]), frame.intrinsics))
+        )
+        readings = _cluster(frame.depth, box)
+        if len(readings) < MIN_READINGS:
+            message = f"{len(readings)} depth readings in the middle of the box, {MIN_READINGS} are needed"
+            return NoEstimate(frame.stamp, frame.camera, NotSeen.NO_DEPTH, message)
+        depth, k = float(readings.mean()), frame.intrinsics
+        u, v = box.middle
+        center = depth * np.array([(u - k.cx) / k.fx, (v - k.cy) / k.fy, 1.0])
+        borrowed = self._borrowed_axis(frame, box)
+        own = np.array([np.cos(box.angle), np.sin(box.angle), 0.0])
+        direction = world_from_camera.rotation.apply(own if borrowed is None else borrowed)
+        direction *= 1.0 if direction @ (LEFT if axis is None else axis) >= 0 else -1.0
+        position = world_from_camera.apply(center)
+        pose = RigidTransform.from_components(position, rotation_about(direction, world_from_camera.rotation))
+        covariance = pose_covariance(
+            direction, POSITION_DEVIATION, OWN_DEVIATION if borrowed is None else BORROWED_DEVIATION
+        )
+        width, height = box.edges
+        extent = depth * float(np.hypot(width / k.fx, height / k.fy))
+        stamp, camera, area = frame.stamp, frame.camera, round(width * height)
+        return Estimate(stamp, camera, position, direction, pose, covariance, len(readings), area, extent, False)
+
+    def _answer(self, rgb: NDArray[np.uint8]) -> tuple[NDArray[np.float32], float]:
+        """The network's output (7, 60, 108), and how much smaller than `rgb` it saw the image."""
+        canvas, scale = fitted(rgb)
+        self._net.setInput(cv2.dnn.blobFromImage(canvas, 1 / 255))
+        return self._net.forward()[0], scale
+
+    def _borrowed_axis(self, frame: RgbdFrame, box: Detection) -> FloatArray | None:
+        """The axis (3,) that the RGB-D technique finds in the box, optical frame; None where it finds too little."""
+        there = box.pixels(frame.depth.shape)
+        found = segment(frame.rgb[there], self._color)
+        if isinstance(found, NoSegment):
+            return None
+        depth = np.where(found.mask, frame.depth[there], 0.0)
+        seen = (depth > 0) & (depth < FAR)
+        cloud = (rays(frame.intrinsics)[there][seen] * depth[seen, None]).astype(float)
+        cloud = cloud[:: 1 + len(cloud) // MOST_POINTS]
+        points = without_outliers(cloud) if len(cloud) >= MIN_POINTS else cloud
+        return min_max_axis(points) if len(points) >= MIN_POINTS else None
+
+
+def _nearest(found: list[Detection], pixel: FloatArray) -> Detection:
+    """The detection whose middle is nearest to `pixel` (1, 2); the likeliest if that is NaN, behind the camera."""
+    return min(found, key=lambda d: float(np.nan_to_num(np.linalg.norm(d.middle - pixel[0]))))
+
+
+def _cluster(depth: NDArray[np.float32], box: Detection) -> NDArray[np.float64]:
+    """Readings (n,) m of `depth` (H, W) about the middle of the box that lie on one surface: near to their median."""
+    there = depth[box.pixels(depth.shape, WINDOW)]
+    readings = there[(there > 0) & (there < FAR)].astype(float)  # NaN compares false
+    return readings[np.abs(readings - np.median(readings)) <= CLUSTER] if len(readings) else readings
+
+
+def shipped_network() -> bytes:
+    """The ONNX file that comes with Regrasp."""
+    return files("perception").joinpath("detector.onnx").read_bytes()
+
+
+def fitted(image: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], float]:
+    """An image (H, W, ...) shrunk to the network's input (240, 432, ...), black beside it, and the factor."""
+    height, width = image.shape[:2]
+    scale = min(WIDTH / width, HEIGHT / height)
+    size = max(1, round(scale * width)), max(1, round(scale * height))
+    small = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
+    canvas = np.zeros((HEIGHT, WIDTH, *small.shape[2:]), np.uint8)
+    canvas[: size[1], : size[0]] = small
+    return canvas, scale
+
+
+def decode(maps: NDArray[np.float32], scale: float, min_score: float) -> list[Detection]:
+    """Detections from the network's output (7, 60, 108).
+
+    Maps: likelihood, offset of the box's middle from the cell's (u, v, cells), logarithm of its edges (u, v, cells),
+    and the axis as in_plane^2 (cos 2 angle, sin 2 angle), which is the same for both its signs.
+    """
+    heat = maps[0]
+    peaks = np.flatnonzero((heat >= min_score) & (heat == cv2.dilate(heat, np.ones((3, 3), np.uint8))))
+    found: list[Detection] = []
+    for cell in peaks[np.argsort(-heat.ravel()[peaks], kind="stable")][:MOST]:
+        row, column = divmod(int(cell), heat.shape[1])
+        score, du, dv, log_width, log_height, cosine, sine = maps[:, row, column].astype(float).tolist()
+        middle = np.array([column + 0.5 + du, row + 0.5 + dv])
+        half = np.exp(np.clip([log_width, log_height], -4, 6)) / 2
+        u0, v0, u1, v1 = (np.concatenate([middle - half, middle + half]) * STRIDE / scale - 0.5).tolist()
+        in_plane = float(np.clip(np.hypot(cosine, sine), 0.0, 1.0)) ** 0.5
+        detection = Detection(score, (u0, v0, u1, v1), float(np.arctan2(sine, cosine)) / 2, in_plane)
+        if all(overlap(detection.box, other.box) < OVERLAP for other in found):
+            found.append(detection)
+    return found
+
+
+def overlap(a: Box, b: Box) -> float:
+    """Intersection over union of two boxes."""
+    across, down = min(a[2], b[2]) - max(a[0], b[0]), min(a[3], b[3]) - max(a[1], b[1])
+    shared = max(0.0, across) * max(0.0, down)
+    return shared / ((a[2] - a[0]) * (a[3] - a[1]) + (b[2] - b[0]) * (b[3] - b[1]) - shared)

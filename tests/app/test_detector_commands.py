@@ -1,0 +1,40 @@
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+from app.cli import app
+
+
+def invoke(*args: str) -> Any:
+    return CliRunner().invoke(app, args)
+
+
+def test_without_torch_it_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "torch", None)
+    monkeypatch.setitem(sys.modules, "onnx", None)
+    result = invoke("train-detector", "--out", str(tmp_path / "out"))
+    assert result.exit_code == 2
+    assert "pip install 'regrasp[train]'" in result.output
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_folder_that_holds_a_network_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "detector.onnx").write_bytes(b"mine")
+    result = invoke("train-detector", "--out", str(tmp_path))
+    assert result.exit_code == 2
+    assert "already holds detector.onnx" in result.output
+    assert (tmp_path / "detector.onnx").read_bytes() == b"mine"
+
+
+@pytest.mark.parametrize("data", [b"", b"no network", None])
+def test_a_file_without_a_network_is_one_line(tmp_path: Path, data: bytes | None) -> None:
+    file = tmp_path / "bad.onnx"
+    if data is not None:
+        file.write_bytes(data)
+    result = invoke("evaluate-detector", str(file))
+    assert result.exit_code == 2
+    assert result.output.count("\n") == 1
+    assert "bad.onnx" in result.output

@@ -1,0 +1,64 @@
+import json
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from app.cli import app
+
+torch = pytest.importorskip("torch", reason="the extra train is missing")
+pytest.importorskip("onnx", reason="the extra train is missing")
+
+SIZES = ("--pictures", "24", "--steps", "2", "--held-out", "1")
+
+
+def train(out: Path) -> Any:
+    return CliRunner().invoke(app, ["train-detector", "--out", str(out), *SIZES])
+
+
+def test_a_tiny_training_leaves_a_network_and_its_figures_and_the_seed_decides(tmp_path: Path) -> None:
+    first, again = tmp_path / "first", tmp_path / "again"
+    results = [train(out) for out in (first, again)]
+    assert [r.exit_code for r in results] == [0, 0], results[0].output
+    assert "AP50" in results[0].output
+    figures = json.loads((first / "evaluation.json").read_text())
+    assert figures["recall"][1] == 4
+    assert 1000 < (first / "detector.onnx").stat().st_size < 2 * 1024 * 1024
+    assert (first / "detector.onnx").read_bytes() == (again / "detector.onnx").read_bytes()
+    assert (first / "evaluation.json").read_bytes() == (again / "evaluation.json").read_bytes()
+
+
+def test_ctrl_c_keeps_the_best_so_far(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from app import detector_train
+
+    batch = detector_train._batch
+    drawn: list[int] = []
+
+    def interrupted(*args: Any) -> Any:
+        if drawn:
+            raise KeyboardInterrupt
+        drawn.append(1)
+        return batch(*args)
+
+    monkeypatch.setattr(detector_train, "CHECK_EVERY", 1)
+    monkeypatch.setattr(detector_train, "_batch", interrupted)
+    assert train(tmp_path / "out").exit_code == 130
+    assert [f.name for f in (tmp_path / "out").iterdir()] == ["detector.onnx"]
+
+
+def test_opencv_computes_what_torch_does() -> None:
+    from app.detector_train import Network, to_onnx
+
+    torch.manual_seed(1)
+    network = Network()
+    image = np.random.default_rng(0).random((1, 3, 240, 432), np.float32)
+    with torch.no_grad():
+        network(torch.from_numpy(image))  # fills the running means
+        expected = network.eval()(torch.from_numpy(image)).numpy()
+    net = cv2.dnn.readNetFromONNX(np.frombuffer(to_onnx(network), np.uint8))
+    net.setInput(image)
+    assert np.abs(net.forward() - expected).max() < 1e-5
+    assert expected.std(axis=(2, 3)).min() > 5e-5  # the picture matters
