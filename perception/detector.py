@@ -15,8 +15,8 @@ from scipy.spatial.transform import RigidTransform
 from interfaces.cell import KnownCell
 from interfaces.frame import RgbdFrame
 from perception.camera_model import project, rays
-from perception.estimate import Estimate, NoEstimate, pose_covariance
-from perception.rgbd_pose import LEFT, MIN_POINTS, min_max_axis, rotation_about, without_outliers
+from perception.estimate import LEFT, Estimate, NoEstimate, pose_covariance
+from perception.rgbd_pose import MIN_POINTS, min_max_axis, rotation_about, without_outliers
 from perception.segmentation import NoSegment, NotSeen, SegmentationParameters, segment
 
 FloatArray = NDArray[np.float64]
