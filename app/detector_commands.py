@@ -30,9 +30,9 @@ def add_to(app: typer.Typer) -> None:
 def train_detector(
     out: Annotated[Path, typer.Option(help="The folder for detector.onnx and evaluation.json.")],
     cell: _Cell = "thesis",
-    pictures: Annotated[int, typer.Option(min=24, help="Random pictures to train on.")] = 3600,
-    steps: Annotated[int, typer.Option(min=1, help="Training steps of 32 parts of pictures each.")] = 5000,
-    held_out: Annotated[int, typer.Option(min=1, help="Pictures of each class to evaluate on at the end.")] = 150,
+    pictures: Annotated[int, typer.Option(min=24, help="Random pictures to train on.")] = 3000,
+    steps: Annotated[int, typer.Option(min=1, help="Training steps of 32 parts of pictures each.")] = 6000,
+    held_out: Annotated[int, typer.Option(min=1, help="Pictures of each class to evaluate on at the end.")] = 60,
     seed: _Seed = TRAINING_SEED,
 ) -> None:
     """Train the network of the technique `detector` on random pictures of a cell, then evaluate it.
@@ -69,7 +69,7 @@ def train_detector(
 def evaluate_detector(
     model: Annotated[Path | None, typer.Argument(help="An ONNX file; default the shipped network.")] = None,
     cell: _Cell = "thesis",
-    held_out: Annotated[int, typer.Option(min=1, help="Pictures of each class of occlusion, and without any.")] = 150,
+    held_out: Annotated[int, typer.Option(min=1, help="Pictures of each class of occlusion, and without any.")] = 60,
     seed: _Seed = HELD_OUT_SEED,
     out: Annotated[Path | None, typer.Option(metavar="FILE", help="Write the figures as JSON, too.")] = None,
 ) -> None:

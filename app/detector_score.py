@@ -22,7 +22,7 @@ from sim.random_scene import RandomScene, Shot
 from sim.renderer import RendererName
 
 MATCH = 0.5  # intersection over union from which a box counts as right: that of AP50
-LEAST_SCORE = 0.01  # of the boxes that enter the average precision; choice: lower ones change it by less than 1e-3
+LEAST_SCORE = 0.01  # of the boxes that enter the average precision; choice: far below any that counts
 LEAST_SEEN = 100  # px of the camera's picture; choice: a seventh of the connector at 0.75 m; less is left out
 OCCLUSION = ((0.0, 0.1), (0.1, 0.3), (0.3, 0.5), (0.5, 0.7))
 SHOTS = 8  # of one scene

@@ -31,7 +31,7 @@ WINDOW = 0.3  # of the box's edges: where depth is read; choice: most of a slant
 # Of position on each axis (m), of a borrowed axis and of the network's own (rad): on pictures as `evaluate-detector`
 # draws, 95 % of the errors of right boxes lie within 1.96 of these (2.45 for an axis, which has two). The front is
 # taken for the middle, the visible part for the whole, and the depth scale is off.
-POSITION_DEVIATION, BORROWED_DEVIATION, OWN_DEVIATION = 0.0155, 0.3, 0.55
+POSITION_DEVIATION, BORROWED_DEVIATION, OWN_DEVIATION = 0.0155, 0.3, 0.6
 FAR = 10.0  # m; choice: stereo cameras of this size read no farther
 MOST_POINTS = 2000  # choice: as at 0.6 m; ten times as many, from nearby, tell no more
 MIN_READINGS = 5  # choice: fewer make no cluster
