@@ -13,6 +13,7 @@ from behaviors.services import Belief
 from sim.ground_truth import GroundTruth
 from sim.phase import LOST_SECONDS, STILL_SECONDS, STILL_SPEED
 
+HOLD_SECONDS = 0.5  # of both pads' touch: a hand that closes beside its middle may touch it and push it away
 SLIDE = 0.003  # m in the jaw ...
 SLIDE_SECONDS = 0.5  # ... within so long: a squeezed end crept so for a second before it sprang out
 
@@ -42,6 +43,7 @@ class Judge:
         self._truth, self._expect = truth, expect
         self._now = 0.0
         self._was_held = False
+        self._held_since: float | None = None  # since when both pads touch it
         self._grip = GripWatch()
         self._unheld_at: float | None = None  # since when not both pads touch it, or it slid before that
         self._untouched_at: float | None = None  # since when none does
@@ -56,10 +58,9 @@ class Judge:
         self._now = now
         self.found_by = self.found_by or belief.found_by
         if self._truth.held():
-            self.takes += not self._was_held
-            self._grip.feed(now, self._truth.connector_in_hand())
-            self._was_held, self._unheld_at, self._untouched_at, self._still_since = True, None, None, None
+            self._watch_hold(now)
             return
+        self._held_since = None
         if self._was_held and not self._truth.stowed():
             if self._unheld_at is None:
                 self._unheld_at = now if self._grip.slid_at is None else self._grip.slid_at
@@ -72,6 +73,14 @@ class Judge:
                     self._was_held, self._grip = False, GripWatch()
         if self.losses and not self._was_held and self.settled_pixels is None:
             self._watch_settling(now)
+
+    def _watch_hold(self, now: float) -> None:
+        self._held_since = now if self._held_since is None else self._held_since
+        self._grip.feed(now, self._truth.connector_in_hand())
+        self._unheld_at = self._untouched_at = self._still_since = None
+        if not self._was_held and now - self._held_since >= HOLD_SECONDS:
+            self.takes += 1
+            self._was_held = True
 
     def slips(self, belief: Belief) -> tuple[Slip, ...]:
         """Each real loss with the first notice that came after it and before the next.

@@ -111,6 +111,13 @@ def test_an_end_that_slides_out_of_the_jaw_is_being_lost_before_the_pads_let_go(
     assert run.verdict("detection_delay") == (True, pytest.approx(0.1))
 
 
+def test_a_touch_while_the_hand_closes_is_neither_hold_nor_loss() -> None:
+    run = Run(Expect(tries=1))
+    run.go(0.3, fingers=2)
+    run.go(1.0, fingers=0)
+    assert (run.judge.losses, run.judge.takes) == ([], 0)
+
+
 def test_what_slid_and_was_held_fast_again_is_lost_only_later() -> None:
     run = Run()
     run.go(1.0, fingers=2)
