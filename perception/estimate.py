@@ -22,7 +22,7 @@ class Estimate:
     sign by the cable if it is seen, else by what the caller knew; `covariance` (6, 6): of position (m^2), then of a
     small turn about the world's axes (rad^2); `points`: depth readings used; `mask_area`: pixels seen as the connector;
     `extent`: length of the visible part along the axis; `whole`: both ends are in sight, or one is and the known
-    length gave the other.
+    length gave the other; `sign_seen`: the frame itself told the cable's end from the tip.
     """
 
     stamp: float
@@ -35,6 +35,7 @@ class Estimate:
     mask_area: int
     extent: float
     whole: bool
+    sign_seen: bool = False
 
 
 @dataclass(frozen=True)

@@ -86,6 +86,7 @@ class Fiducial:
             found.area,
             self._connector.length,
             whole=True,
+            sign_seen=True,
         )
 
     def seat(self, frame: RgbdFrame, world_from_camera: RigidTransform) -> TagPose | NoEstimate:

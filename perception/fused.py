@@ -323,4 +323,5 @@ def _estimate(frame: RgbdFrame, camera: Registration, found: _Found, hint: Float
         found.patch.area,
         float(np.ptp(np.percentile(along, [1, 99]))),
         found.whole,
+        bool(found.sign),
     )
