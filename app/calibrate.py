@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from app.calibration_file import CalibrationFile, write_calibration
 from app.findings import Finding, Findings, shown
+from app.image_files import read_rgb
 from app.table import print_table
 from interfaces.cell import CameraSpec
 from interfaces.frame import Intrinsics
@@ -57,15 +58,11 @@ def pictures_in(folder: Path) -> list[Picture]:
 
 
 def _read(path: Path) -> NDArray[np.uint8]:
-    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)  # what is wrong we say ourselves
-    data = np.fromfile(path, np.uint8)
-    image = cv2.imdecode(data, cv2.IMREAD_COLOR_RGB) if len(data) else None
-    if image is None:
-        raise Findings([Finding(shown(path), 1, "is no image that can be read; take it out or save it again")])
+    image = read_rgb(path)
     if min(image.shape[:2]) < MIN_SIDE:
         message = f"is {image.shape[1]}x{image.shape[0]} pixels; give pictures of at least {MIN_SIDE} each way"
         raise Findings([Finding(shown(path), 1, message)])
-    return np.asarray(image, np.uint8)
+    return image
 
 
 def run(

@@ -26,8 +26,8 @@ class CalibrationFile(Model):
     fy: Positive
     cx: Number
     cy: Number
-    distortion: tuple[Number, Number, Number, Number, Number]  # OpenCV's k1, k2, p1, p2, k3
-    rms: NotNegative  # of the corners' distances from where the board's should be
+    distortion: tuple[Number, Number, Number, Number, Number] = (0.0, 0.0, 0.0, 0.0, 0.0)  # OpenCV's k1, k2, p1, p2, k3
+    rms: NotNegative | None = None  # of the corners' distances from where the board's should be
 
     @property
     def intrinsics(self) -> Intrinsics:
@@ -42,4 +42,9 @@ def load_calibration(path: Path) -> CalibrationFile:
 
 def write_calibration(path: Path, calibration: CalibrationFile) -> None:
     """Write it as YAML. Raises OSError where that cannot be."""
-    write_whole(path, yaml.safe_dump(calibration.model_dump(mode="json"), sort_keys=False, default_flow_style=None))
+    write_whole(
+        path,
+        yaml.safe_dump(
+            calibration.model_dump(mode="json", exclude_none=True), sort_keys=False, default_flow_style=None
+        ),
+    )

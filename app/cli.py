@@ -14,6 +14,7 @@ from app import (
     calibrate_commands,
     detector_commands,
     output,
+    perceive_commands,
     record_commands,
     scenario_commands,
     study_commands,
@@ -67,6 +68,7 @@ app.add_typer(study_commands.app, name="study")
 record_commands.add_to(app)
 calibrate_commands.add_to(app)
 detector_commands.add_to(app)
+perceive_commands.add_to(app)
 
 
 def _version(wanted: bool) -> None:

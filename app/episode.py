@@ -74,7 +74,7 @@ def run_episode(
     """
     began = time.perf_counter()
     with Record(out, scenario.name, seed, scenario.case, copies(scenario, seed)) as record:
-        world = _world(scenario, seed, renderer, gui)
+        world = build_world(scenario, seed, renderer, gui)
         try:
             log = record.logger(world.now)
             log.info(
@@ -108,7 +108,8 @@ def run_episode(
     return result
 
 
-def _world(scenario: Scenario, seed: int, renderer: RendererName, gui: bool) -> World:
+def build_world(scenario: Scenario, seed: int, renderer: RendererName = "auto", gui: bool = False) -> World:
+    """The scenario's world as this seed makes it; close it."""
     rng = np.random.default_rng([seed, 0])
     obstacles = draw_obstacles(scenario.file, rng)
     faults = draw_faults(scenario.file, rng)

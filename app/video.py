@@ -18,7 +18,7 @@ Frame = NDArray[np.uint8]
 SIZE = (1280, 544)
 OVERVIEW_SIZE = (856, 480)  # what an overview camera should render, to be shown without scaling
 _CAMERA_SIZE = (424, 240)
-_INK, _PAPER = (235, 235, 235), 24
+_INK, PAPER = (235, 235, 235), 24
 
 
 def compose(overview: Frame | None, rear: Frame | None, wrist: Frame | None, lines: Sequence[str]) -> Frame:
@@ -27,15 +27,15 @@ def compose(overview: Frame | None, rear: Frame | None, wrist: Frame | None, lin
     Images are (H, W, 3) uint8 RGB of any size, scaled to fit; None leaves the place dark. Up to four lines, in two
     columns; they stand on a dark band of their own.
     """
-    frame: Frame = np.full((SIZE[1], SIZE[0], 3), _PAPER, np.uint8)
+    frame: Frame = np.full((SIZE[1], SIZE[0], 3), PAPER, np.uint8)
     _place(frame, overview, (0, 0), OVERVIEW_SIZE)
     for row, (label, image) in enumerate({"rear camera": rear, "wrist camera": wrist}.items()):
         left, top = OVERVIEW_SIZE[0], row * _CAMERA_SIZE[1]
         _place(frame, image, (left, top), _CAMERA_SIZE)
-        _write(frame, label, (left + 8, top + 20), 0.5)
+        write_text(frame, label, (left + 8, top + 20), 0.5)
     for i, line in enumerate(lines[:4]):
         column, row = divmod(i, 2)
-        _write(frame, line, (16 + column * SIZE[0] // 2, OVERVIEW_SIZE[1] + 25 + 27 * row), 0.6)
+        write_text(frame, line, (16 + column * SIZE[0] // 2, OVERVIEW_SIZE[1] + 25 + 27 * row), 0.6)
     return frame
 
 
@@ -51,12 +51,12 @@ def _place(frame: Frame, image: Frame | None, corner: tuple[int, int], size: tup
     frame[top : top + height, left : left + width] = image
 
 
-def _write(frame: Frame, text: str, origin: tuple[int, int], scale: float) -> None:
+def write_text(frame: Frame, text: str, origin: tuple[int, int], scale: float) -> None:
     """Light letters on a dark plate, readable on anything; `origin` is the left end of the base line. ASCII only."""
     text = text.encode("ascii", "replace").decode()
     (width, height), below = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, scale, 1)
     left, base = origin
-    cv2.rectangle(frame, (left - 4, base - height - 2), (left + width + 4, base + below), (_PAPER,) * 3, cv2.FILLED)
+    cv2.rectangle(frame, (left - 4, base - height - 2), (left + width + 4, base + below), (PAPER,) * 3, cv2.FILLED)
     cv2.putText(frame, text, origin, cv2.FONT_HERSHEY_SIMPLEX, scale, _INK, 1, cv2.LINE_AA)
 
 

@@ -65,10 +65,11 @@ def register(
 ) -> Registration:
     """The camera's pose and depth scale that bring the seen faces of `boxes` home, near to what it was told.
 
-    Without boxes the camera is taken to be where it was told, exactly: poses then stand in its own frame.
+    Without boxes the camera is taken to be where it was told, exactly: poses then stand in its own frame, and its scale
+    stays as uncertain as it was.
     """
     if not boxes:
-        return Registration(world_from_camera, 1.0, np.zeros((7, 7)))
+        return Registration(world_from_camera, 1.0, np.diag([0.0] * 6 + [errors.scale**2]))
     k = subsampled(frame.intrinsics, STEP)
     depth = frame.depth[::STEP, ::STEP].reshape(-1)
     usable = np.isfinite(depth) & (depth > 0)

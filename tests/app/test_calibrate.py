@@ -52,6 +52,7 @@ def test_rendered_boards_are_compared_with_what_is_true(tmp_path: Path) -> None:
     file = load_calibration(tmp_path / "rear.yaml")
     true = Intrinsics.from_fov(848, 480, float(np.deg2rad(65.0)))
     assert file.intrinsics.fx == pytest.approx(true.fx, rel=0.005)
+    assert file.rms is not None
     assert file.rms < 0.3
     assert len(list((tmp_path / "drawn").glob("*.png"))) >= 5
     first = (tmp_path / "rear.yaml").read_bytes()
