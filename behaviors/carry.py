@@ -12,7 +12,7 @@ from motion.failure import PlanningError
 from motion.kinematics import ArmKinematics
 from motion.straight import straight_line
 from perception.estimate import Estimate
-from perception.mean_pose import mean_pose
+from perception.fusion import fuse
 
 # m before the clip along the hand's own axis, from where it goes straight in; more would press the cable
 BEFORE = 0.025
@@ -88,8 +88,8 @@ class Insert(HandLeaf):
         if not long or belief.held is None:
             self.say("the hand hides the connector", frames=len(seen))
             return
-        pose, whole = mean_pose(long)
-        found = self.services.motion.tool(HAND).inv() * pose
+        mean = fuse(long)
+        found, whole = self.services.motion.tool(HAND).inv() * mean.world_from_connector, mean.whole
         # The fingers hide the cable's side: unless an end shows, where the part lies on the length is a guess.
         if not whole:
             found = _turned_in_the_jaw(belief.held, found)

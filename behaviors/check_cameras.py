@@ -5,7 +5,7 @@ from typing import Any, ClassVar
 from behaviors.leaf import Failed, Port, Steps, StepsLeaf
 from interfaces.cause import CauseCode
 from perception.estimate import Estimate
-from perception.mean_pose import mean_pose
+from perception.fusion import fuse
 
 
 class CheckCameras(StepsLeaf):
@@ -32,6 +32,7 @@ class CheckCameras(StepsLeaf):
         health = perception.track.check(clock.now())
         if not (health.ok and seen):
             raise Failed(CauseCode.CONNECTOR_NOT_FOUND, health.reason)
-        self.services.belief.connector, self.services.belief.sure = mean_pose(list(seen.values()))
-        self.services.belief.found_by, self.services.belief.vain_searches = "rear", 0
-        self.say("found", camera="rear", position=self.services.belief.connector.translation.round(4).tolist())
+        found, belief = fuse(list(seen.values())), self.services.belief
+        belief.connector, belief.sure = found.world_from_connector, found.whole
+        belief.found_by, belief.vain_searches = "rear", 0
+        self.say("found", camera="rear", position=found.position.round(4).tolist())

@@ -8,7 +8,7 @@ from behaviors.leaf import Steps
 from behaviors.look import LookLeaf
 from motion.failure import PlanningError
 from perception.estimate import Estimate
-from perception.mean_pose import mean_pose
+from perception.fusion import fuse
 
 LOOK_SECONDS = 0.8
 LOOKS = 2  # from two sides: what one look takes for an obstacle's inside, the other looks through
@@ -40,7 +40,8 @@ class LookCloser(LookLeaf):
                 continue
             whole += [e for e in seen if e.whole]
             if seen:
-                belief.connector, belief.sure = mean_pose(whole or seen)
+                found = fuse(whole or seen)
+                belief.connector, belief.sure = found.world_from_connector, found.whole
                 belief.found_by = "wrist"
                 self.say("looked closer", position=belief.connector.translation.round(4).tolist(), sure=belief.sure)
         yield from self.go_to_sleep(EYE)

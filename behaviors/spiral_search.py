@@ -15,7 +15,7 @@ from interfaces.cell import FixedMount
 from motion.failure import PlanningError
 from motion.viewpoints import Stop, spiral
 from perception.estimate import Estimate
-from perception.mean_pose import mean_pose
+from perception.fusion import fuse
 
 DISTANCE = (
     0.25  # m from the plane through the start: at 0.30 the left arm reaches fewer of the first stops (6 of 9, not 9)
@@ -59,9 +59,10 @@ class SpiralSearch(LookLeaf):
                 continue
             looked += 1
             if len(seen) >= ENOUGH:
-                belief.connector, belief.sure = mean_pose(seen)
+                found = fuse(seen)
+                belief.connector, belief.sure = found.world_from_connector, found.whole
                 belief.found_by, belief.vain_searches = "wrist", 0
-                position = belief.connector.translation.round(4).tolist()
+                position = found.position.round(4).tolist()
                 self.say("found", camera="wrist", stop=stop.index, looked=looked, skipped=skipped, position=position)
                 return
         belief.vain_searches += 1
