@@ -20,6 +20,7 @@ LETTERS, LETTER, LINE = 0.5, 9, 22  # OpenCV's size of the letters; pixels of a 
 BRIGHT, DARK, ARROW = (90, 255, 90), (0, 40, 0), (255, 240, 60)  # RGB; choice: bright in dark edging shows on anything
 ON_RIM = np.linspace(0.0, 2.0 * np.pi, 48, endpoint=False)  # rad: points of an end's circle
 FINE = 4  # bits of a pixel's fraction
+HEAD = 0.12  # of the arrow's length; choice: within the outline of a connector four times as long as thick
 BEYOND = 20_000.0  # pixels; what is further off is not drawn
 
 
@@ -86,6 +87,6 @@ def _arrow(image: NDArray[np.uint8], scale: int, intrinsics: Intrinsics, ends: F
     if pixels is not None:
         start, tip = pixels.tolist()
         for color, thickness in ((DARK, 4), (ARROW, 2)):
-            cv2.arrowedLine(image, start, tip, color, thickness, cv2.LINE_AA, FINE, 0.2)
+            cv2.arrowedLine(image, start, tip, color, thickness, cv2.LINE_AA, FINE, HEAD)
             if both_ways:
-                cv2.arrowedLine(image, tip, start, color, thickness, cv2.LINE_AA, FINE, 0.2)
+                cv2.arrowedLine(image, tip, start, color, thickness, cv2.LINE_AA, FINE, HEAD)
