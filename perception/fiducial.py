@@ -32,6 +32,7 @@ PATCH = 50.0  # pixels an independent reading; choice: a stereo matching window 
 MIN_READINGS = 20
 SIZE_ERROR = 0.05  # choice: two deviations of the depth's scale, 3 %, and as much again for the size
 TURN = 1.0  # rad; choice: what is known of the tilt beforehand, which a frontal view hardly shows
+EXACT = CameraErrors(0.0, 0.0, 0.0)  # without known boxes poses stand in the camera's own frame, as in `register`
 CROSSES = np.cross(np.eye(3)[:, None], np.eye(3))  # (3, 3, 3): the products of the unit vectors
 
 
@@ -61,6 +62,7 @@ class Fiducial:
             raise ValueError("the cell's connector has no tag; give known.connector.tag, as the cell thesis_tags does")
         self._connector, self._clip = known.connector, known.clip
         self._carried = {c.name for c in known.cameras if isinstance(c.mount, WristMount)}
+        self._in_cell = bool(known.boxes)
 
     def estimate(
         self,
@@ -102,7 +104,8 @@ class Fiducial:
         found = find_tag(frame, body.tag, seen_near)
         if isinstance(found, NoEstimate):
             return found
-        return _in_world(found, world_from_camera, CARRIED if frame.camera in self._carried else FIXED)
+        errors = (CARRIED if frame.camera in self._carried else FIXED) if self._in_cell else EXACT
+        return _in_world(found, world_from_camera, errors)
 
 
 def find_tag(frame: RgbdFrame, tag: Tag, near: FloatArray | None = None) -> TagPose | NoEstimate:
