@@ -1,21 +1,18 @@
 """The pose study with both cameras: after the rear camera's look, the left arm brings its own to the best view."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
 from scipy.spatial.transform import RigidTransform
 
 from app.pose_grasp import done, grasp, services_of
 from app.pose_scenes import Scene
-from app.pose_trial import MEAN_SECONDS, Looked, Setup, Trial, look, looked, mean, measured
+from app.pose_trial import MEAN_SECONDS, Looked, Setup, Trial, look, looked, measured
 from behaviors.hand import EYE
 from behaviors.leaf import Steps
 from behaviors.look import LOOK_MARGIN, LookLeaf
 from behaviors.services import Services
 from behaviors.start_up import StartUp
-from interfaces.cell import pose_along
-from perception.estimate import Estimate
+from perception.fusion import fuse
 from perception.technique import Technique
 
 BOTH = "both cameras"  # what stands behind the technique's name
@@ -76,22 +73,4 @@ def _with_wrist(scene: Scene, services: Services, technique: Technique, rear: Lo
     wrist = looked(technique, frames, pose, scene.truth.connector_pose())
     if not wrist.estimates:
         return rear.world_from_connector, f"wrist camera: {wrist.why}"
-    return merged([rear.estimates, wrist.estimates]), ""
-
-
-def merged(looks: Sequence[Sequence[Estimate]]) -> RigidTransform:
-    """world_from_connector by several looks, each the mean of its estimates and weighed by its mean covariance.
-
-    Frames of one look share the errors that matter, so that their number adds no weight.
-    """
-    means = [mean(seen) for seen in looks]
-    covariances = [np.mean([e.covariance for e in seen], axis=0) for seen in looks]
-    weights = [np.linalg.inv(c[:3, :3]) for c in covariances]
-    total = sum(w @ m.translation for w, m in zip(weights, means, strict=True))
-    x, y, z = np.linalg.solve(np.sum(weights, axis=0), total).tolist()
-    axes = np.array([m.rotation.apply([1.0, 0.0, 0.0]) for m in means])
-    # The turns across the axis alone: those about it, of which nothing is known, are the largest eigenvalue.
-    sure = np.array([1.0 / np.linalg.eigvalsh(c[3:, 3:])[:2].sum() for c in covariances])
-    line = (sure * np.where(axes @ axes[np.argmax(sure)] >= 0, 1.0, -1.0)) @ axes
-    ax, ay, az = line.tolist()
-    return pose_along((x, y, z), (ax, ay, az))
+    return fuse([*rear.estimates, *wrist.estimates]).world_from_connector, ""

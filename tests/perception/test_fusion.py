@@ -152,6 +152,14 @@ def test_a_camera_that_sees_along_the_axis_is_helped_by_one_that_sees_it_from_th
     assert fused.camera == "rear, wrist"
 
 
+def test_many_frames_of_a_worse_camera_do_not_outweigh_a_better_one() -> None:
+    away = np.array([0.0, 0.006, 0.0])
+    sure = estimate(covariance=pose_covariance(LEFT, 0.001, 0.01))
+    unsure = estimate(PLACE + away, LEFT, "wrist", pose_covariance(LEFT, 0.002, 0.03))
+    fused = fuse([sure] + [unsure] * 40)
+    assert fused.position == pytest.approx(PLACE + 0.24 * away, abs=1e-4)  # variances 1 and 4 times 0.8
+
+
 @pytest.mark.parametrize("cameras", [("rear",), ("rear", "wrist")])
 @pytest.mark.parametrize("frames", [1, 2, 12])
 def test_the_truth_lies_in_the_stated_regions_as_often_as_they_say(cameras: tuple[str, ...], frames: int) -> None:
