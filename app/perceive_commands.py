@@ -35,7 +35,7 @@ def perceive(
         list[Path] | None,
         typer.Option(metavar="FILE", help="Depth aligned to colour, 16-bit PNG or .npy; one a picture."),
     ] = None,
-    technique: Annotated[str, typer.Option(help="Such as rgbd, fiducial or fused.")] = "fused",
+    technique: Annotated[str, typer.Option(help="One of rgbd, fiducial, detector, fused.")] = "fused",
     draw: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the result on the first picture.")] = None,
     depth_unit: Annotated[
         float, typer.Option(min=1e-6, max=1.0, help="Metres that a whole number of depth counts.")
@@ -68,10 +68,12 @@ def perceive(
       regrasp perceive --rgb a.png --depth a.npy --rgb b.png --depth b.npy --intrinsics my_camera.yaml
       regrasp perceive --technique fiducial --cell thesis_tags --rgb photo.jpg --intrinsics my_camera.yaml
 
-    Metres, radians; quaternions x, y, z, w. The connector's x axis leads from the cable to the tip; covariance is that
-    of position, then of a small turn. Several pictures of a connector that lies still give one pose together, and each
-    its own. Poses are in the camera's frame (x right, y down, z forward), unless --camera or --camera-pose say where it
-    stands in the cell's world: then `fused` also sets the camera right by the cell's floor and panels.
+    Metres, radians; quaternions x, y, z, w. The connector's x axis leads from the cable to the tip; sign_seen says that
+    the picture tells which end is which. covariance is that of position, then of a small turn; extent the length in
+    sight; whole says that position is the whole connector's middle, and not that of the part in sight. Several pictures
+    of a connector that lies still give one pose together, and each its own. Poses are in the camera's frame (x right, y
+    down, z forward), unless --camera or --camera-pose say where it stands in the cell's world: then `fused` also sets
+    the camera right by the cell's floor and panels.
 
     An intrinsics file is what `regrasp calibrate` writes: width, height, fx, fy, cx, cy (pixels) and, if you like,
     distortion: [k1, k2, p1, p2, k3]. A camera pose file holds position: [x, y, z] and quaternion: [x, y, z, w] of the
@@ -94,7 +96,13 @@ def perceive(
     known = load_cell(resolve("cell", cell, Path())).known
     given = {"color": tint, "length": length, "radius": radius}
     told = {key: value for key, value in given.items() if value is not None}
-    known = known.model_copy(update={"connector": known.connector.model_copy(update=told)})
+    connector = known.connector.model_copy(update=told)
+    if 2 * connector.radius >= connector.length:
+        message = (
+            f"a connector {connector.length:g} m long and {2 * connector.radius:g} thick; one is longer than thick"
+        )
+        raise Findings([Finding("--radius", 1, message)])
+    known = known.model_copy(update={"connector": connector})
     from app import perceive as steps  # brings OpenCV and the compiler
 
     files = [steps.Files(*each) for each in zip(rgb, depths, models, cameras, poses, strict=True)]

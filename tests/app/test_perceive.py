@@ -200,6 +200,7 @@ def test_bad_options_are_findings(shots: Shots) -> None:
     assert "is no colour; write three numbers" in finding(*files, "--color", "red")
     assert "is grey" in finding(*files, "--color", "90,90,90")
     assert "no cell named 'thesi'" in finding(*files, "--cell", "thesi")
+    assert "0.09 m long and 0.1 thick" in finding(*files, "--radius", "0.05")
     depths = ["--depth", shots.folder / "depth_1.png"]
     assert "--depth:1: given 2 times for 1 pictures; give one for each" in finding(*files, *depths)
     assert invoke(*files, "--length", "0").exit_code == 2
@@ -292,3 +293,8 @@ def test_snapshot_gives_what_perceive_takes(tmp_path: Path) -> None:
     wrong = CliRunner().invoke(app, ["snapshot", "no_obstacle", "--camera", "read", "--out", str(tmp_path)])
     assert wrong.exit_code == 2
     assert "did you mean 'rear'?" in wrong.output
+
+
+def test_help_names_every_technique() -> None:
+    told = invoke("--help").output
+    assert all(name in told for name in TECHNIQUES)
