@@ -216,7 +216,7 @@ def _nearest_on_ray(
     slope = ray[0] * axis[0] + ray[1] * axis[1] + ray[2] * axis[2]
     start = center[0] * axis[0] + center[1] * axis[1] + center[2] * axis[2]
     middle = (out - slope * start) / max(1.0 - slope * slope, 1e-3)
-    if abs(middle * slope - start) < half - radius:
+    if slope * slope < 0.999 and abs(middle * slope - start) < half - radius:
         return distance(middle * ray[0], middle * ray[1], middle * ray[2], center, axis, radius, half)[0], middle
     low, high = out - half - radius, out + half + radius
     first, second = high - _GOLD * (high - low), low + _GOLD * (high - low)

@@ -47,7 +47,7 @@ def outline(mask: NDArray[np.bool_], depth: NDArray[np.float32], shift: float) -
         steps = np.array(LOOK_OUT)[:, None]
         out = np.clip(b + steps * dv, 0, height - 1), np.clip(a + steps * du, 0, width - 1)
         beyond, z = readings[out].min(axis=0), own[b, a]
-        shadow = gap[out][0] <= shift * (1.0 / z - 1.0 / behind[out][0]) + SHADOW_SLACK
+        shadow = (du <= 0) & (gap[out][0] <= shift * (1.0 / z - 1.0 / behind[out][0]) + SHADOW_SLACK)
         covered.append((beyond < z - NEARER) | (np.isinf(beyond) & ~shadow))
         pixels.append(np.column_stack([a + du / 2, b + dv / 2]))
     return Outline(np.concatenate(pixels), np.concatenate(covered))

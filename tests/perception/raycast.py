@@ -1,5 +1,6 @@
-"""A tiny analytic ray caster: RGB and depth of cylinders and boxes, with a stereo camera's noise."""
+"""A tiny analytic ray caster: RGB and depth of cylinders, balls and boxes, with a stereo camera's noise."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import cv2
@@ -48,6 +49,20 @@ class Cylinder:
 
 
 @dataclass(frozen=True, eq=False)
+class Ball:
+    center: NDArray[np.float64]
+    radius: float
+    color: tuple[float, float, float] = RED
+
+    def hit(self, o: Image, d: Image) -> tuple[Image, Image]:
+        m = o - self.center
+        a, b, c = (d * d).sum(1), d @ m, float(m @ m) - self.radius**2
+        root = np.sqrt(np.maximum(b * b - a * c, 0.0))
+        t = np.where((b * b > a * c) & (b < -root), (-b - root) / a, np.inf)
+        return t, (m + np.where(np.isfinite(t), t, 0.0)[:, None] * d) / self.radius
+
+
+@dataclass(frozen=True, eq=False)
 class Block:
     lower: NDArray[np.float64]
     upper: NDArray[np.float64]
@@ -84,7 +99,11 @@ IDEAL = Sensor(subpixel=0.0, gray_noise=0.0, shadow=False, flying=False)
 
 
 def render(
-    things: list[Cylinder | Block], world_from_camera: RigidTransform, k: Intrinsics, sensor: Sensor, seed: int
+    things: Sequence[Cylinder | Block | Ball],
+    world_from_camera: RigidTransform,
+    k: Intrinsics,
+    sensor: Sensor,
+    seed: int,
 ) -> RgbdFrame:
     rng = np.random.default_rng(seed)
     u, v = np.meshgrid(np.arange(k.width), np.arange(k.height))
