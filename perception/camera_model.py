@@ -9,6 +9,8 @@ from interfaces.frame import Intrinsics
 
 FloatArray = NDArray[np.float64]
 
+NEAREST, FURTHEST = 0.01, 50.0  # m; choice: no such camera measures nearer or further, RealSense 0.2 to 10
+
 
 @lru_cache(maxsize=8)  # a pure function of a value; the two cameras and their subsampled images use four entries
 def rays(intrinsics: Intrinsics) -> NDArray[np.float32]:
@@ -25,7 +27,7 @@ def deproject(depth: NDArray[np.float32], mask: NDArray[np.bool_], intrinsics: I
     """Points (n, 3) m in the optical frame of those pixels of `mask` (H, W) whose `depth` (H, W) m is a reading."""
     pixels = np.flatnonzero(mask)
     z = depth.reshape(-1)[pixels]
-    valid = np.isfinite(z) & (z > 0)
+    valid = (z > NEAREST) & (z < FURTHEST)  # false for NaN
     return (rays(intrinsics).reshape(-1, 3)[pixels[valid]] * z[valid, None]).astype(np.float64)
 
 

@@ -42,13 +42,14 @@ PROMISING = (8, 3)  # starts that are fitted roughly, rough fits that are fitted
 ALIKE, ALIKE_COSINE = 0.02, 0.94  # m, and of 20 degrees: fits so near to each other end alike
 MISSING_COST = 100.0  # of a whole axis that should show: what is not there weighs like twenty points off
 DOUBT = 3.0  # of cost that makes another fit e times less likely; 1 by theory, whose noise has no outliers
+BEFORE = 0.5  # of the radius; choice: midway between the body's surface and its axis
 END = 0.004  # m: outline points so near to an end belong to it
 END_EDGES = 4  # of them show that the end is in sight
 # Refused is what does not fit. Of 140 renders in all poses, up to 70 % hidden, 139 stay within all of these.
 MAX_EDGE_MISS = 0.5  # pixels, median over the outline
 MAX_STRAY = 0.3  # share of the outline that lies more than a pixel off: a cable before it makes as much
 MAX_MIDDLE_MISS, MAX_FAR_MISS = 1.2, 2.2  # deviations of depth: median, and 80th percentile
-MAX_MISSING = 0.25  # share of the axis that should show and does not
+MAX_MISSING = 0.15  # share of the axis that should show and does not; a shorter rod of 7 cm misses a tenth
 
 
 @dataclass(frozen=True)
@@ -255,7 +256,8 @@ def _missing(patch: _Patch, found: Fit, connector: Connector) -> float:
     inside = np.all((pixels >= 0) & (pixels < [patch.mask.shape[1], patch.mask.shape[0]]), axis=1)
     u, v = pixels[inside].T
     reading = patch.depth[v, u]
-    open_to_view = reading > points[inside, 2]
+    # The body shows a radius before its axis or more, a cable that goes on from a shorter rod does not.
+    open_to_view = reading > points[inside, 2] - BEFORE * connector.radius
     return float(np.count_nonzero(open_to_view & ~patch.mask[v, u])) / len(along)
 
 

@@ -25,6 +25,7 @@ class Rgbd:
 
     def __init__(self, known: KnownCell) -> None:
         self._parameters = SegmentationParameters.for_color(known.connector.color)
+        self._length = known.connector.length
 
     def estimate(
         self,
@@ -48,7 +49,8 @@ class Rgbd:
         position, way = world_from_camera.apply(n_mean(points)), world_from_camera.rotation.apply(here)
         way *= 1.0 if way @ (LEFT if axis is None else axis) >= 0 else -1.0
         pose = RigidTransform.from_components(position, rotation_about(way, world_from_camera.rotation))
-        spread = pose_covariance(way, POSITION_DEVIATION, ANGLE_DEVIATION)
+        too_long = extent - self._length  # what shows more than the connector is that much in doubt
+        spread = pose_covariance(way, max(POSITION_DEVIATION, too_long), ANGLE_DEVIATION)
         return Estimate(
             frame.stamp, frame.camera, position, way, pose, spread, len(points), found.area, extent, whole=False
         )

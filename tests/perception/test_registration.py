@@ -79,7 +79,7 @@ def test_a_frame_that_shows_no_face_leaves_what_was_expected(known: KnownCell, n
 
 def test_one_panel_alone_tells_no_shift_along_it(known: KnownCell) -> None:
     back = [box for box in known.boxes if box.name == "back_panel"]
-    shifted = RigidTransform.from_components(REAR_POSE.translation + [0.0, 0.004, 0.0], REAR_POSE.rotation)
+    shifted = RigidTransform.from_components(REAR_POSE.translation + np.array([0.0, 0.004, 0.0]), REAR_POSE.rotation)
     frame = seen(blocks(back), PLACE, Sensor(), 0, shifted)
     found = register(frame, REAR_POSE, back, FIXED)
     deviation = np.sqrt(np.diag(found.covariance))
@@ -89,7 +89,7 @@ def test_one_panel_alone_tells_no_shift_along_it(known: KnownCell) -> None:
 
 def test_a_carried_camera_may_be_turned_further(known: KnownCell) -> None:
     turned = Rotation.from_rotvec([0.012, -0.01, 0.015]) * REAR_POSE.rotation
-    camera = RigidTransform.from_components(REAR_POSE.translation + [0.006, -0.008, 0.005], turned)
+    camera = RigidTransform.from_components(REAR_POSE.translation + np.array([0.006, -0.008, 0.005]), turned)
     frame = seen(blocks(known.boxes), PLACE, Sensor(), 0, camera)
     before = np.linalg.norm(miss(register(frame, REAR_POSE, (), CARRIED), camera, 1.0))
     after = np.linalg.norm(miss(register(frame, REAR_POSE, known.boxes, CARRIED), camera, 1.0))
