@@ -4,7 +4,6 @@ import io
 import statistics
 import time
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import cv2
@@ -12,7 +11,7 @@ import numpy as np
 import py_trees
 from numpy.typing import NDArray
 from py_trees.parsers.behaviour_tree_xml import parse_behaviour_tree_xml
-from scipy.spatial.transform import Rotation
+from scipy.spatial.transform import RigidTransform, Rotation
 
 from app.attempts import Attempts
 from app.resources import shipped
@@ -20,12 +19,14 @@ from app.scenario_file import load_cell, load_scenario
 from app.table import print_table
 from app.tick_log import TickLog
 from behaviors import LEAVES
-from interfaces.cell import TAG_DICTIONARY
+from interfaces.cell import TAG_DICTIONARY, Cell
 from interfaces.frame import RgbdFrame
 from perception.detector import Detector, fitted, shipped_network
 from perception.estimate import NoEstimate
+from perception.fused import Fused
+from perception.registration import FIXED, register
 from perception.rgbd_pose import Rgbd
-from perception.segmentation import SegmentationParameters
+from perception.segmentation import SegmentationParameters, color_mask
 from perception.technique import make_technique
 from sim.cable import spring_torques
 from sim.renderer import make_renderer
@@ -47,11 +48,12 @@ def main() -> None:
             "tick of the recovery tree with logs / bare": ticks(),
             "cable torques by numba / numpy and scipy": springs(scenario.cell.hidden.cable.links),
             f"848x480 picture by {world.renderer.name} / TinyRenderer": pictures(world),
-            "colour and depth to pose / bare OpenCV calls": poses(world),
+            **looks(scenario.cell, 848),
+            **looks(scenario.cell, 640),
             "848x480 tag to pose / bare OpenCV calls": tags(848),
             "640x480 tag to pose / bare OpenCV calls": tags(640),
-            "848x480 to pose by detector / its network's bare forward": detections(world, 848),
-            "640x480 to pose by detector / its network's bare forward": detections(world, 640),
+            "848x480 to pose by detector / its network's bare forward": detections(scenario.cell, 848),
+            "640x480 to pose by detector / its network's bare forward": detections(scenario.cell, 640),
         }
         print_table(("pair", "ours ms", "other ms", "ratio"), [_line(name, *pair) for name, pair in rows.items()])
     finally:
@@ -130,13 +132,17 @@ def pictures(world: World) -> tuple[Call, Call]:
     return lambda: draw(world.renderer), lambda: draw(tiny)
 
 
-def first_frame(world: World) -> RgbdFrame:
-    """The rear camera's."""
+def rear_frame(cell: Cell, width: int) -> tuple[RgbdFrame, RigidTransform]:
+    """The rear camera's first frame with `width` x 480 pixels, and its pose as the robot believes it."""
+    spec = cell.known.camera("rear").model_copy(update={"width": width})
+    cameras = (spec, cell.known.camera("wrist"))
+    world = World(cell.model_copy(update={"known": cell.known.model_copy(update={"cameras": cameras})}), "zero", 0)
     frame = world.cameras["rear"].latest()
     while frame is None:
         world.advance(0.05)
         frame = world.cameras["rear"].latest()
-    return frame
+    world.close()
+    return frame, spec.mount.world_from_camera  # type: ignore[union-attr]
 
 
 def tags(width: int) -> tuple[Call, Call]:
@@ -145,12 +151,8 @@ def tags(width: int) -> tuple[Call, Call]:
     That is the search, the fit of the edges, and both poses.
     """
     cell = load_cell(shipped("cell")["thesis_tags"])
-    spec = cell.known.camera("rear").model_copy(update={"width": width})
-    cameras = (spec, cell.known.camera("wrist"))
-    world = World(cell.model_copy(update={"known": cell.known.model_copy(update={"cameras": cameras})}), "zero", 0)
-    frame = first_frame(world)
-    world.close()
-    technique, pose = make_technique("fiducial", cell.known), spec.mount.world_from_camera  # type: ignore[union-attr]
+    frame, pose = rear_frame(cell, width)
+    technique = make_technique("fiducial", cell.known)
     dictionary, fitting = (
         cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, TAG_DICTIONARY)),
         cv2.aruco.DetectorParameters(),
@@ -176,42 +178,46 @@ def tags(width: int) -> tuple[Call, Call]:
     return lambda: technique.estimate(frame, pose), bare
 
 
-def poses(world: World) -> tuple[Call, Call]:
-    """The connector's pose from a rear frame, and OpenCV's own share of it: colour space, range, dilate, contours."""
-    image, known = first_frame(world), world.cell.known
-    world_from_camera = known.camera("rear").mount.world_from_camera  # type: ignore[union-attr]
-    spans = SegmentationParameters.for_color(known.connector.color).ranges()
-    kernel = np.ones((3, 3), np.uint8)
+def looks(cell: Cell, width: int) -> dict[str, tuple[Call, Call]]:
+    """The connector's pose from a rear frame of `width` x 480 pixels, and stages of it; OpenCV's own share of each.
+
+    That is colour space, ranges and contours.
+    """
+    frame, pose = rear_frame(cell, width)
+    known, color = cell.known, SegmentationParameters.for_color(cell.known.connector.color)
+    spans = color.ranges()
 
     def bare() -> Any:
-        hsv = cv2.cvtColor(image.rgb, cv2.COLOR_RGB2HSV)
+        hsv = cv2.cvtColor(frame.rgb, cv2.COLOR_RGB2HSV)
         masks = [cv2.inRange(hsv, low, high) for low, high in spans]
-        mask = cv2.dilate(masks[0] if len(masks) == 1 else cv2.bitwise_or(*masks), kernel)
+        mask = masks[0] if len(masks) == 1 else cv2.bitwise_or(*masks)
         return cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
 
-    technique = Rgbd(known)
-    assert not isinstance(technique.estimate(image, world_from_camera), NoEstimate)
-    return lambda: technique.estimate(image, world_from_camera), bare
+    rgbd, fused = Rgbd(known), Fused(known)
+    unregistered = Fused(known.model_copy(update={"boxes": ()}))
+    assert not any(isinstance(t.estimate(frame, pose), NoEstimate) for t in (rgbd, fused, unregistered))
+    ours: dict[str, Call] = {
+        "rgbd": lambda: rgbd.estimate(frame, pose),
+        "fused": lambda: fused.estimate(frame, pose),
+        "fused, the colour's mask": lambda: color_mask(frame.rgb, color),
+        "fused, the camera registered": lambda: register(frame, pose, known.boxes, FIXED),
+        "fused, all but registered": lambda: unregistered.estimate(frame, pose),
+    }
+    return {f"{width}x480 {name} / bare OpenCV calls": (call, bare) for name, call in ours.items()}
 
 
-def detections(world: World, width: int) -> tuple[Call, Call]:
-    """The connector's pose by the network from the middle `width` columns of a rear frame, and the network alone."""
-    frame, known = first_frame(world), world.cell.known
-    world_from_camera = known.camera("rear").mount.world_from_camera  # type: ignore[union-attr]
-    first = (frame.intrinsics.width - width) // 2
-    k = replace(frame.intrinsics, width=width, cx=frame.intrinsics.cx - first)
-    there = slice(first, first + width)
-    rgb, depth = np.ascontiguousarray(frame.rgb[:, there]), np.ascontiguousarray(frame.depth[:, there])
-    image, detector = replace(frame, rgb=rgb, depth=depth, intrinsics=k), Detector(known)
+def detections(cell: Cell, width: int) -> tuple[Call, Call]:
+    """The connector's pose by the network from a rear frame of `width` x 480 pixels, and the network alone."""
+    (frame, pose), detector = rear_frame(cell, width), Detector(cell.known)
     network = cv2.dnn.readNetFromONNX(np.frombuffer(shipped_network(), np.uint8))
-    blob = cv2.dnn.blobFromImage(fitted(rgb)[0], 1 / 255)
+    blob = cv2.dnn.blobFromImage(fitted(frame.rgb)[0], 1 / 255)
 
     def bare() -> Any:
         network.setInput(blob)
         return network.forward()
 
-    assert not isinstance(detector.estimate(image, world_from_camera), NoEstimate)
-    return lambda: detector.estimate(image, world_from_camera), bare
+    assert not isinstance(detector.estimate(frame, pose), NoEstimate)
+    return lambda: detector.estimate(frame, pose), bare
 
 
 if __name__ == "__main__":

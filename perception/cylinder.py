@@ -63,23 +63,23 @@ def fit(
     What is more than `fade` deviations off counts little.
     """
     center, axis = np.ascontiguousarray(center, float), np.ascontiguousarray(axis, float)
-    center, axis, cost, hessian, tilts = _fit(
-        sight.points,
-        sight.deviations,
-        sight.rays,
-        sight.widths,
-        sight.inside,
-        sight.point_share,
-        sight.ray_share,
-        center,
-        axis,
-        radius,
-        length / 2,
-        fade,
-        steps,
+    return Fit(
+        *_fit(
+            sight.points,
+            sight.deviations,
+            sight.rays,
+            sight.widths,
+            sight.inside,
+            sight.point_share,
+            sight.ray_share,
+            center,
+            axis,
+            radius,
+            length / 2,
+            fade,
+            steps,
+        )
     )
-    covariance = np.linalg.inv(hessian + np.diag(1.0 / np.array([length] * 3 + [1.0] * 2) ** 2))
-    return Fit(center, axis, float(cost), covariance, tilts)
 
 
 def thinned(sight: Sight, count: int) -> Sight:
@@ -366,4 +366,6 @@ def _fit(
             damping *= 8.0
             if damping > 1e6:
                 break
-    return center, axis, cost, hessian, tilts
+    for k in range(5):
+        hessian[k, k] += 0.25 / half**2 if k < 3 else 1.0
+    return center, axis, cost, np.linalg.inv(hessian), tilts

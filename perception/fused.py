@@ -15,7 +15,7 @@ from scipy.spatial.transform import RigidTransform
 from interfaces.cell import CameraSpec, Connector, KnownCell, WristMount, pose_along
 from interfaces.frame import Intrinsics, RgbdFrame
 from perception.cable_end import cable_leaves
-from perception.camera_model import project
+from perception.camera_model import FURTHEST, NEAREST, project
 from perception.cylinder import COARSE, FINE, Fit, Sight, depth_misses, fit, nearest_on_rays, thinned
 from perception.estimate import LEFT, ROLL_VARIANCE, Estimate, NoEstimate
 from perception.outline import outline
@@ -34,15 +34,17 @@ QUANTUM = 0.0003  # m: deviation of a reading rounded to millimetres
 INDEPENDENT_AREA = 50.0  # pixels an independent reading; choice: a stereo matching window of some 8 pixels
 EDGE_WIDTH = 0.5  # pixels: deviation of an outline point
 EDGE_SHARE = 0.25  # of the outline's points count as independent: neighbours are rounded alike
-POINTS, EDGES = 300, 160  # at most, for speed
+POINTS, EDGES = 200, 160  # at most, for speed; neighbouring readings err alike, more change no result
 SIDE_SEEN = 2.0  # choice: a patch so many times longer than wide shows which way the axis runs in the image
 TILTS = np.deg2rad([-80.0, -65.0, -40.0, 0.0, 40.0, 65.0, 80.0])  # of the starts, out of the image: noise tilts a stub
+TURNS = np.deg2rad([0.0, 45.0, 90.0, 135.0])  # of the starts, in the image, where the patch does not show it
 ROUGH_COUNT, ROUGH_STEPS = 50, 6  # points and outline points of rough fits, and their steps
-PROMISING = (8, 3)  # starts that are fitted roughly, rough fits that are fitted in full
+PROMISING = (10, 4)  # starts that are fitted roughly, rough fits that are fitted in full
 ALIKE, ALIKE_COSINE = 0.02, 0.94  # m, and of 20 degrees: fits so near to each other end alike
 MISSING_COST = 100.0  # of a whole axis that should show: what is not there weighs like twenty points off
 DOUBT = 3.0  # of cost that makes another fit e times less likely; 1 by theory, whose noise has no outliers
-BEFORE = 0.5  # of the radius; choice: midway between the body's surface and its axis
+BEFORE = 0.7  # of the radius before the axis; choice: between what touches the body there and the surface of a cable
+HOPELESS = 4.0  # choice: a fit so many times worse than the best is no doubt, and not worth more steps
 END = 0.004  # m: outline points so near to an end belong to it
 END_EDGES = 4  # of them show that the end is in sight
 # Refused is what does not fit. Of 140 renders in all poses, up to 70 % hidden, 139 stay within all of these.
@@ -108,21 +110,23 @@ class Fused:
         near: FloatArray | None = None,
     ) -> Estimate | NoEstimate:
         """See `Technique.estimate`."""
-        masks = _patches(color_mask(frame.rgb, self._color))
-        if not masks:
+        patches = _patches(color_mask(frame.rgb, self._color))
+        if not patches:
             message = f"no patch of {MIN_AREA} pixels has the connector's colour"
             return NoEstimate(frame.stamp, frame.camera, NotSeen.NO_COLOR, message)
         errors = CARRIED if frame.camera in self._carried else FIXED
         camera = register(frame, world_from_camera, self._boxes, errors)
-        results = [self._find(frame, mask, camera.scale) for mask in masks]
+        results = [self._find(frame, *patch, camera.scale) for patch in patches]
         found = [r for r in results if isinstance(r, _Found)]
         if not found:
             reason, message = next(r for r in results if not isinstance(r, _Found))
             return NoEstimate(frame.stamp, frame.camera, reason, message)
         return _estimate(frame, camera, _choose(found, camera, near), axis)
 
-    def _find(self, frame: RgbdFrame, mask: Mask, scale: float) -> _Found | tuple[NotSeen, str]:
-        patch = _look(frame, mask, scale, self._stereo.get(frame.camera, D415))
+    def _find(
+        self, frame: RgbdFrame, mask: Mask, window: tuple[slice, slice], scale: float
+    ) -> _Found | tuple[NotSeen, str]:
+        patch = _look(frame, mask, window, scale, self._stereo.get(frame.camera, D415))
         readings, edges = len(patch.sight.points), int(np.count_nonzero(~patch.sight.inside))
         if readings < MIN_READINGS:
             return NotSeen.NO_DEPTH, f"{readings} depth readings on {patch.area} pixels, {MIN_READINGS} are needed"
@@ -139,27 +143,27 @@ class Fused:
         return _Found(patch, _doubted(best, others), whole, sign)
 
 
-def _patches(binary: NDArray[np.uint8]) -> list[Mask]:
-    """The largest patches of a colour mask (H, W), each as a mask of its own, largest first."""
+def _patches(binary: NDArray[np.uint8]) -> list[tuple[Mask, tuple[slice, slice]]]:
+    """The largest patches of a colour mask (H, W), largest first: each alone in a window (h, w), and the window."""
     contours, _ = cv2.findContours(binary, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-    masks = []
+    patches = []
     for contour in sorted(contours, key=cv2.contourArea, reverse=True)[:PATCHES]:
-        filled = np.zeros_like(binary)
-        cv2.drawContours(filled, [contour], -1, 255, cv2.FILLED)
-        cv2.bitwise_and(filled, binary, dst=filled)
+        u, v, width, height = cv2.boundingRect(contour)
+        u0, v0 = max(0, u - MARGIN), max(0, v - MARGIN)
+        window = np.s_[v0 : v + height + MARGIN, u0 : u + width + MARGIN]
+        filled = np.zeros_like(binary[window])
+        cv2.drawContours(filled, [contour], -1, 255, cv2.FILLED, offset=(-u0, -v0))
+        cv2.bitwise_and(filled, binary[window], dst=filled)
         if cv2.countNonZero(filled) >= MIN_AREA:
-            masks.append(filled > 0)
-    return masks
+            patches.append((filled > 0, window))
+    return patches
 
 
-def _look(frame: RgbdFrame, mask: Mask, scale: float, stereo: _Stereo) -> _Patch:
-    """Cut out the patch's window, and gather its readings and outline."""
-    k = frame.intrinsics
-    columns, rows = np.flatnonzero(mask.any(axis=0)), np.flatnonzero(mask.any(axis=1))
-    u0, v0 = max(0, int(columns[0]) - MARGIN), max(0, int(rows[0]) - MARGIN)
-    window = np.s_[v0 : int(rows[-1]) + MARGIN + 1, u0 : int(columns[-1]) + MARGIN + 1]
-    mask = mask[window]
-    depth = np.nan_to_num(frame.depth[window], posinf=0.0, neginf=0.0) * np.float32(scale)
+def _look(frame: RgbdFrame, mask: Mask, window: tuple[slice, slice], scale: float, stereo: _Stereo) -> _Patch:
+    """Gather the readings and the outline of the patch `mask` (h, w) in its window."""
+    k, v0, u0 = frame.intrinsics, window[0].start, window[1].start
+    depth = frame.depth[window]
+    depth = np.where((depth > NEAREST) & (depth < FURTHEST), depth * np.float32(scale), np.float32(0))
     here = Intrinsics(mask.shape[1], mask.shape[0], k.fx, k.fy, k.cx - u0, k.cy - v0)
     core = cv2.erode(mask.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
     v, u = np.nonzero(core & (depth > 0))
@@ -202,7 +206,8 @@ def _fits(patch: _Patch, connector: Connector) -> list[Fit]:
     rough.sort(key=burden)
     full = [fit(patch.sight, f.center, f.axis, *size, COARSE) for f in _distinct(rough, PROMISING[1])]
     full.sort(key=burden)
-    return [fit(patch.sight, f.center, f.axis, *size, FINE) for f in full]
+    worst = HOPELESS * (burden(full[0]) + DOUBT)
+    return [fit(patch.sight, f.center, f.axis, *size, FINE) for f in full if burden(f) < worst]
 
 
 def _distinct(fits: list[Fit], count: int) -> list[Fit]:
@@ -236,12 +241,13 @@ def _starts(sight: Sight, connector: Connector) -> list[tuple[FloatArray, FloatA
     offsets = sight.points - middle
     flat = offsets - np.outer(offsets @ view, view)
     values, vectors = np.linalg.eigh(flat.T @ flat)
-    ways = [vectors[:, -1]] if values[-1] > SIDE_SEEN**2 * values[-2] else [vectors[:, -1], vectors[:, -2]]
+    turns = (0.0,) if values[-1] > SIDE_SEEN**2 * values[-2] else TURNS
+    ways = [np.cos(turn) * vectors[:, -1] + np.sin(turn) * vectors[:, -2] for turn in turns]
     axes = [np.linalg.eigh(offsets.T @ offsets)[1][:, -1]]
     axes += [np.cos(tilt) * way + np.sin(tilt) * view for way in ways for tilt in TILTS]
+    ends = np.percentile(offsets @ np.array(axes).T, [2, 98], axis=0).T
     starts = []
-    for axis in axes:
-        low, high = np.percentile(offsets @ axis, [2, 98])
+    for axis, (low, high) in zip(axes, ends, strict=True):
         behind = middle + np.pi / 4 * connector.radius * (view - (view @ axis) * axis)
         shifts = (low + connector.length / 2, high - connector.length / 2)
         starts += [(behind + shift * axis, axis) for shift in shifts]

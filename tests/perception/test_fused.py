@@ -1,13 +1,10 @@
 import colorsys
-from dataclasses import replace
 
-import cv2
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from raycast import BLACK, PURPLE, REAR_POSE, RED, Ball, Block, Cylinder, Sensor
 from scene import LEFTWARDS, PLACE, Thing, blocks, plug, really, seen
-from scipy.spatial.transform import Rotation
 
 from interfaces.cell import KnownCell
 from interfaces.frame import RgbdFrame
@@ -94,12 +91,13 @@ def test_the_hint_decides_where_the_cable_is_hidden(fused: Fused, panels: list[T
         assert off(fused.estimate(frame, REAR_POSE, axis=hint), axis=hint)[1] < 5.0
 
 
+PLATE = np.array([0.002, 0.045, 0.03])
 SQUARE = np.array([0.01, 0.045, 0.01])
 LOOK_ALIKES: dict[str, list[Thing]] = {
     "no cable": [Cylinder(PLACE, DOWN)],  # upright: its depth shadow hides neither end
     "a box": [Block(PLACE - SQUARE, PLACE + SQUARE, RED)],
     "a cube": [Block(PLACE - 0.02, PLACE + 0.02, RED)],
-    "a plate": [Block(PLACE - [0.002, 0.045, 0.03], PLACE + [0.002, 0.045, 0.03], RED)],
+    "a plate": [Block(PLACE - PLATE, PLACE + PLATE, RED)],
     "a ball": [Ball(PLACE, 0.02)],
     "a large ball": [Ball(PLACE, 0.045)],
     "a short rod": [
@@ -123,16 +121,16 @@ def test_what_only_has_its_colour_is_refused(fused: Fused, panels: list[Thing], 
 
 
 def test_red_things_beside_it_are_not_mistaken(fused: Fused, panels: list[Thing]) -> None:
-    aside = PLACE + [0.0, 0.0, 0.09]
-    others: list[Thing] = [Ball(aside, 0.03), Block(aside - [0.02, 0.15, 0.03], aside + [0.02, -0.06, 0.03], RED)]
+    above, right = np.array([0.0, 0.0, 0.09]), np.array([0.0, -0.10, 0.09])
+    others: list[Thing] = [Ball(PLACE + above, 0.03), Block(PLACE + right - 0.03, PLACE + right + 0.03, RED)]
     assert off(fused.estimate(seen([*panels, *plug(), *others]), REAR_POSE))[0] < 0.003
 
 
 def test_of_two_alike_the_one_near_to_the_last_place_is_taken(fused: Fused, panels: list[Thing]) -> None:
-    upper = PLACE + [0.02, 0.0, 0.06]
+    upper = PLACE + np.array([0.02, 0.0, 0.06])
     frame = seen([*panels, *plug(), *plug(upper)])
     for center in (PLACE, upper):
-        result = fused.estimate(frame, REAR_POSE, near=center + [0.0, 0.02, 0.0])
+        result = fused.estimate(frame, REAR_POSE, near=center + 0.01)
         assert off(result, center)[0] < 0.004
 
 
