@@ -14,7 +14,7 @@ from scipy.spatial.transform import RigidTransform
 
 from interfaces.cell import KnownCell
 from interfaces.frame import RgbdFrame
-from perception.camera_model import project, rays
+from perception.camera_model import NEAREST, project, rays
 from perception.estimate import LEFT, Estimate, NoEstimate, pose_covariance
 from perception.rgbd_pose import MIN_POINTS, min_max_axis, rotation_about, without_outliers
 from perception.segmentation import NoSegment, NotSeen, SegmentationParameters, segment
@@ -36,6 +36,7 @@ FAR = 10.0  # m; choice: stereo cameras of this size read no farther
 MOST_POINTS = 2000  # choice: as at 0.6 m; ten times as many, from nearby, tell no more
 MIN_READINGS = 5  # choice: fewer make no cluster
 CLUSTER = 0.02  # m; readings this near to their median are one surface; choice: the connector's thickness
+SURFACE_SHARE = 0.2  # of the readings; choice: even noise over a metre has 0.04, a slanting connector half and more
 
 
 @dataclass(frozen=True)
@@ -157,10 +158,16 @@ def _nearest(found: list[Detection], pixel: FloatArray) -> Detection:
 
 
 def _cluster(depth: NDArray[np.float32], box: Detection) -> NDArray[np.float64]:
-    """Readings (n,) m of `depth` (H, W) about the middle of the box that lie on one surface: near to their median."""
+    """Readings (n,) m of `depth` (H, W) about the middle of the box that lie on one surface: near to their median.
+
+    None where hardly any do: such a depth is noise.
+    """
     there = depth[box.pixels(depth.shape, WINDOW)]
-    readings = there[(there > 0) & (there < FAR)].astype(float)  # NaN compares false
-    return readings[np.abs(readings - np.median(readings)) <= CLUSTER] if len(readings) else readings
+    readings = there[(there > NEAREST) & (there < FAR)].astype(float)  # NaN compares false
+    if not len(readings):
+        return readings
+    cluster = readings[np.abs(readings - np.median(readings)) <= CLUSTER]
+    return cluster if len(cluster) >= SURFACE_SHARE * len(readings) else readings[:0]
 
 
 def shipped_network() -> bytes:
