@@ -75,7 +75,7 @@ def wilson(k: int, n: int) -> tuple[float, float]:
     p, z2 = k / n, _Z**2
     middle = (p + z2 / (2 * n)) / (1 + z2 / n)
     half = _Z / (1 + z2 / n) * math.sqrt(p * (1 - p) / n + z2 / (4 * n**2))
-    return max(0.0, middle - half), min(1.0, middle + half)
+    return min(p, max(0.0, middle - half)), max(p, min(1.0, middle + half))  # rounding: the share itself lies in it
 
 
 _HEADER = ("case", "succeeded", "95 % interval", "median sim s", "median x real time", "max force N")
