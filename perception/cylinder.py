@@ -304,6 +304,9 @@ def _equations(
             continue
         x, y, z = far * rays[i, 0], far * rays[i, 1], far * rays[i, 2]
         out, gx, gy, gz = distance(x, y, z, center, axis, radius, half)
+        # At the rim the gradient jumps between two that are aslant to the ray: only what is square to it is true.
+        along = gx * rays[i, 0] + gy * rays[i, 1] + gz * rays[i, 2]
+        gx, gy, gz = gx - along * rays[i, 0], gy - along * rays[i, 1], gz - along * rays[i, 2]
         _row(row, x, y, z, gx, gy, gz, center, tilts)
         cost += _add(hessian, gradient, row, out, widths[i] * far, fade, ray_share)
     return hessian, gradient, cost

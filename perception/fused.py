@@ -77,11 +77,15 @@ D415 = _Stereo(0.055, 0.0055)  # of a camera that is not in the cell
 
 @dataclass(frozen=True, eq=False)
 class _Cut:
-    """A `window` of the frame: the `mask` (h, w) of one patch of the colour there, and of the `others`."""
+    """A `window` of the frame: the `mask` (h, w) of one patch of the colour there, and of the `others`.
+
+    `broken_off`: the patch reaches the picture's rim.
+    """
 
     mask: Mask
     others: Mask
     window: tuple[slice, slice]
+    broken_off: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,7 +170,8 @@ def _patches(binary: NDArray[np.uint8]) -> list[_Cut]:
         cv2.drawContours(filled, [contour], -1, 255, cv2.FILLED, offset=(-u0, -v0))
         cv2.bitwise_and(filled, binary[window], dst=filled)
         if cv2.countNonZero(filled) >= MIN_AREA:
-            patches.append(_Cut(filled > 0, binary[window] > filled, window))
+            broken_off = u == 0 or v == 0 or u + width == binary.shape[1] or v + height == binary.shape[0]
+            patches.append(_Cut(filled > 0, binary[window] > filled, window, broken_off))
     return patches
 
 
@@ -285,8 +290,8 @@ def _refusal(patch: _Patch, found: Fit, connector: Connector) -> str | None:
     misses, far = nearest_on_rays(sight.rays, found.center, found.axis, *size)
     across = np.cross(found.axis, found.center / np.linalg.norm(found.center))
     aside = ((far[:, None] * sight.rays - found.center) @ across)[~sight.inside]
-    if min(np.count_nonzero(aside > 0), np.count_nonzero(aside < 0)) < SIDE_EDGES:
-        return "only one side of it shows"
+    if patch.cut.broken_off and min(np.count_nonzero(aside > 0), np.count_nonzero(aside < 0)) < SIDE_EDGES:
+        return "it goes on beyond the picture, and only one side of it shows"
     pixels = np.abs(misses / far * patch.intrinsics.fx)[~sight.inside]
     edge, stray = float(np.median(pixels)), float(np.mean(pixels > 1.0))
     if edge > MAX_EDGE_MISS or stray > MAX_STRAY:
