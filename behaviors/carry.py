@@ -22,6 +22,7 @@ LOOK_SECONDS = 0.8
 SEATED_SECONDS = 0.6  # the clip's lips take 0.2 s to close
 WAY_MARGIN = 0.0
 ROLLS = 36
+WHOLE_SHARE = 0.9  # of the length; choice: the visible part's middle is then within 5 mm of the whole's
 LONG_ENOUGH = 0.04  # m: a shorter visible part says too little of the axis
 TRUSTED_SHIFT = 0.06  # m: what is seen further off its place in the hand than this is a false look
 
@@ -89,8 +90,10 @@ class Insert(HandLeaf):
             self.say("the hand hides the connector", frames=len(seen))
             return
         mean = fuse(long)
-        found, whole = self.services.motion.tool(HAND).inv() * mean.world_from_connector, mean.whole
-        # The fingers hide the cable's side: unless an end shows, where the part lies on the length is a guess.
+        found = self.services.motion.tool(HAND).inv() * mean.world_from_connector
+        # The fingers end the visible part as an end of its own would: unless all of the length shows, where the part
+        # lies on it is a guess.
+        whole = mean.extent > WHOLE_SHARE * self.services.known.connector.length
         if not whole:
             found = _turned_in_the_jaw(belief.held, found)
         shift = float(np.linalg.norm(found.translation - belief.held.translation))
