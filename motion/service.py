@@ -34,8 +34,8 @@ JAW_REACH = 0.13  # m round a connector's centre where the jaw may be: half its 
 TIGHT_MARGIN = 0.005  # m where nothing is found with `MARGIN`
 WAYS = 12  # ways to grasp that the planner may choose from
 # m on the last straight centimetres and on the way of a held connector, which start and end near things: the first that
-# leaves a way. Voxels are a margin themselves.
-NEAR_MARGINS = (0.008, 0.004, 0.0)
+# leaves a way. A jaw that opens on the way, as on a slip, spreads its fingers by 15 mm to each side.
+NEAR_MARGINS = (0.020, 0.014, 0.008, 0.004, 0.0)
 APPROACH_SPEED = 0.3  # share of the joints' speed on straight ways near things
 OPEN_GAP = 0.05  # m between the pads: 15 mm to each side of the connector, about 8 mm is how far off a pose may be
 GRIP_OFFSETS = (-0.02, -0.03, 0.0)  # m along the connector from its centre, tried in turn: near the cable the tip shows
