@@ -20,6 +20,7 @@ TICK = 0.05  # simulated seconds
 DRAWN = 0.05  # m straight back
 FOLLOWED = 0.04  # m that the connector must have come along; choice: it may slide a little, and the arm errs
 HELD_SECONDS = 2.0
+FRESH = 0.2  # s until the camera shows the scene as it is: its first picture is older than the foam piece's place
 
 
 def services_of(scene: Scene) -> Services:
@@ -37,6 +38,7 @@ def grasp(scene: Scene, services: Services, pose: RigidTransform) -> str:
 
     Grasped, drawn back 5 cm and held for 2 s, by ground truth; the scene's things move.
     """
+    scene.world.advance(FRESH)
     services.belief.connector = pose
     why = done(scene, services, StartUp(name="start_up")) or done(scene, services, Regrasp(name="regrasp"))
     return why or _drawn_back(services, scene)

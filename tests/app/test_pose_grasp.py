@@ -16,12 +16,13 @@ def believed(scene: Scene, off: float = 0.0) -> RigidTransform:
     return pose_along((x, y, z + off), (ax, ay, az))
 
 
-@pytest.mark.parametrize("name", ["2", "4"])
+@pytest.mark.parametrize("name", ["2", "4", "9"])
 def test_the_right_pose_is_grasped(name: str) -> None:
     with Scene(study_cell(overrides=SMALL), name, 0) as scene:
         assert grasp(scene, services_of(scene), believed(scene)) == ""
         assert scene.truth.held()
         assert not scene.truth.plugged()  # drawn off the stand
+        assert not scene.truth.contact_peaks()  # it saw the piece before the ninth
 
 
 def test_a_wrong_pose_is_not_grasped() -> None:
