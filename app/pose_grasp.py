@@ -24,7 +24,8 @@ FRESH = 0.2  # s until the camera shows the scene as it is: its first picture is
 
 
 def services_of(scene: Scene) -> Services:
-    """A robot in the scene, which has looked at nothing yet."""
+    """A robot in the scene, which has looked at nothing yet; its cameras show the scene as it is."""
+    scene.world.advance(FRESH)
     world, known = scene.world, scene.world.cell.known
     grippers = {name: arm.gripper for name, arm in world.arms.items()}
     motion = Motion(known, world.arms, grippers, world, scene.seed * 1000)
@@ -38,7 +39,6 @@ def grasp(scene: Scene, services: Services, pose: RigidTransform) -> str:
 
     Grasped, drawn back 5 cm and held for 2 s, by ground truth; the scene's things move.
     """
-    scene.world.advance(FRESH)
     services.belief.connector = pose
     why = done(scene, services, StartUp(name="start_up")) or done(scene, services, Regrasp(name="regrasp"))
     return why or _drawn_back(services, scene)
