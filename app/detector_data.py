@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from interfaces.cell import Cell
 from perception.camera_model import project
 from perception.detector import HEIGHT, STRIDE, WIDTH, fitted
+from perception.segmentation import SegmentationParameters, color_mask
 from sim.random_scene import RandomScene, Shot
 
 FloatArray = NDArray[np.float64]
@@ -22,7 +23,8 @@ SHOTS = 24  # of one scene; choice: a scene costs as much to make as six picture
 ABSENT = 6  # every sixth picture is without the connector, among its look-alikes
 PATCH = 160  # px; choice: training on parts of pictures, mostly about the connector, learns more a second
 CLEAR = 24  # px of the small picture that must show of a connector that counts: 6 cells' corners; less is left out
-NEAR_CONNECTOR = 0.8  # share of the patches that are cut about the connector
+NEAR_CONNECTOR, NEAR_LIKE = 0.6, 0.3  # share of the patches that are cut about the connector, about its colour elsewhere
+LIKES = 16  # places of its colour kept of a picture
 MOSAIC = 0.15  # share of the patches that are made of four
 
 
@@ -31,16 +33,19 @@ class Pictures:
     """So many small pictures and their truth.
 
     `images` (n, 240, 432, 3) uint8; `masks` (n, 240, 432) uint8, 255 where the connector shows; `axes` (n, 2): where
-    its unit axis points in the image, as long as it is seen (`Detection.in_plane`).
+    its unit axis points in the image, as long as it is seen (`Detection.in_plane`); `likes` (n, 16, 2): pixels (u, v)
+    of its colour elsewhere, -1 where there is none.
     """
 
     images: NDArray[np.uint8]
     masks: NDArray[np.uint8]
     axes: NDArray[np.float32]
+    likes: NDArray[np.int16]
 
     def part(self, first: int, after: int) -> "Pictures":
         """Pictures `first` to `after` - 1, not copied."""
-        return Pictures(self.images[first:after], self.masks[first:after], self.axes[first:after])
+        some = slice(first, after)
+        return Pictures(self.images[some], self.masks[some], self.axes[some], self.likes[some])
 
 
 @dataclass(frozen=True)
@@ -58,17 +63,31 @@ def make_pictures(cell: Cell, seed: int, count: int, tell: Callable[[int], None]
         np.zeros((count, HEIGHT, WIDTH, 3), np.uint8),
         np.zeros((count, HEIGHT, WIDTH), np.uint8),
         np.zeros((count, 2), np.float32),
+        np.full((count, LIKES, 2), -1, np.int16),
     )
+    color = SegmentationParameters.for_color(cell.known.connector.color)
     for first in range(0, count, SHOTS):
-        scene = RandomScene(cell, np.random.default_rng([seed, first]))
+        rng = np.random.default_rng([seed, first])
+        scene = RandomScene(cell, rng)
         for i in range(first, min(first + SHOTS, count)):
             shot = scene.shot(present=i % ABSENT != ABSENT - 1)
             out.images[i], _ = fitted(shot.rgb)
             out.masks[i] = fitted(shot.mask * np.uint8(255))[0]
             out.axes[i] = axis_in_image(shot)
+            out.likes[i] = _likes(out.images[i], out.masks[i], color, rng)
             tell(i + 1)
         scene.close()
     return out
+
+
+def _likes(
+    image: NDArray[np.uint8], mask: NDArray[np.uint8], color: SegmentationParameters, rng: np.random.Generator
+) -> NDArray[np.int16]:
+    """Random pixels (16, 2) of the connector's colour that are not the connector's; -1 if there are none."""
+    v, u = np.nonzero((color_mask(image, color) > 0) & (mask == 0))
+    if not len(u):
+        return np.full((LIKES, 2), -1, np.int16)
+    return np.column_stack([u, v])[rng.integers(len(u), size=LIKES)].astype(np.int16)
 
 
 def axis_in_image(shot: Shot) -> FloatArray:
@@ -101,10 +120,13 @@ def _cut(pictures: Pictures, rng: np.random.Generator, size: int) -> tuple[NDArr
     """A square of `size` px, turned, zoomed, sheared and mirrored, with parts cut out."""
     i = int(rng.integers(len(pictures.images)))
     image, mask = pictures.images[i], pictures.masks[i]
-    middle = rng.uniform([0, 0], [WIDTH, HEIGHT])
-    if mask.any() and rng.random() < NEAR_CONNECTOR:
+    middle, draw = rng.uniform([0, 0], [WIDTH, HEIGHT]), float(rng.random())
+    like = pictures.likes[i, rng.integers(LIKES)]
+    if draw < NEAR_CONNECTOR and mask.any():
         u, v, width, height = cv2.boundingRect(mask)
         middle = np.array([u + width / 2, v + height / 2])
+    elif draw < NEAR_CONNECTOR + NEAR_LIKE and like[0] >= 0:
+        middle = like.astype(float)
     change = _change(rng)
     matrix = np.column_stack([change, rng.uniform(0.1, 0.9, 2) * size - change @ middle])
     image = cv2.warpAffine(image, matrix, (size, size), flags=cv2.INTER_LINEAR)

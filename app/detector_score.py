@@ -96,8 +96,12 @@ def held_out_shots(
 
 
 def occlusion_class(shot: Shot) -> int | None:
-    """The index in `OCCLUSION` of how much of the connector is hidden; None where too little shows."""
-    if np.count_nonzero(shot.mask) < LEAST_SEEN:
+    """The index in `OCCLUSION` of how much of the connector is hidden; None where too little shows.
+
+    None, too, at the picture's rim: how much of it lies beyond is not counted.
+    """
+    inner = shot.mask[1:-1, 1:-1]
+    if np.count_nonzero(inner) < max(LEAST_SEEN, np.count_nonzero(shot.mask)):
         return None
     return next((i for i, (low, high) in enumerate(OCCLUSION) if low <= shot.occlusion < high), None)
 

@@ -6,11 +6,11 @@ latency on the simulated clock.
 
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from functools import partial
-from itertools import chain
+from itertools import chain, product
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import RigidTransform
+from scipy.spatial.transform import RigidTransform, Rotation, Slerp
 
 from interfaces.cause import CauseCode
 from interfaces.cell import KnownCell
@@ -24,6 +24,7 @@ from motion.failure import PlanningError
 from motion.grasps import choose_grasp, grasp_candidates
 from motion.kinematics import ArmKinematics
 from motion.planner import plan
+from motion.spheres import JAW_OPENING
 from motion.straight import straight_line
 from motion.task import Task
 
@@ -33,9 +34,8 @@ MARGIN = 0.015  # m between the arm's spheres and anything while it moves freely
 JAW_REACH = 0.13  # m round a connector's centre where the jaw may be: half its length, a finger's width, 5 cm of palm
 TIGHT_MARGIN = 0.005  # m where nothing is found with `MARGIN`
 WAYS = 12  # ways to grasp that the planner may choose from
-# m on the last straight centimetres and on the way of a held connector, which start and end near things: the first that
-# leaves a way. A jaw that opens on the way, as on a slip, spreads its fingers by 15 mm to each side.
-NEAR_MARGINS = (0.020, 0.014, 0.008, 0.004, 0.0)
+NEAR_MARGINS = (0.020, 0.014, 0.008, 0.004, 0.0)  # m on straight centimetres near things: the first that leaves a way
+LIFTS = (0.0, 0.04, 0.08)  # m by which the middle of a straight way may pass above it: obstacles stand on the floor
 APPROACH_SPEED = 0.3  # share of the joints' speed on straight ways near things
 OPEN_GAP = 0.05  # m between the pads: 15 mm to each side of the connector, about 8 mm is how far off a pose may be
 GRIP_OFFSETS = (-0.02, -0.03, 0.0)  # m along the connector from its centre, tried in turn: near the cable the tip shows
@@ -85,20 +85,22 @@ class Motion(Bodies):
     ) -> Task:
         """Bring what `arm` holds (tool_from_connector) to one of the goals (world_from_tool), the first preferred.
 
-        By way of the shapes that the cable takes by itself where that is free, else straight, else by any free way.
-        From the goal the tool must also reach the poses `onward` (goal_from_tool) in straight lines.
+        By way of the shapes that the cable takes by itself where that is free, else straight or in a flat arch, else by
+        any free way; if it can, with room for a jaw that opens on the way, as on a slip. From the goal the tool must also reach the poses `onward` (goal_from_tool) in straight lines.
         """
 
         def steps() -> Iterator[None]:
             model, q, kin = self.start_model(arm, held), self.joints(arm), self.kinematics[arm]
-            start, release = kin.tool(q) * held, held.inv()
+            tool, release = kin.tool(q), held.inv()
+            start = tool * held
             leads_on = partial(_leads_on, kin, onward)
             natural = (path for goal in goals for path in self._natural_paths(kin, q, start, goal * held, release))
-            direct = (_through(kin, q, [goal]) for goal in goals)
+            direct = (_through(kin, q, _lifted(tool, goal, lift)) for goal in goals for lift in LIFTS)
             paths = [path for path in chain(natural, direct) if path is not None and leads_on(path[-1])]
-            for margin in NEAR_MARGINS:
+            wide = self.model(arm, held=held, opening=JAW_OPENING)
+            for jaw, margin in product((wide, model), NEAR_MARGINS):
                 for path in paths:
-                    if model.path_free(path[1:], margin):
+                    if jaw.path_free(path[1:], margin):
                         yield from self._follow(arm, path, speed)
                         return
             configurations = np.array([end for goal in goals for end in kin.ik(goal) if leads_on(end)]).reshape(-1, 6)
@@ -329,6 +331,15 @@ def _clear_of(points: FloatArray | None, place: FloatArray, radius: float) -> Fl
     if points is None:
         return NO_POINTS
     return points[np.linalg.norm(points - place, axis=1) > radius]
+
+
+def _lifted(start: RigidTransform, goal: RigidTransform, lift: float) -> list[RigidTransform]:
+    """The way from start to goal, through the middle raised by `lift` m if there is any."""
+    if not lift:
+        return [goal]
+    middle = 0.5 * (start.translation + goal.translation) + [0.0, 0.0, lift]
+    turn = Slerp([0.0, 1.0], Rotation.concatenate([start.rotation, goal.rotation]))(0.5)
+    return [RigidTransform.from_components(middle, turn), goal]
 
 
 def _through(kin: ArmKinematics, q: FloatArray, poses: Sequence[RigidTransform]) -> FloatArray | None:

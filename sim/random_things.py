@@ -150,9 +150,10 @@ class Thing:
 def make_things(client: int, connector: Connector, rng: np.random.Generator, count: int, held_out: bool) -> list[Thing]:
     """So many things, most of nearly the connector's colour. None is a cylinder of its proportions: that would be one.
 
-    Kinds: box, ball, can, screwdriver; if `held_out` also capsule, hammer and a thin rod, and never a box or a ball.
+    Kinds: can, screwdriver, and box, ball, pole, barbell, stack of boxes or, if `held_out`, capsule, hammer, thin rod.
     """
-    kinds = (_can, _screwdriver, _capsule, _hammer, _rod) if held_out else (_box, _ball, _can, _screwdriver)
+    others = (_capsule, _hammer, _rod) if held_out else (_box, _ball, _pole, _barbell, _stack)
+    kinds = (_can, _screwdriver, *others)
     things = []
     for _ in range(count):
         color = like(connector.color, rng) if rng.random() < ALIKE else unlike(connector.color, rng)
@@ -167,6 +168,28 @@ def _box(client: int, color: Color, rng: np.random.Generator) -> Thing:
 
 def _ball(client: int, color: Color, rng: np.random.Generator) -> Thing:
     return Thing(((shape(client, p.GEOM_SPHERE, color, radius=float(rng.uniform(0.008, 0.05))), 0.0),))
+
+
+def _pole(client: int, color: Color, rng: np.random.Generator) -> Thing:
+    radius, length = float(rng.uniform(0.006, 0.02)), float(rng.uniform(0.25, 0.6))
+    return Thing(((shape(client, p.GEOM_CYLINDER, color, radius=radius, length=length), 0.0),))
+
+
+def _barbell(client: int, color: Color, rng: np.random.Generator) -> Thing:
+    radius, length = float(rng.uniform(0.015, 0.03)), float(rng.uniform(0.08, 0.2))
+    bar = shape(client, p.GEOM_CYLINDER, any_color(rng), radius=0.4 * radius, length=length)
+    weights = [shape(client, p.GEOM_SPHERE, color, radius=radius) for _ in range(2)]
+    return Thing(((bar, 0.0), (weights[0], -length / 2), (weights[1], length / 2)))
+
+
+def _stack(client: int, color: Color, rng: np.random.Generator) -> Thing:
+    parts, reach = [], 0.0
+    for shade in (color, any_color(rng), like(color, rng)):
+        half = rng.uniform(0.006, 0.03, 3)
+        body = shape(client, p.GEOM_BOX, shade, halfExtents=half.tolist())
+        parts.append((body, reach + float(half[0])))
+        reach += 2 * float(half[0])
+    return Thing(tuple(parts))
 
 
 def _can(client: int, color: Color, rng: np.random.Generator) -> Thing:

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -47,7 +49,7 @@ def test_patches_keep_the_connector_in_its_box(pictures: Pictures, monkeypatch: 
     """A white connector in a black picture reaches all four edges of its box, and no pixel of it is outside."""
     monkeypatch.setattr("app.detector_data._cut_out", lambda *_: None)
     monkeypatch.setattr("app.detector_data._recolored", lambda image, _rng: image)
-    white = Pictures(np.zeros_like(pictures.images), pictures.masks, pictures.axes)
+    white = replace(pictures, images=np.zeros_like(pictures.images))
     white.images[pictures.masks >= 128] = 255
     compared = 0
     for i in range(100):
