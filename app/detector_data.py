@@ -23,7 +23,10 @@ SHOTS = 24  # of one scene; choice: a scene costs as much to make as six picture
 ABSENT = 6  # every sixth picture is without the connector, among its look-alikes
 PATCH = 160  # px; choice: training on parts of pictures, mostly about the connector, learns more a second
 CLEAR = 24  # px of the small picture that must show of a connector that counts: 6 cells' corners; less is left out
-NEAR_CONNECTOR, NEAR_LIKE = 0.6, 0.3  # share of the patches that are cut about the connector, about its colour elsewhere
+NEAR_CONNECTOR, NEAR_LIKE = (
+    0.6,
+    0.3,
+)  # share of the patches that are cut about the connector, about its colour elsewhere
 LIKES = 16  # places of its colour kept of a picture
 MOSAIC = 0.15  # share of the patches that are made of four
 
