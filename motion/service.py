@@ -86,7 +86,8 @@ class Motion(Bodies):
         """Bring what `arm` holds (tool_from_connector) to one of the goals (world_from_tool), the first preferred.
 
         By way of the shapes that the cable takes by itself where that is free, else straight or in a flat arch, else by
-        any free way; if it can, with room for a jaw that opens on the way, as on a slip. From the goal the tool must also reach the poses `onward` (goal_from_tool) in straight lines.
+        any free way; if it can, with room for a jaw that opens on the way, as on a slip. From the goal the tool must
+        also reach the poses `onward` (goal_from_tool) in straight lines.
         """
 
         def steps() -> Iterator[None]:

@@ -289,6 +289,18 @@ def test_a_goal_from_which_the_tool_cannot_go_on_is_no_goal(rig: Rig) -> None:
     assert rig.motion.tool("right").translation == pytest.approx(goals[0].translation, abs=1e-3)
 
 
+def test_a_carry_leaves_room_for_a_jaw_that_opens(rig: Rig) -> None:
+    upright = ASIDE + np.array([0.0, 0.0, 0.0, 0.0, 0.0, np.pi / 2])  # one finger above the other
+    rig.arms["right"].at = upright
+    goal = moved(rig, 0.0, 0.18, 0.0)
+    bar = [moved(rig, 0.0, y, -0.077).apply([0.02, 0.0, 0.0]) for y in np.linspace(0.03, 0.15, 7)]
+    rig.motion.set_obstacles(np.vstack([cube(place, 0.04) for place in bar]), 0.01)
+    rig.run(rig.motion.carry("right", [goal], HELD, speed=0.5))
+    open_jaw = rig.motion.model("right", held=HELD, opening=0.075)
+    assert all(open_jaw.free(q, 0.0) for q in flown(rig, "right"))
+    assert rig.motion.tool("right").translation == pytest.approx(goal.translation, abs=1e-3)
+
+
 def test_a_carry_leaves_out_a_goal_in_the_panel(rig: Rig) -> None:
     rig.arms["right"].at = ASIDE
     tool = rig.motion.tool("right")
