@@ -100,8 +100,8 @@ def occlusion_class(shot: Shot) -> int | None:
 
     None, too, at the picture's rim: how much of it lies beyond is not counted.
     """
-    inner = shot.mask[1:-1, 1:-1]
-    if np.count_nonzero(inner) < max(LEAST_SEEN, np.count_nonzero(shot.mask)):
+    seen, inner = int(np.count_nonzero(shot.mask)), int(np.count_nonzero(shot.mask[1:-1, 1:-1]))
+    if inner < max(LEAST_SEEN, seen):
         return None
     return next((i for i, (low, high) in enumerate(OCCLUSION) if low <= shot.occlusion < high), None)
 
