@@ -37,7 +37,8 @@ def _errors(trials: Sequence[Trial], techniques: Sequence[str]) -> Figure:
         x, y = np.array(points).reshape(-1, 2).T
         axes.plot(x, y, "o", alpha=0.5, markersize=4, label=technique)
     shown = [c for c in THESIS_RGBD if c in names]
-    axes.plot([names.index(c) for c in shown], [THESIS_RGBD[c] for c in shown], "k_", ms=20, label="thesis, RGB-D")
+    if shown:
+        axes.plot([names.index(c) for c in shown], [THESIS_RGBD[c] for c in shown], "k_", ms=20, label="thesis, RGB-D")
     axes.set_xticks(range(len(names)), [_label(name) for name in names])
     axes.set(xlabel="configuration, share hidden", ylabel="position error, mm", ylim=(0, None))
     axes.grid(axis="y", alpha=0.3)
@@ -52,6 +53,7 @@ def _label(name: str) -> str:
 
 def _shares(trials: Sequence[Trial], techniques: Sequence[str], thesis: Mapping[str, Any]) -> Figure:
     figure = Figure(figsize=(8, 4), layout="constrained")
+    first = next((name for name in techniques if name in thesis), None)
     for axes, what in zip(figure.subplots(1, 2, sharey=True), ("identified", "grasped"), strict=True):
         for number, technique in enumerate(techniques):
             own = [t for t in trials if t.technique == technique and t.configuration in HEADLINE]
@@ -62,9 +64,10 @@ def _shares(trials: Sequence[Trial], techniques: Sequence[str], thesis: Mapping[
                 axes.bar(number, 100 * k / n, WIDTH, yerr=[[100 * (k / n - low)], [100 * (high - k / n)]], capsize=4)
             if technique in thesis:
                 k, n = thesis[technique][what]
-                axes.plot(number, 100 * k / n, "k_", markersize=40, label=None if number else "thesis")
+                axes.plot(number, 100 * k / n, "k_", markersize=40, label="thesis" if technique == first else None)
         axes.set_xticks(range(len(techniques)), techniques)
         axes.set(title=what, ylim=(0, 105))
-        axes.legend(loc="lower right")
+        if first is not None:
+            axes.legend(loc="lower right")
     figure.axes[0].set_ylabel("share of trials, %")
     return figure

@@ -12,8 +12,9 @@ from typer.testing import CliRunner
 from app.cli import app
 from app.pose_coverage import run_coverage
 from app.pose_negatives import FRAMES, Negative, negative_frames
+from app.pose_plots import draw
 from app.pose_scenes import study_cell
-from app.pose_study import of_technique, run_pose
+from app.pose_study import THESIS, of_technique, run_pose
 from app.pose_trial import Setup, Trial
 from interfaces.cell import FixedMount, KnownCell
 from interfaces.frame import RgbdFrame
@@ -142,3 +143,11 @@ def test_a_folder_with_a_study_is_refused(tmp_path: Path) -> None:
     (tmp_path / "pose.json").write_text("{}")
     result = CliRunner().invoke(app, ["study", "pose", "--out", str(tmp_path)])
     assert (result.exit_code, "already holds a study" in result.stderr) == (2, True)
+
+
+@pytest.mark.filterwarnings("error")
+def test_plots_of_any_techniques_say_what_the_marks_are(tmp_path: Path) -> None:
+    for names in (["fused"], ["fused", "rgbd"]):
+        trials = [Trial(name, "1", 0, True, error_m=0.002, grasped=True) for name in names]
+        draw(tmp_path, trials, names, THESIS)
+        assert np.std(np.asarray(cv2.imread(str(tmp_path / "shares.png")))) > 5
