@@ -1,5 +1,6 @@
 """Options that several commands take."""
 
+import re
 from typing import Annotated
 
 import typer
@@ -20,11 +21,11 @@ Sets = Annotated[
 
 def parse_seeds(text: str) -> range:
     """The seeds of "A:B", B left out. Raises `Findings` for anything else."""
-    first, _, after = text.partition(":")
-    if not (first.isdecimal() and after.isdecimal() and int(first) < int(after) <= MOST_SEED):
+    first, after = map(int, text.split(":")) if re.fullmatch(r"\d{1,10}:\d{1,10}", text) else (0, 0)
+    if not first < after <= MOST_SEED:
         right = f"write A:B with A below B and B at most {MOST_SEED}, such as 0:20"
         raise Findings([Finding("--seeds", 1, f"{quoted(text)} is no range of seeds; {right}")])
-    seeds = range(int(first), int(after))
+    seeds = range(first, after)
     if len(seeds) > MOST_SEEDS:
         raise Findings([Finding("--seeds", 1, f"{len(seeds)} seeds; ask for at most {MOST_SEEDS} in one study")])
     return seeds

@@ -10,6 +10,7 @@ import typer
 from app import output
 from app.findings import Finding, Findings, nearest, shown
 from app.options import Sets, parse_seeds
+from interfaces.quote import quoted
 
 app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Run many episodes or scenes and count.")
 
@@ -50,7 +51,7 @@ def pose(
     configurations: Annotated[
         str | None, typer.Option(metavar="A,B", help="Configurations to try; default all.")
     ] = None,
-    no_grasp: Annotated[bool, typer.Option("--no-grasp", help="Only look: a tenth of the time.")] = False,
+    no_grasp: Annotated[bool, typer.Option("--no-grasp", help="Only look: half the time.")] = False,
     both_cameras: Annotated[
         bool, typer.Option("--both-cameras", help="A second row each: the wrist camera looks, too.")
     ] = False,
@@ -126,5 +127,5 @@ def _techniques(text: str | None, wrong: list[Finding]) -> list[str]:
 def _listed(option: str, text: str | None, known: Sequence[str], wrong: list[Finding]) -> list[str]:
     """The names of "A,B", each once, all that are known without a text; those that are not go to `wrong`."""
     names = list(known) if text is None else list(dict.fromkeys(name.strip() for name in text.split(",")))
-    wrong += [Finding(option, 1, f"no {name!r}; {nearest(name, known)}") for name in names if name not in known]
+    wrong += [Finding(option, 1, f"no {quoted(name)}; {nearest(name, known)}") for name in names if name not in known]
     return names

@@ -60,7 +60,8 @@ def test_findings_in_trees_and_cells_are_short(tmp_path: Path, monkeypatch: pyte
 @pytest.mark.parametrize(
     "line",
     ["run short_obstacle --seed {}", "run {}", "run short_obstacle --case {}", "run short_obstacle --set {}",
-     "run short_obstacle --jobs {}", "study run --seeds {}", "trees check {}", "scenarios show {}"],
+     "run short_obstacle --jobs {}", "study demo --seeds {}", "study pose --seeds 0:{}",
+     "study pose --techniques {}", "study pose --configurations {}", "trees check {}", "scenarios show {}"],
 )  # fmt: skip
 def test_what_is_wrong_on_the_command_line_is_told_in_short(line: str) -> None:
     result = CliRunner().invoke(app, [word.format("9" * 5000) for word in line.split()])
