@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from app.calibration_file import CalibrationFile, write_calibration
 from app.findings import Finding, Findings, shown
 from app.image_files import read_rgb
+from app.record import write_whole
 from app.table import print_table
 from interfaces.cell import CameraSpec
 from interfaces.frame import Intrinsics
@@ -142,6 +143,7 @@ def _write(out: Path, found: Calibration) -> None:
     k = found.intrinsics
     fx, fy, cx, cy = (round(value, 4) for value in (k.fx, k.fy, k.cx, k.cy))
     k1, k2, p1, p2, k3 = (round(value, 6) for value in found.distortion)
+    out.parent.mkdir(parents=True, exist_ok=True)
     write_calibration(
         out,
         CalibrationFile(
@@ -175,5 +177,5 @@ def _draw(
         for start, off in zip(seen[name], residuals[name], strict=True):
             foot, tip = np.rint([start, start + MAGNIFIED * off]).astype(int).tolist()
             cv2.arrowedLine(image, foot, tip, (255, 0, 255), 1, cv2.LINE_AA, tipLength=0.3)
-        cv2.imwrite(str(folder / f"{Path(name).stem}.png"), image)
+        write_whole(folder / f"{name.removesuffix('.png')}.png", cv2.imencode(".png", image)[1].tobytes())
     typer.echo(f"corners, and residuals {MAGNIFIED:.0f} times enlarged, drawn in {shown(folder)}")

@@ -75,6 +75,15 @@ def test_a_folder_of_pictures(tmp_path: Path, boards: list[Any]) -> None:
     assert (drawn != boards[0][:, :, ::-1]).any()
 
 
+def test_every_picture_is_drawn_whatever_its_name(tmp_path: Path, boards: list[Any]) -> None:
+    folder = save(tmp_path / "photos", boards[:5])
+    cv2.imwrite(str(folder / "0.jpg"), boards[5][:, :, ::-1], [cv2.IMWRITE_JPEG_QUALITY, 98])
+    result = invoke("--images", "photos", *MINE, "--draw", "drawn", "-o", "new/camera.yaml")
+    assert result.exit_code == 0, result.output
+    assert len(list((tmp_path / "drawn").iterdir())) == 6
+    assert (tmp_path / "new" / "camera.yaml").exists()
+
+
 def finding(*args: str) -> str:
     result = invoke(*args)
     assert result.exit_code == 2, result.output
