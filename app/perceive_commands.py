@@ -17,6 +17,8 @@ from interfaces.quote import quoted
 T = TypeVar("T")
 
 SUFFIXES = (".png", ".jpg", ".jpeg")  # of a drawing
+# Of these a snapshot writes some; a camera pose that an earlier one left would not be that of its pictures.
+SNAPSHOT = ("rgb.png", "rgb_001.png", "depth.png", "depth_001.png", "intrinsics.yaml", "camera_pose.yaml")
 LEAST_SATURATION = 0.2  # choice: with less a colour is grey, and all that is grey would be the connector's
 
 
@@ -171,10 +173,12 @@ def snapshot(
 
     \b
     Example:
-      regrasp snapshot no_obstacle --seed 3 --frames 4 --out frames
-      regrasp snapshot no_obstacle --set cell=thesis_tags --out frames
+      regrasp snapshot no_obstacle --seed 3 --frames 4 --out four
+      regrasp snapshot no_obstacle --set cell=thesis_tags --out tags
     """
     wrong = output.unwritable(out)
+    if there := [name for name in SNAPSHOT if (out / name).exists()]:
+        wrong.append(Finding(shown(out), 1, f"already holds {', '.join(there)}; name another folder"))
     loaded = load_scenario(scenario, [*(sets or []), *([] if seed is None else [f"seed={seed}"])], None)
     names = [c.name for c in loaded.cell.known.cameras]
     if camera not in names:

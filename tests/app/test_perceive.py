@@ -290,6 +290,11 @@ def test_snapshot_gives_what_perceive_takes(tmp_path: Path) -> None:
     assert sorted(path.name for path in folder.iterdir()) == names
     files = ["--rgb", folder / "rgb.png", "--depth", folder / "depth.png", "--intrinsics", folder / "intrinsics.yaml"]
     assert answer(*files, "--camera-pose", folder / "camera_pose.yaml")["found"]
+    kept = {path.name: path.read_bytes() for path in folder.iterdir()}
+    again = CliRunner().invoke(app, ["snapshot", "no_obstacle", "--camera", "wrist", "--out", str(folder)])
+    assert again.exit_code == 2
+    assert "already holds rgb.png, depth.png, intrinsics.yaml, camera_pose.yaml" in again.output
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == kept
     wrong = CliRunner().invoke(app, ["snapshot", "no_obstacle", "--camera", "read", "--out", str(tmp_path)])
     assert wrong.exit_code == 2
     assert "did you mean 'rear'?" in wrong.output
