@@ -13,8 +13,8 @@ NEAREST, FARTHEST = 0.05, 20.0  # m; choice: a median depth beyond these is one 
 
 
 def read_rgb(path: Path) -> NDArray[np.uint8]:
-    """A colour picture (H, W, 3). Raises `Findings`."""
-    image = _decoded(path, cv2.IMREAD_COLOR_RGB)
+    """A colour picture (H, W, 3), as the imager gave it: which way up it was held does not matter. Raises `Findings`."""
+    image = _decoded(path, cv2.IMREAD_COLOR_RGB | cv2.IMREAD_IGNORE_ORIENTATION)
     if image is None:
         raise _wrong(path, "is no image that can be read; take it out or save it again")
     return np.asarray(image, np.uint8)
@@ -23,14 +23,15 @@ def read_rgb(path: Path) -> NDArray[np.uint8]:
 def read_depth(path: Path, unit: float) -> NDArray[np.float32]:
     """Depth (H, W) in metres, 0 where there is no reading.
 
-    Whole numbers count `unit` metres, as in a 16-bit PNG; floats are metres, as in a .npy file. Raises `Findings`.
+    Whole numbers count `unit` metres, as in a 16-bit PNG; floats are metres, as in a .npy file. Whole numbers of 8 bits
+    are a picture of depth, and no depth. Raises `Findings`.
     """
     image = _array(path) if path.suffix.lower() == ".npy" else _decoded(path, cv2.IMREAD_UNCHANGED)
     if image is None:
         raise _wrong(path, "is no depth image that can be read; give a 16-bit PNG, or a .npy array of metres")
-    if image.ndim != 2 or not (image.dtype == np.uint16 or image.dtype.kind == "f"):
+    if image.ndim != 2 or not (image.dtype.kind == "f" or (image.dtype.kind in "iu" and image.dtype.itemsize > 1)):
         shape = " x ".join(map(str, image.shape))
-        right = "depth is H x W, 16-bit whole numbers or floats in metres"
+        right = "depth is H x W, whole numbers of 16 bits or more, or floats in metres"
         raise _wrong(path, f"is {shape} of type {image.dtype}; {right}")
     with np.errstate(all="ignore"):  # what overflows is no reading
         depth = np.asarray(image, np.float32) * np.float32(1.0 if image.dtype.kind == "f" else unit)
@@ -46,7 +47,10 @@ def read_depth(path: Path, unit: float) -> NDArray[np.float32]:
 def _decoded(path: Path, flags: int) -> NDArray[np.generic] | None:
     cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)  # what is wrong we say ourselves
     _check_file(path)
-    data = np.fromfile(path, np.uint8)
+    try:
+        data = np.fromfile(path, np.uint8)
+    except OSError as error:
+        raise _wrong(path, f"cannot be read: {error.strerror or error}") from None
     try:
         return cv2.imdecode(data, flags) if len(data) else None
     except cv2.error:  # more pixels than it allows

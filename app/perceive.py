@@ -104,16 +104,16 @@ def _frames(
 ) -> list[tuple[RgbdFrame, RigidTransform]]:
     """Frames and their world_from_camera. Raises `Findings` for all that is wrong in any file."""
     frames, wrong = [], []
-    cameras = {path: load_calibration(path) for path in {f.intrinsics for f in files}}
     number_of = {path: i for i, path in enumerate(dict.fromkeys(f.intrinsics for f in files), 1)}
     for number, f in enumerate(files, 1):
         try:
             if f.depth is None and technique not in NEEDS_NO_DEPTH:
                 message = f"the technique {technique} needs depth; give --depth FILE for each --rgb"
                 raise Findings([Finding("--depth", 1, message)])
-            rgb, depth = _images(f, cameras[f.intrinsics], unit)
+            lens = load_calibration(f.intrinsics)
+            rgb, depth = _images(f, lens, unit)
             camera = f.camera or ("camera" if len(number_of) == 1 else f"camera {number_of[f.intrinsics]}")
-            frame = RgbdFrame(camera, number, 0.0, rgb, depth, cameras[f.intrinsics].intrinsics)
+            frame = RgbdFrame(camera, number, 0.0, rgb, depth, lens.intrinsics)
             frames.append((frame, _place(f, known)))
         except Findings as error:
             wrong += error.items
@@ -193,7 +193,7 @@ def _rounded(values: NDArray[np.float64], digits: int) -> list[float]:
 def _json(answer: dict[str, Any]) -> str:
     """JSON, indented, each list of numbers on one line."""
     text = json.dumps(answer, indent=2, allow_nan=False)
-    return re.sub(r"\[[-+.,e\d\s]+\]", lambda numbers: f"[{' '.join(numbers[0][1:-1].split())}]", text)
+    return re.sub(r"\[\n[-+.,e\d\s]+\]", lambda numbers: f"[{' '.join(numbers[0][1:-1].split())}]", text)
 
 
 def _draw(path: Path, look: Look, result: Estimate | NoEstimate, known: KnownCell, technique: str) -> None:
@@ -206,6 +206,7 @@ def _draw(path: Path, look: Look, result: Estimate | NoEstimate, known: KnownCel
     image = draw_pose(look.frame.rgb, look.frame.intrinsics, found, *size, _lines(technique, result))
     ok, data = cv2.imencode(path.suffix, cv2.cvtColor(image, cv2.COLOR_RGB2BGR))
     assert ok
+    path.parent.mkdir(parents=True, exist_ok=True)
     write_whole(path, data.tobytes())
 
 

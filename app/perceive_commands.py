@@ -1,5 +1,6 @@
 """`regrasp perceive` and `regrasp snapshot`."""
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, TypeVar
@@ -79,7 +80,8 @@ def perceive(
 
     An intrinsics file is what `regrasp calibrate` writes: width, height, fx, fy, cx, cy (pixels) and, if you like,
     distortion: [k1, k2, p1, p2, k3]. A camera pose file holds position: [x, y, z] and quaternion: [x, y, z, w] of the
-    optical frame. Depth as whole numbers counts --depth-unit, as floats metres; 0 and NaN are no reading.
+    optical frame. Depth as whole numbers counts --depth-unit, as floats metres; 0 and NaN are no reading. A note in a
+    picture on how to turn it (EXIF) is not obeyed: the camera's axes are those of its imager.
 
     \b
     Exit code: 0 found, 1 not found, 2 bad input.
@@ -142,7 +144,7 @@ def _color(text: str, wrong: list[Finding]) -> Color | None:
     """A colour of "R,G,B", each then 0 to 1. What is wrong is added to `wrong`."""
     parts = text.split(",")
     right = "write three numbers of 0 to 255, such as 191,13,15"
-    if len(parts) != 3 or not all(part.strip().isdecimal() and int(part) <= 255 for part in parts):
+    if len(parts) != 3 or not all(re.fullmatch(r"\s*\d{1,3}\s*", part) and int(part) <= 255 for part in parts):
         wrong.append(Finding("--color", 1, f"{quoted(text)} is no colour; {right}"))
         return None
     red, green, blue = (int(part) / 255 for part in parts)

@@ -122,6 +122,31 @@ def test_files_of_other_kinds_say_the_same(shots: Shots, tmp_path: Path) -> None
     assert other["pose"]["position"] == pytest.approx(png["pose"]["position"], abs=0.004)
 
 
+def test_depth_of_wider_whole_numbers_counts_the_same(shots: Shots, tmp_path: Path) -> None:
+    png = answer(*frame_of(shots, 0))
+    millimetres = cv2.imread(str(shots.folder / "depth_0.png"), cv2.IMREAD_UNCHANGED)
+    assert millimetres is not None
+    for kind in (">u2", "i2", "i4"):
+        np.save(tmp_path / "d.npy", millimetres.astype(kind))
+        files = ["--rgb", shots.folder / "rgb_0.png", "--intrinsics", shots.folder / "intrinsics.yaml"]
+        assert answer(*files, "--depth", tmp_path / "d.npy")["pose"] == png["pose"]
+
+
+def test_a_picture_lies_as_the_imager_gave_it(shots: Shots, tmp_path: Path) -> None:
+    rgb = cv2.imread(str(shots.folder / "rgb_0.png"))
+    assert rgb is not None
+    jpeg = cv2.imencode(".jpg", rgb, [cv2.IMWRITE_JPEG_QUALITY, 98])[1].tobytes()
+    upside_down = b"\xff\xe1\x00\x22Exif\0\0II*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0\x03\0\0\0\0\0\0\0"
+    (tmp_path / "plain.jpg").write_bytes(jpeg)
+    (tmp_path / "noted.jpg").write_bytes(jpeg[:2] + upside_down + jpeg[2:])
+    turned = cv2.imread(str(tmp_path / "noted.jpg"))
+    assert turned is not None
+    assert np.abs(turned[::-1, ::-1].astype(int) - rgb).mean() < 3  # others obey the note
+    rest = ["--depth", shots.folder / "depth_0.png", "--intrinsics", shots.folder / "intrinsics.yaml"]
+    plain, noted = (answer("--rgb", tmp_path / f"{name}.jpg", *rest) for name in ("plain", "noted"))
+    assert noted["pose"] == plain["pose"]
+
+
 def test_a_bent_picture_is_made_straight(shots: Shots, tmp_path: Path) -> None:
     k = yaml.safe_load((shots.folder / "intrinsics.yaml").read_text())
     (tmp_path / "k.yaml").write_text(yaml.safe_dump(k | {"distortion": [0.1, 0.0, 0.0, 0.0, 0.0]}))
@@ -147,6 +172,8 @@ def test_what_is_not_there_is_not_found_and_why_is_told(shots: Shots, tmp_path: 
     assert told["reason"] == "no_color"
     assert "colour" in told["message"]
     assert (tmp_path / "seen.png").exists()
+    assert invoke(*frame_of(shots, 0), "--color", "0,200,40", "--draw", tmp_path / "new" / "seen.png").exit_code == 1
+    assert (tmp_path / "new" / "seen.png").exists()
     assert json.loads(invoke(*frame_of(shots, 0), "--radius", "0.03").stdout)["reason"] == "not_its_shape"
 
 
@@ -203,6 +230,7 @@ def test_bad_options_are_findings(shots: Shots) -> None:
     assert "0.09 m long and 0.1 thick" in finding(*files, "--radius", "0.05")
     depths = ["--depth", shots.folder / "depth_1.png"]
     assert "--depth:1: given 2 times for 1 pictures; give one for each" in finding(*files, *depths)
+    assert "is no colour" in finding(*files, "--color", "9" * 5000 + ",0,0")
     assert invoke(*files, "--length", "0").exit_code == 2
     assert invoke("--rgb", "a.png").exit_code == 2
 
@@ -224,7 +252,7 @@ def test_bad_files_are_findings_that_say_what_would_be_right(small: Path) -> Non
     assert invoke(*SMALL).exit_code == 1
     cv2.imwrite("grey.png", np.full((48, 64), 8, np.uint8))
     told = finding("--rgb", "rgb.png", "--depth", "grey.png", "--intrinsics", "k.yaml")
-    assert told == "grey.png:1: is 48 x 64 of type uint8; depth is H x W, 16-bit whole numbers or floats in metres"
+    assert told == "grey.png:1: is 48 x 64 of type uint8; depth is H x W, whole numbers of 16 bits or more, or floats in metres"
     assert "is 48 x 64 x 3 of type uint8" in finding("--rgb", "rgb.png", "--depth", "rgb.png", "--intrinsics", "k.yaml")
     cv2.imwrite("wide.png", np.zeros((30, 40), np.uint16))
     told = finding("--rgb", "rgb.png", "--depth", "wide.png", "--intrinsics", "k.yaml")
@@ -235,6 +263,9 @@ def test_bad_files_are_findings_that_say_what_would_be_right(small: Path) -> Non
     told = finding("--rgb", "gone.png", "--depth", "gone.npy", "--intrinsics", "k.yaml")
     assert "'gone.png' does not exist; name an image file" in told
     assert "is no file" in finding("--rgb", ".", "--depth", "depth.png", "--intrinsics", "k.yaml")
+    names = ("b.yaml", "a.yaml", "c.yaml")
+    many = [word for name in names for word in (*SMALL[:4], "--intrinsics", name)]
+    assert [line.split(":")[0] for line in finding(*many).splitlines()] == sorted(names)  # all at once
     (small / "k.yaml").write_text(K.replace("fx: 60.0", "fx: .nan"))
     assert finding(*SMALL).startswith("k.yaml:")
     (small / "k.yaml").write_text(K.replace("fx: 60.0", "fx: 0.5"))
@@ -242,6 +273,13 @@ def test_bad_files_are_findings_that_say_what_would_be_right(small: Path) -> Non
     (small / "k.yaml").write_text(K)
     (small / "pose.yaml").write_text("position: [0, 0, 0]\nquaternion: [0, 0, 0, 0]\n")
     assert "a quaternion x, y, z, w has length 1, this one 0" in finding(*SMALL, "--camera-pose", "pose.yaml")
+
+
+def test_names_of_files_come_out_as_they_are(small: Path) -> None:
+    name = "bild [ 1,  2 ] \u00e4.png"
+    (small / "rgb.png").rename(small / name)
+    told = json.loads(invoke("--rgb", name, *SMALL[2:]).stdout)
+    assert told["frames"][0]["rgb"] == name
 
 
 @settings(max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
