@@ -13,7 +13,7 @@ NEAREST, FARTHEST = 0.05, 20.0  # m; choice: a median depth beyond these is one 
 
 
 def read_rgb(path: Path) -> NDArray[np.uint8]:
-    """A colour picture (H, W, 3), as the imager gave it: which way up it was held does not matter. Raises `Findings`."""
+    """A colour picture (H, W, 3), as the imager gave it, whichever way up it was held. Raises `Findings`."""
     image = _decoded(path, cv2.IMREAD_COLOR_RGB | cv2.IMREAD_IGNORE_ORIENTATION)
     if image is None:
         raise _wrong(path, "is no image that can be read; take it out or save it again")

@@ -68,6 +68,6 @@ def _shares(trials: Sequence[Trial], techniques: Sequence[str], thesis: Mapping[
         axes.set_xticks(range(len(techniques)), techniques)
         axes.set(title=what, ylim=(0, 105))
         if first is not None:
-            axes.legend(loc="lower right")
+            axes.legend(loc="lower right", markerscale=0.4)
     figure.axes[0].set_ylabel("share of trials, %")
     return figure

@@ -11,7 +11,11 @@ class UseTechnique(Leaf):
     """From now on every look is by this technique of `perception.technique`."""
 
     INPUT_PORTS: ClassVar[dict[str, Any]] = {
-        "technique": Port(data_type=str, names="technique", description="rgbd, detector, fused; fiducial where the connector has a tag")
+        "technique": Port(
+            data_type=str,
+            names="technique",
+            description="rgbd, detector, fused; fiducial where the connector has a tag",
+        )
     }
     OUTPUT_PORTS: ClassVar[dict[str, Any]] = {}
     RETURNS = frozenset({Status.SUCCESS})

@@ -252,7 +252,8 @@ def test_bad_files_are_findings_that_say_what_would_be_right(small: Path) -> Non
     assert invoke(*SMALL).exit_code == 1
     cv2.imwrite("grey.png", np.full((48, 64), 8, np.uint8))
     told = finding("--rgb", "rgb.png", "--depth", "grey.png", "--intrinsics", "k.yaml")
-    assert told == "grey.png:1: is 48 x 64 of type uint8; depth is H x W, whole numbers of 16 bits or more, or floats in metres"
+    right = "whole numbers of 16 bits or more, or floats in metres"
+    assert told == f"grey.png:1: is 48 x 64 of type uint8; depth is H x W, {right}"
     assert "is 48 x 64 x 3 of type uint8" in finding("--rgb", "rgb.png", "--depth", "rgb.png", "--intrinsics", "k.yaml")
     cv2.imwrite("wide.png", np.zeros((30, 40), np.uint16))
     told = finding("--rgb", "rgb.png", "--depth", "wide.png", "--intrinsics", "k.yaml")
