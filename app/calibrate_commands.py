@@ -8,6 +8,7 @@ import typer
 from app import output
 from app.findings import Finding, Findings, nearest, shown
 from app.options import MOST_SEED
+from app.progress import late_imports
 from app.resources import resolve
 from app.scenario_file import load_cell
 from interfaces.quote import quoted
@@ -54,7 +55,8 @@ def calibrate(
         wrong.append(Finding("--draw", 1, "is the folder of your pictures, which it would overwrite; name another"))
     if wrong:
         raise Findings(wrong)
-    from app import calibrate as steps  # brings OpenCV and the physics
+    with late_imports():
+        from app import calibrate as steps  # brings OpenCV and the physics
 
     board = steps.Board(columns, rows, square)
     if images is not None:

@@ -22,7 +22,7 @@ from app import (
 )
 from app.findings import Finding, Findings, printable
 from app.options import MOST_SEED, Sets
-from app.progress import shown_progress
+from app.progress import late_imports, shown_progress
 from app.run_every import run_every
 from app.scenario_file import load_scenario
 from app.summary import summary
@@ -144,7 +144,8 @@ def run(
     wrong += [] if out else output.findings(folder)
     if wrong:
         raise Findings(wrong)
-    from app.episode import run_episode  # brings the planner, the compiler and the physics: seconds
+    with late_imports():
+        from app.episode import run_episode  # brings the planner, the compiler and the physics: seconds
 
     with shown_progress(quiet) as progress:
         result = run_episode(loaded, folder, seed=loaded.file.seed, video=video, gui=gui, progress=progress)

@@ -10,6 +10,7 @@ import typer
 from app import output
 from app.findings import Finding, Findings, nearest, shown
 from app.options import MOST_SEED, Sets
+from app.progress import late_imports
 from app.resources import resolve
 from app.scenario_file import load_cell, load_scenario
 from interfaces.cell import Color
@@ -107,7 +108,8 @@ def perceive(
         )
         raise Findings([Finding("--radius", 1, message)])
     known = known.model_copy(update={"connector": connector})
-    from app import perceive as steps  # brings OpenCV and the compiler
+    with late_imports():
+        from app import perceive as steps  # brings OpenCV and the compiler
 
     files = [steps.Files(*each) for each in zip(rgb, depths, models, cameras, poses, strict=True)]
     raise typer.Exit(0 if steps.run(technique, files, known, depth_unit, draw) else 1)
@@ -187,7 +189,8 @@ def snapshot(
         wrong.append(Finding("--camera", 1, f"no camera {quoted(camera)}; {nearest(camera, names)}"))
     if wrong:
         raise Findings(wrong)
-    from app.snapshot import take  # brings the planner, the compiler and the physics: seconds
+    with late_imports():
+        from app.snapshot import take  # brings the planner, the compiler and the physics: seconds
 
     take(loaded, camera, frames, out)
     typer.echo(f"written to {shown(out)}")

@@ -2,8 +2,8 @@
 
 import contextlib
 import signal
-from collections.abc import Callable, Generator, Sequence
-from multiprocessing import get_context
+from collections.abc import Callable, Generator, Iterator, Sequence
+from multiprocessing import get_context, resource_tracker
 from multiprocessing.connection import Connection, wait
 from typing import Any, Generic, NamedTuple, NoReturn, TypeVar
 
@@ -34,7 +34,8 @@ def run_each(tasks: Sequence[Callable[[], T]], jobs: int) -> Generator[Done[T]]:
                 number, task = waiting.pop(0)
                 reader, writer = context.Pipe(duplex=False)
                 process = context.Process(target=_child, args=(writer, task), daemon=True)
-                process.start()
+                with _sigint_blocked():
+                    process.start()
                 writer.close()  # the child has the only one now: its death shows as an end of file
                 running[reader] = number, process
             for ready in wait(list(running)):
@@ -43,6 +44,20 @@ def run_each(tasks: Sequence[Callable[[], T]], jobs: int) -> Generator[Done[T]]:
                 del running[ready]
     finally:
         _stop([process for _, process in running.values()])
+
+
+@contextlib.contextmanager
+def _sigint_blocked() -> Iterator[None]:
+    """What is started meanwhile never hears of a terminal's Ctrl-C, which reaches all of us; here it comes afterwards.
+
+    Ignored by the child itself it would come while it still imports.
+    """
+    resource_tracker.ensure_running()  # its start would end the block
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _received(number: int, reader: Any, process: Any) -> Done[Any]:
@@ -71,8 +86,7 @@ def _child(writer: "Connection[Any, Any]", task: Callable[[], Any]) -> None:
     def interrupt(_number: int, _frame: object) -> NoReturn:
         raise KeyboardInterrupt
 
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal's Ctrl-C reaches all of us; the parent passes it on once
-    signal.signal(signal.SIGTERM, interrupt)
+    signal.signal(signal.SIGTERM, interrupt)  # the parent passes Ctrl-C on once
     with contextlib.suppress(KeyboardInterrupt):
         try:
             value, error = task(), ""

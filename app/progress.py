@@ -57,6 +57,14 @@ class _Lines:
 
 
 @contextmanager
+def late_imports() -> Iterator[None]:
+    """Ctrl-C waits for the end of it: in the middle of their import libraries in C++ swallow it, or die of it."""
+    with interruptible() as check:
+        yield
+        check()
+
+
+@contextmanager
 def interruptible() -> Iterator[Callable[[], None]]:
     """A check that raises KeyboardInterrupt if Ctrl-C came since; the second Ctrl-C does so where it strikes."""
     asked = False

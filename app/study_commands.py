@@ -10,6 +10,7 @@ import typer
 from app import output
 from app.findings import Finding, Findings, nearest, shown
 from app.options import Sets, parse_seeds
+from app.progress import late_imports
 from interfaces.quote import quoted
 
 app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Run many episodes or scenes and count.")
@@ -31,7 +32,8 @@ def demo(
     chosen = parse_seeds(seeds)
     if wrong := _unfit(out, "demo.json"):
         raise Findings(wrong)
-    from app.study import run_demo
+    with late_imports():
+        from app.study import run_demo
 
     raise typer.Exit(run_demo(chosen, jobs, out, sets or []))
 
@@ -51,7 +53,7 @@ def pose(
     configurations: Annotated[
         str | None, typer.Option(metavar="A,B", help="Configurations to try; default all.")
     ] = None,
-    no_grasp: Annotated[bool, typer.Option("--no-grasp", help="Only look: half the time.")] = False,
+    no_grasp: Annotated[bool, typer.Option("--no-grasp", help="Only look: less than half the time.")] = False,
     both_cameras: Annotated[
         bool, typer.Option("--both-cameras", help="A second row each: the wrist camera looks, too.")
     ] = False,
@@ -73,13 +75,15 @@ def pose(
     """
     chosen, wrong = parse_seeds(seeds), _unfit(out, "pose.json")
     names = _techniques(techniques, wrong)
-    from app.pose_scenes import CONFIGURATIONS
+    with late_imports():
+        from app.pose_scenes import CONFIGURATIONS
 
     shown_ones = _listed("--configurations", configurations, tuple(CONFIGURATIONS), wrong)
     if wrong:
         raise Findings(wrong)
-    from app.pose_study import run_pose
-    from app.pose_trial import setups_of
+    with late_imports():
+        from app.pose_study import run_pose
+        from app.pose_trial import setups_of
 
     setups = setups_of(names, cell, grasps=not no_grasp, renderer=renderer)
     raise typer.Exit(run_pose(setups, chosen, jobs, out, shown_ones, both_cameras))
@@ -104,8 +108,9 @@ def coverage(
     names = _techniques(techniques, wrong)
     if wrong:
         raise Findings(wrong)
-    from app.pose_coverage import run_coverage
-    from app.pose_trial import setups_of
+    with late_imports():
+        from app.pose_coverage import run_coverage
+        from app.pose_trial import setups_of
 
     raise typer.Exit(run_coverage(setups_of(names, cell, renderer=renderer), chosen, jobs, out))
 
@@ -119,7 +124,8 @@ def _unfit(out: Path | None, file: str) -> list[Finding]:
 
 
 def _techniques(text: str | None, wrong: list[Finding]) -> list[str]:
-    from perception.technique import TECHNIQUES  # late: it brings the arithmetic
+    with late_imports():
+        from perception.technique import TECHNIQUES  # it brings the arithmetic
 
     return _listed("--techniques", text, TECHNIQUES, wrong)
 
