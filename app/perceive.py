@@ -131,6 +131,9 @@ def _images(files: Files, camera: CalibrationFile, unit: float) -> tuple[NDArray
     if not (abs(k.cx - k.width / 2) < k.width and abs(k.cy - k.height / 2) < k.height):
         right = f"expected a point near the middle of {k.width}x{k.height} pixels"
         raise Findings([Finding(source, 1, f"cx, cy are {k.cx:g}, {k.cy:g}; {right}")])
+    if _folds(camera):
+        right = "write OpenCV's k1, k2, p1, p2, k3, or none"
+        raise Findings([Finding(source, 1, f"distortion bends the picture beyond use; {right}")])
     rgb = read_rgb(files.rgb)
     depth = np.zeros((k.height, k.width), np.float32) if files.depth is None else read_depth(files.depth, unit)
     wrong = [
@@ -144,6 +147,18 @@ def _images(files: Files, camera: CalibrationFile, unit: float) -> tuple[NDArray
     if any(camera.distortion):
         return undistorted(rgb, k, camera.distortion), undistorted(depth, k, camera.distortion)
     return rgb, depth
+
+
+def _folds(camera: CalibrationFile) -> bool:
+    """Whether the distortion folds the picture, or more than doubles it, nearer to its middle than its sides are.
+
+    Further out, where a calibration may have seen nothing, it may.
+    """
+    k, (k1, k2, _, _, k3) = camera.intrinsics, camera.distortion
+    r = np.linspace(0.0, 0.5 * min(k.width / k.fx, k.height / k.fy), 100)
+    with np.errstate(over="ignore", invalid="ignore"):
+        bent = r * (1.0 + k1 * r**2 + k2 * r**4 + k3 * r**6)
+        return not bool(np.all(np.diff(bent) > 0) and bent[-1] < 2.0 * r[-1])  # NaN too
 
 
 def _place(files: Files, known: KnownCell) -> RigidTransform:

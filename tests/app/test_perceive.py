@@ -269,6 +269,9 @@ def test_bad_files_are_findings_that_say_what_would_be_right(small: Path) -> Non
     assert [line.split(":")[0] for line in finding(*many).splitlines()] == sorted(names)  # all at once
     (small / "k.yaml").write_text(K.replace("fx: 60.0", "fx: .nan"))
     assert finding(*SMALL).startswith("k.yaml:")
+    for k1 in ("-5.0", "80.0", "1.0e+300"):
+        (small / "k.yaml").write_text(K + f"distortion: [{k1}, 0, 0, 0, 0]\n")
+        assert finding(*SMALL).startswith("k.yaml:1: distortion bends the picture beyond use; write OpenCV's")
     (small / "k.yaml").write_text(K.replace("fx: 60.0", "fx: 0.5"))
     assert "k.yaml:1: fx, fy are 0.5, 60 pixels; expected 13 to 1280" in finding(*SMALL)
     (small / "k.yaml").write_text(K)
