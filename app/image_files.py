@@ -1,5 +1,6 @@
 """A person's own pictures as arrays: colour and depth files."""
 
+import os
 from pathlib import Path
 
 import cv2
@@ -47,10 +48,7 @@ def read_depth(path: Path, unit: float) -> NDArray[np.float32]:
 def _decoded(path: Path, flags: int) -> NDArray[np.generic] | None:
     cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)  # what is wrong we say ourselves
     _check_file(path)
-    try:
-        data = np.fromfile(path, np.uint8)
-    except OSError as error:
-        raise _wrong(path, f"cannot be read: {error.strerror or error}") from None
+    data = np.fromfile(path, np.uint8)
     try:
         return cv2.imdecode(data, flags) if len(data) else None
     except cv2.error:  # more pixels than it allows
@@ -67,8 +65,8 @@ def _array(path: Path) -> NDArray[np.generic] | None:
 
 
 def _check_file(path: Path) -> None:
-    if not path.is_file():
-        wrong = "is no file" if path.exists() else "does not exist"
+    if not os.path.isfile(path):  # also in a folder that may not be looked into
+        wrong = "is no file" if os.path.exists(path) else "does not exist"
         raise Findings([Finding(shown(path), 1, f"{quoted(shown(path))} {wrong}; name an image file")])
 
 

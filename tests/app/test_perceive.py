@@ -1,6 +1,7 @@
 """`regrasp perceive` and `regrasp snapshot`, as a user types them, on renders that went through files."""
 
 import json
+import os
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -19,6 +20,8 @@ from typer.testing import CliRunner
 from app.camera_pose_file import write_camera_pose
 from app.cli import app
 from app.episode import build_world
+from app.findings import Findings
+from app.image_files import read_depth
 from app.scenario_file import load_scenario
 from app.snapshot import write_frame
 from perception.technique import TECHNIQUES
@@ -345,3 +348,15 @@ def test_snapshot_gives_what_perceive_takes(tmp_path: Path) -> None:
 def test_help_names_every_technique() -> None:
     told = invoke("--help").output
     assert all(name in told for name in TECHNIQUES)
+
+
+def test_a_file_in_a_folder_that_nobody_may_look_into_is_not_there(
+    small: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def locked(path: object, **_: object) -> os.stat_result:
+        raise PermissionError(13, "Permission denied", path)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "stat", locked)
+        with pytest.raises(Findings, match=r"'locked/d.npy' does not exist; name an image file"):
+            read_depth(Path("locked/d.npy"), 0.001)
