@@ -55,6 +55,7 @@ MAX_STRAY = 0.3  # share of the outline that lies more than a pixel off: a cable
 MAX_MIDDLE_MISS, MAX_FAR_MISS = 1.2, 2.2  # deviations of depth: median, and 80th percentile
 MAX_BESIDE = 0.25  # of the patch's pixels
 HEAD_ON = np.cos(np.deg2rad(4.0))  # choice: seen so nearly along its axis it shows a disc, as balls do
+MAX_SURPRISE = 40.0  # of the camera's correction; choice: errors as expected exceed it once in a million cameras
 MAX_MISSING = 0.15  # share of the axis that should show and does not; a shorter rod of 7 cm misses a tenth
 
 
@@ -133,6 +134,9 @@ class Fused:
             return NoEstimate(frame.stamp, frame.camera, NotSeen.NO_COLOR, message)
         errors = CARRIED if frame.camera in self._carried else FIXED
         camera = register(frame, world_from_camera, self._boxes, errors)
+        if camera.surprise > MAX_SURPRISE:
+            message = "the cell's panels are not where the camera's intrinsics, its depth and its place put them"
+            return NoEstimate(frame.stamp, frame.camera, NotSeen.NO_CAMERA, message)
         results = [self._find(frame, cut, camera.scale) for cut in cuts]
         found = [r for r in results if isinstance(r, _Found)]
         if not found:

@@ -1,4 +1,5 @@
 import colorsys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -154,6 +155,24 @@ def test_the_world_pose_agrees_with_position_and_axis(fused: Fused, panels: list
     assert result.whole
     assert result.extent == pytest.approx(0.09, abs=0.01)
     assert np.all(np.linalg.eigvalsh(result.covariance) > 0)
+
+
+FACTORS = (0.5, 0.8, 0.9, 0.95, 1.05, 1.1, 1.25, 2.0)
+
+
+@pytest.mark.parametrize(("focal", "depth"), [pair for x in FACTORS for pair in ((x, 1.0), (1.0, x), (x, x))])
+def test_wrong_intrinsics_or_depths_give_no_wrong_pose_with_small_doubt(
+    fused: Fused, panels: list[Thing], focal: float, depth: float
+) -> None:
+    frame, center, axis = drawn(panels, 7)
+    k = frame.intrinsics
+    wrong = replace(
+        frame, intrinsics=replace(k, fx=focal * k.fx, fy=focal * k.fy), depth=np.float32(depth) * frame.depth
+    )
+    result = fused.estimate(wrong, REAR_POSE, axis=axis)
+    if isinstance(result, Estimate):
+        miss = result.position - center
+        assert miss @ np.linalg.solve(result.covariance[:3, :3], miss) < CHI2_95_OF_3
 
 
 def test_the_95_percent_ellipsoid_holds_the_truth(fused: Fused, panels: list[Thing]) -> None:

@@ -58,6 +58,23 @@ def test_arms_and_obstacles_before_the_panels_do_no_harm(known: KnownCell) -> No
     assert np.mean(off) < 0.003
 
 
+def test_a_thing_before_most_of_a_face_is_not_taken_for_it(known: KnownCell) -> None:
+    piece = Block(np.array([0.25, -0.45, 0.0]), np.array([0.40, 0.30, 0.2]), PURPLE)  # its foot is near the floor
+    for seed in range(5):
+        frame, camera, factor = drawn(known, FIXED, seed, [piece])
+        found = register(frame, REAR_POSE, known.boxes, FIXED)
+        off = miss(found, camera, factor)
+        assert off @ np.linalg.solve(found.point_covariance(PLACE)[:3, :3], off) < 11.3, (seed, off)  # 99 % of chi2, 3
+
+
+def test_surprise_tells_a_camera_that_stands_elsewhere(known: KnownCell) -> None:
+    for seed in range(5):
+        frame, _, _ = drawn(known, FIXED, seed)
+        assert register(frame, REAR_POSE, known.boxes, FIXED).surprise < 25
+    moved = RigidTransform.from_translation([0.02, 0.0, 0.015]) * REAR_POSE
+    assert register(frame, moved, known.boxes, FIXED).surprise > 40
+
+
 def test_without_boxes_only_the_scale_stays_in_doubt(known: KnownCell) -> None:
     frame, _, _ = drawn(known, FIXED, 0)
     found = register(frame, REAR_POSE, (), FIXED)
