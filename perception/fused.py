@@ -55,6 +55,7 @@ MAX_STRAY = 0.3  # share of the outline that lies more than a pixel off: a cable
 MAX_MIDDLE_MISS, MAX_FAR_MISS = 1.2, 2.2  # deviations of depth: median, and 80th percentile
 MAX_BESIDE = 0.25  # of the patch's pixels
 HEAD_ON = np.cos(np.deg2rad(4.0))  # choice: seen so nearly along its axis it shows a disc, as balls do
+LEAST_SHOWN = 1.8  # radii of its length; choice: a shorter piece may be of anything round
 MAX_SURPRISE = 40.0  # of the camera's correction; choice: errors as expected exceed it once in a million cameras
 MAX_MISSING = 0.15  # share of the axis that should show and does not; a shorter rod of 7 cm misses a tenth
 
@@ -137,15 +138,15 @@ class Fused:
         if camera.surprise > MAX_SURPRISE:
             message = "the cell's panels are not where the camera's intrinsics, its depth and its place put them"
             return NoEstimate(frame.stamp, frame.camera, NotSeen.NO_CAMERA, message)
-        results = [self._find(frame, cut, camera.scale) for cut in cuts]
+        results = [self._find(frame, cut, camera) for cut in cuts]
         found = [r for r in results if isinstance(r, _Found)]
         if not found:
             reason, message = next(r for r in results if not isinstance(r, _Found))
             return NoEstimate(frame.stamp, frame.camera, reason, message)
         return _estimate(frame, camera, _choose(found, camera, near), axis)
 
-    def _find(self, frame: RgbdFrame, cut: _Cut, scale: float) -> _Found | tuple[NotSeen, str]:
-        patch = _look(frame, cut, scale, self._stereo.get(frame.camera, D415))
+    def _find(self, frame: RgbdFrame, cut: _Cut, camera: Registration) -> _Found | tuple[NotSeen, str]:
+        patch = _look(frame, cut, camera.scale, self._stereo.get(frame.camera, D415))
         readings, edges = len(patch.sight.points), int(np.count_nonzero(~patch.sight.inside))
         if readings < MIN_READINGS:
             return NotSeen.NO_DEPTH, f"{readings} depth readings on {patch.area} pixels, {MIN_READINGS} are needed"
@@ -155,9 +156,15 @@ class Fused:
         refusal = _refusal(patch, best, self._connector)
         if refusal is not None:
             return NotSeen.NOT_ITS_SHAPE, refusal
+        center = camera.world_from_camera.apply(best.center)
+        for box in self._boxes:  # a flat piece of its colour on a panel, partly hidden, fits best there
+            if np.all(np.abs(center - box.center) < 0.5 * np.asarray(box.size)):
+                return NotSeen.NOT_ITS_SHAPE, f"it would lie within the {box.name.replace('_', ' ')}"
         whole, leaves = _ends(patch, best, self._connector)
         if leaves == [False, False]:
             return NotSeen.NOT_ITS_SHAPE, "no cable leaves either of its ends"
+        if True not in leaves and (less := _too_little(patch, best, self._connector)) is not None:
+            return NotSeen.TOO_SMALL, f"no cable shows, and {less}"
         sign = float(leaves[0] is True) - float(leaves[1] is True)
         return _Found(patch, _doubted(best, others), whole, sign)
 
@@ -292,9 +299,7 @@ def _refusal(patch: _Patch, found: Fit, connector: Connector) -> str | None:
     """Why the patch is not the connector, in a sentence; None when it may be."""
     sight, size = patch.sight, (connector.radius, connector.length)
     misses, far = nearest_on_rays(sight.rays, found.center, found.axis, *size)
-    across = np.cross(found.axis, found.center / np.linalg.norm(found.center))
-    aside = ((far[:, None] * sight.rays - found.center) @ across)[~sight.inside]
-    if patch.cut.broken_off and min(np.count_nonzero(aside > 0), np.count_nonzero(aside < 0)) < SIDE_EDGES:
+    if patch.cut.broken_off and not _both_sides(patch, found, connector):
         return "it goes on beyond the picture, and only one side of it shows"
     pixels = np.abs(misses / far * patch.intrinsics.fx)[~sight.inside]
     edge, stray = float(np.median(pixels)), float(np.mean(pixels > 1.0))
@@ -312,6 +317,24 @@ def _refusal(patch: _Patch, found: Fit, connector: Connector) -> str | None:
     if missing > MAX_MISSING:
         return f"{missing:.0%} of its length should show and does not, at most {MAX_MISSING:.0%} may be"
     return None
+
+
+def _too_little(patch: _Patch, found: Fit, connector: Connector) -> str | None:
+    """Why what shows of the body, but for its cable, may be a bit of anything; None where it is enough."""
+    if patch.cut.broken_off:
+        return "it goes on beyond the picture"
+    if not _both_sides(patch, found, connector):
+        return "only one side of it"
+    shown, least = _extent(patch, found), LEAST_SHOWN * connector.radius
+    return f"{1e3 * shown:.0f} mm of its length, {1e3 * least:.0f} are needed" if shown < least else None
+
+
+def _both_sides(patch: _Patch, found: Fit, connector: Connector) -> bool:
+    """Whether the outline shows on either side of the axis: how thick it is."""
+    rays = patch.sight.rays[~patch.sight.inside]
+    _, far = nearest_on_rays(rays, found.center, found.axis, connector.radius, connector.length)
+    aside = (far[:, None] * rays - found.center) @ np.cross(found.axis, found.center)
+    return min(np.count_nonzero(aside > 0), np.count_nonzero(aside < 0)) >= SIDE_EDGES
 
 
 def _beside(patch: _Patch, found: Fit, connector: Connector) -> int:
@@ -340,6 +363,11 @@ def _ends(patch: _Patch, found: Fit, connector: Connector) -> tuple[bool, list[b
     return any(seen), leaves
 
 
+def _extent(patch: _Patch, found: Fit) -> float:
+    """Length m of what shows, along the axis."""
+    return float(np.ptp(np.percentile((patch.sight.points - found.center) @ found.axis, [1, 99])))
+
+
 def _choose(found: list[_Found], camera: Registration, near: FloatArray | None) -> _Found:
     """The one nearest to where it was, else the largest."""
     if near is None:
@@ -360,7 +388,6 @@ def _estimate(frame: RgbdFrame, camera: Registration, found: _Found, hint: Float
     covariance[3:, 3:] += ROLL_VARIANCE * np.outer(axis, axis)
     x, y, z = position.tolist()
     ax, ay, az = (sign * axis).tolist()
-    along = (found.patch.sight.points - found.fit.center) @ found.fit.axis
     return Estimate(
         frame.stamp,
         frame.camera,
@@ -370,7 +397,7 @@ def _estimate(frame: RgbdFrame, camera: Registration, found: _Found, hint: Float
         covariance,
         len(found.patch.sight.points),
         found.patch.area,
-        float(np.ptp(np.percentile(along, [1, 99]))),
+        _extent(found.patch, found.fit),
         found.whole,
         bool(found.sign),
     )

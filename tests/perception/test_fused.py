@@ -121,6 +121,24 @@ def test_what_only_has_its_colour_is_refused(fused: Fused, panels: list[Thing], 
         assert result.reason is NotSeen.NOT_ITS_SHAPE
 
 
+def test_a_bit_of_something_without_a_cable_is_refused(fused: Fused, panels: list[Thing]) -> None:
+    lid = Block(PLACE - np.array([0.05, 0.1, 0.11]), PLACE + np.array([-0.03, 0.1, 0.006]), PURPLE)
+    for seed in range(4):
+        result = fused.estimate(seen([*panels, Ball(PLACE, 0.0115), lid], seed=seed), REAR_POSE)
+        assert isinstance(result, NoEstimate)
+
+
+def test_a_flat_piece_on_a_panel_is_refused(fused: Fused, panels: list[Thing], known: KnownCell) -> None:
+    back = next(box for box in known.boxes if box.name == "back_panel")
+    face = back.center[0] - back.size[0] / 2
+    sticker = Block(np.array([face - 0.0005, 0.0, 0.3]), np.array([face, 0.08, 0.33]), RED)
+    plug_before = Cylinder(np.array([face - 0.02, 0.04, 0.30]), LEFTWARDS, 0.12, 0.012, BLACK)
+    at = np.array([face, 0.04, 0.33])
+    for seed in range(4):
+        result = fused.estimate(seen([*panels, sticker, plug_before], at, seed=seed), REAR_POSE)
+        assert isinstance(result, NoEstimate)
+
+
 def test_red_things_beside_it_are_not_mistaken(fused: Fused, panels: list[Thing]) -> None:
     above, right = np.array([0.0, 0.0, 0.09]), np.array([0.0, -0.10, 0.09])
     others: list[Thing] = [Ball(PLACE + above, 0.03), Block(PLACE + right - 0.03, PLACE + right + 0.03, RED)]
@@ -176,11 +194,13 @@ def test_wrong_intrinsics_or_depths_give_no_wrong_pose_with_small_doubt(
 
 
 def test_the_95_percent_ellipsoid_holds_the_truth(fused: Fused, panels: list[Thing]) -> None:
-    inside, draws = 0, 300
+    inside, found, draws = 0, 0, 300
     for seed in range(1000, 1000 + draws):
         frame, center, axis = drawn(panels, seed)
         result = fused.estimate(frame, REAR_POSE, axis=axis)
-        assert isinstance(result, Estimate), (seed, result)
-        miss = result.position - center
-        inside += bool(miss @ np.linalg.solve(result.covariance[:3, :3], miss) < CHI2_95_OF_3)
-    assert 0.88 * draws <= inside <= 0.995 * draws
+        if isinstance(result, Estimate):
+            found += 1
+            miss = result.position - center
+            inside += bool(miss @ np.linalg.solve(result.covariance[:3, :3], miss) < CHI2_95_OF_3)
+    assert found >= 0.98 * draws  # the picture's rim cuts one now and then
+    assert 0.88 * found <= inside <= 0.995 * found
