@@ -334,7 +334,7 @@ def _both_sides(patch: _Patch, found: Fit, connector: Connector) -> bool:
     rays = patch.sight.rays[~patch.sight.inside]
     _, far = nearest_on_rays(rays, found.center, found.axis, connector.radius, connector.length)
     aside = (far[:, None] * rays - found.center) @ np.cross(found.axis, found.center)
-    return min(np.count_nonzero(aside > 0), np.count_nonzero(aside < 0)) >= SIDE_EDGES
+    return bool(min(np.count_nonzero(aside > 0), np.count_nonzero(aside < 0)) >= SIDE_EDGES)
 
 
 def _beside(patch: _Patch, found: Fit, connector: Connector) -> int:
