@@ -11,6 +11,7 @@ import typer
 from app import output
 from app.findings import Finding, Findings, shown
 from app.options import MOST_SEED
+from app.record import write_whole
 from app.resources import resolve
 
 if TYPE_CHECKING:
@@ -30,8 +31,8 @@ def add_to(app: typer.Typer) -> None:
 def train_detector(
     out: Annotated[Path, typer.Option(help="The folder for detector.onnx and evaluation.json.")],
     cell: _Cell = "thesis",
-    pictures: Annotated[int, typer.Option(min=24, help="Random pictures to train on.")] = 3000,
-    steps: Annotated[int, typer.Option(min=1, help="Training steps of 32 parts of pictures each.")] = 6000,
+    pictures: Annotated[int, typer.Option(min=24, help="Random pictures to train on.")] = 8000,
+    steps: Annotated[int, typer.Option(min=1, help="Training steps of 32 parts of pictures each.")] = 14000,
     held_out: Annotated[int, typer.Option(min=1, help="Pictures of each class to evaluate on at the end.")] = 60,
     seed: _Seed = TRAINING_SEED,
 ) -> None:
@@ -62,7 +63,7 @@ def train_detector(
     with _progress("drawing pictures", pictures) as tell:
         drawn = make_pictures(loaded, seed, pictures, tell)
     with _progress("training", steps) as tell:
-        train(drawn, seed, steps, lambda model, _score: _write(out / "detector.onnx", model), tell)
+        train(drawn, seed, steps, lambda model, _score: write_whole(out / "detector.onnx", model), tell)
     evaluate_detector(out / "detector.onnx", cell, held_out, out=out / "evaluation.json")
 
 
@@ -83,6 +84,8 @@ def evaluate_detector(
       regrasp evaluate-detector results/detector/detector.onnx --out evaluation.json
     """
     wrong = output.unwritable(out.parent) if out else []
+    if out is not None and out.is_dir():
+        wrong.append(Finding(shown(out), 1, "is a folder; name a file"))
     if model is not None and not model.is_file():
         wrong.append(Finding(shown(model), 1, "is no file; name an ONNX file that `regrasp train-detector` made"))
     if wrong:
@@ -95,7 +98,8 @@ def evaluate_detector(
         shots = held_out_shots(loaded, seed, held_out, tell=tell)
     figures = summary([answer(detector, shot, loaded, number) for number, shot in enumerate(shots)])
     if out is not None:
-        _write(out, (json.dumps(figures, indent=2) + "\n").encode())
+        out.parent.mkdir(parents=True, exist_ok=True)
+        write_whole(out, json.dumps(figures, indent=2) + "\n")
     _print(figures)
 
 
@@ -108,22 +112,17 @@ def _load(cell: str) -> "Cell":
 def _detector(cell: "Cell", model: Path | None) -> Any:
     """The detector with that network. Raises `Findings` if the file holds none."""
     import cv2
+    import numpy as np
 
-    from perception.detector import Detector
+    from perception.detector import HEIGHT, WIDTH, Detector
 
     try:
-        return Detector(cell.known, model.read_bytes() if model else None)
-    except cv2.error:
-        message = "holds no network; name an ONNX file that `regrasp train-detector` made"
+        detector = Detector(cell.known, model.read_bytes() if model else None)
+        detector.detect(np.zeros((HEIGHT, WIDTH, 3), np.uint8))
+        return detector
+    except (cv2.error, ValueError):
+        message = "holds no such network; name an ONNX file that `regrasp train-detector` made"
         raise Findings([Finding(shown(model) if model else "detector.onnx", 1, message)]) from None
-
-
-def _write(path: Path, data: bytes) -> None:
-    """Whole or not at all."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(path.name + ".part")
-    part.write_bytes(data)
-    part.replace(path)
 
 
 def _print(figures: dict[str, Any]) -> None:

@@ -26,7 +26,7 @@ from interfaces.quote import quoted
 from perception.calibration import undistorted
 from perception.estimate import Estimate, NoEstimate
 from perception.fusion import fuse
-from perception.registration import FIXED, register
+from perception.registration import expected_errors, register
 from perception.technique import TECHNIQUES, TechniqueName, make_technique
 
 NEEDS_NO_DEPTH = ("fiducial",)
@@ -215,7 +215,8 @@ def _draw(path: Path, look: Look, result: Estimate | NoEstimate, known: KnownCel
     """The result on the look's picture."""
     place = look.world_from_camera
     if technique == "fused":  # which sets the camera right first
-        place = register(look.frame, place, known.boxes, FIXED).world_from_camera
+        errors = expected_errors(known, look.frame.camera)
+        place = register(look.frame, place, known.boxes, errors).world_from_camera
     found = (result, place.inv()) if isinstance(result, Estimate) else None
     size = (known.connector.radius, known.connector.length)
     image = draw_pose(look.frame.rgb, look.frame.intrinsics, found, *size, _lines(technique, result))

@@ -136,7 +136,10 @@ class Detector:
         """The network's output (7, 60, 108), and how much smaller than `rgb` it saw the image."""
         canvas, scale = fitted(rgb)
         self._net.setInput(cv2.dnn.blobFromImage(canvas, 1 / 255))
-        return self._net.forward()[0], scale
+        maps = self._net.forward()
+        if maps.shape != (1, 7, HEIGHT // STRIDE, WIDTH // STRIDE):
+            raise ValueError(f"a network that answers with maps of shape {maps.shape} is none of ours")
+        return maps[0], scale
 
     def _borrowed_axis(self, frame: RgbdFrame, box: Detection) -> FloatArray | None:
         """The axis (3,) that the RGB-D technique finds in the box, optical frame; None where it finds too little."""

@@ -12,14 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
-from interfaces.cell import CameraSpec, Connector, KnownCell, WristMount, pose_along
+from interfaces.cell import CameraSpec, Connector, KnownCell, pose_along
 from interfaces.frame import Intrinsics, RgbdFrame
 from perception.cable_end import cable_leaves
 from perception.camera_model import FURTHEST, NEAREST, project
 from perception.cylinder import COARSE, FINE, Fit, Sight, depth_misses, fit, nearest_on_rays, thinned
 from perception.estimate import LEFT, ROLL_VARIANCE, Estimate, NoEstimate
 from perception.outline import outline
-from perception.registration import CARRIED, FIXED, Registration, register
+from perception.registration import FIXED, CameraErrors, Registration, expected_errors, register
 from perception.segmentation import NotSeen, SegmentationParameters, color_mask
 
 FloatArray = NDArray[np.float64]
@@ -116,7 +116,7 @@ class Fused:
 
     def __init__(self, known: KnownCell) -> None:
         self._connector, self._boxes = known.connector, known.boxes
-        self._carried = {c.name for c in known.cameras if isinstance(c.mount, WristMount)}
+        self._errors: dict[str, CameraErrors] = {c.name: expected_errors(known, c.name) for c in known.cameras}
         self._stereo: dict[str, _Stereo] = {c.name: _Stereo.of(c) for c in known.cameras}
         self._color = SegmentationParameters.for_color(known.connector.color)
 
@@ -133,8 +133,7 @@ class Fused:
         if not cuts:
             message = f"no patch of {MIN_AREA} pixels has the connector's colour"
             return NoEstimate(frame.stamp, frame.camera, NotSeen.NO_COLOR, message)
-        errors = CARRIED if frame.camera in self._carried else FIXED
-        camera = register(frame, world_from_camera, self._boxes, errors)
+        camera = register(frame, world_from_camera, self._boxes, self._errors.get(frame.camera, FIXED))
         if camera.surprise > MAX_SURPRISE:
             message = "the cell's panels are not where the camera's intrinsics, its depth and its place put them"
             return NoEstimate(frame.stamp, frame.camera, NotSeen.NO_CAMERA, message)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from interfaces.cell import Box
+from interfaces.cell import Box, KnownCell, WristMount
 from interfaces.frame import RgbdFrame
 from perception.camera_model import rays, subsampled
 
@@ -42,6 +42,12 @@ class CameraErrors:
 FIXED = CameraErrors(0.002, 0.003, 0.015)
 # choice: an arm adds 5 mm at its tool, made by joints some 8 mrad off, now and then one of them 50
 CARRIED = CameraErrors(0.006, 0.02, 0.015)
+
+
+def expected_errors(known: KnownCell, camera: str) -> CameraErrors:
+    """Those of a camera of the cell by how it is mounted; one that is not in the cell is taken to be fixed."""
+    mounts = [c.mount for c in known.cameras if c.name == camera]
+    return CARRIED if any(isinstance(mount, WristMount) for mount in mounts) else FIXED
 
 
 @dataclass(frozen=True, eq=False)

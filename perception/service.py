@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import RigidTransform
 
-from interfaces.cell import FixedMount, KnownCell
+from interfaces.cell import KnownCell
 from interfaces.devices import Camera, Clock
 from interfaces.frame import RgbdFrame
 from perception.camera_health import CameraHealth
 from perception.estimate import Estimate, NoEstimate
 from perception.occupancy import ASSUMED_DEPTH, Occupancy, Spheres
-from perception.registration import CARRIED, FIXED, register
+from perception.registration import expected_errors, register
 from perception.segmentation import NotSeen
 from perception.technique import TechniqueName, make_technique
 from perception.track import ConnectorTrack
@@ -94,8 +94,7 @@ class Perception:
         frame = self.frame(camera)
         if frame is not None:
             depth = ASSUMED_DEPTH if camera == "rear" else 0.0
-            errors = FIXED if isinstance(self._known.camera(camera).mount, FixedMount) else CARRIED
-            place = register(frame, self._pose_of(frame), self._known.boxes, errors)
+            place = register(frame, self._pose_of(frame), self._known.boxes, expected_errors(self._known, camera))
             scaled = replace(frame, depth=frame.depth * np.float32(place.scale))
             self.occupancy.integrate(scaled, place.world_from_camera, self._arm_spheres(), depth)
         return len(self.occupancy.occupied_points())

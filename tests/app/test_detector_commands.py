@@ -38,3 +38,9 @@ def test_a_file_without_a_network_is_one_line(tmp_path: Path, data: bytes | None
     assert result.exit_code == 2
     assert result.output.count("\n") == 1
     assert "bad.onnx" in result.output
+
+
+def test_a_folder_for_the_figures_is_refused_at_once(tmp_path: Path) -> None:
+    result = invoke("evaluate-detector", "--out", str(tmp_path))
+    assert result.exit_code == 2
+    assert "is a folder; name a file" in result.output
