@@ -91,6 +91,8 @@ class Insert(HandLeaf):
             return
         mean = fuse(long)
         found = self.services.motion.tool(HAND).inv() * mean.world_from_connector
+        if _axis(found) @ _axis(belief.held) < 0:  # a finger was taken for the cable: no connector turns round in a jaw
+            found = found * RigidTransform.from_rotation(Rotation.from_euler("z", 180, degrees=True))
         # The fingers end the visible part as an end of its own would: unless all of the length shows, where the part
         # lies on it is a guess.
         whole = mean.extent > WHOLE_SHARE * self.services.known.connector.length

@@ -49,8 +49,16 @@ class LookLeaf(HandLeaf):
                 return view, goals
         raise PlanningError(CauseCode.OUT_OF_REACH, "no free place from which the whole connector shows")
 
-    def go_and_look(self, goals: NDArray[np.float64], seconds: float, seen: list[Estimate]) -> Steps:
+    def go_and_look(
+        self,
+        goals: NDArray[np.float64],
+        seconds: float,
+        seen: list[Estimate],
+        glimpses: list[NDArray[np.float64]] | None = None,
+    ) -> Steps:
         """Move the camera to one of the goals, look for so long, gather estimates in `seen`, map what stands there.
+
+        `glimpses`: places (3,) m where something showed that may be the connector.
 
         Unlike a yielded task, a motion that cannot be raises its PlanningError here, to the caller.
         """
@@ -69,3 +77,5 @@ class LookLeaf(HandLeaf):
                 motion.set_obstacles(perception.occupancy.occupied_points(), perception.occupancy.h)
             if isinstance(result, Estimate):
                 seen.append(result)
+            elif glimpses is not None and result.glimpse is not None:
+                glimpses.append(result.glimpse)

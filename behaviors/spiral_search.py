@@ -1,11 +1,12 @@
 """Look behind things with the wrist camera: the thesis's spiral (Hwang 2024, section 3.4.3)."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from itertools import product
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import RigidTransform
+from scipy.spatial.transform import RigidTransform, Rotation
 
 from behaviors.hand import EYE
 from behaviors.leaf import Failed, Port, Steps
@@ -29,8 +30,9 @@ class SpiralSearch(LookLeaf):
     """Moves the left arm's camera from stop to stop until it sees the connector, at most `time_limit` seconds.
 
     Starts where the connector was last seen, else, and after a search from there in vain, at the back panel's middle. A
-    stop that cannot be reached, not even a little nearer or further, is skipped and logged. When all is in vain the arm
-    goes back to sleep.
+    stop that cannot be reached, not even a little nearer or further, is skipped and logged. Where something shows that
+    may be the connector, but too little of it to tell, the camera looks there next. When all is in vain the arm goes
+    back to sleep.
     """
 
     INPUT_PORTS: ClassVar[dict[str, Any]] = {
@@ -52,12 +54,16 @@ class SpiralSearch(LookLeaf):
             if clock.now() > begin + self.get_input("time_limit"):
                 break
             seen: list[Estimate] = []
+            glimpses: list[NDArray[np.float64]] = []
             try:
-                yield from self.go_and_look(self._goals(stop), self.get_input("look_seconds"), seen)
+                goals = self._goals([stop.world_from_camera])
+                yield from self.go_and_look(goals, self.get_input("look_seconds"), seen, glimpses)
             except PlanningError:
                 skipped.append(stop.index)
                 continue
             looked += 1
+            if len(seen) < ENOUGH <= len(glimpses):
+                yield from self._look_there(stop.world_from_camera, np.median(glimpses, axis=0), seen)
             if len(seen) >= ENOUGH:
                 found = fuse(seen)
                 belief.connector, belief.sure = found.world_from_connector, found.whole
@@ -84,9 +90,22 @@ class SpiralSearch(LookLeaf):
         self.say("search", start=start.round(3).tolist(), last_seen=from_last)
         return spiral(start, rear.mount.world_from_camera, rear.intrinsics, DISTANCE)
 
-    def _goals(self, stop: Stop) -> NDArray[np.float64]:
-        for nearer in NEARER:
-            pose = stop.world_from_camera * RigidTransform.from_translation([0.0, 0.0, nearer])
+    def _look_there(self, world_from_camera: RigidTransform, place: NDArray[np.float64], seen: list[Estimate]) -> Steps:
+        """Look where something showed that may be the connector: the same way, from before it, else turned."""
+        sight = world_from_camera.rotation.apply([0.0, 0.0, 1.0])
+        before = RigidTransform.from_components(place - DISTANCE * sight, world_from_camera.rotation)
+        turn, _ = Rotation.align_vectors(place - world_from_camera.translation, sight)
+        turned = RigidTransform.from_components(world_from_camera.translation, turn * world_from_camera.rotation)
+        self.say("glimpsed", position=place.round(3).tolist())
+        try:
+            goals = self._goals([before, turned])
+            yield from self.go_and_look(goals, self.get_input("look_seconds"), seen)
+        except PlanningError as error:
+            self.say("no closer look", why=str(error))
+
+    def _goals(self, views: Sequence[RigidTransform]) -> NDArray[np.float64]:
+        for view, nearer in product(views, NEARER):
+            pose = view * RigidTransform.from_translation([0.0, 0.0, nearer])
             goals = self.view_goals(pose)
             if len(goals):
                 return goals

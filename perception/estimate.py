@@ -40,12 +40,16 @@ class Estimate:
 
 @dataclass(frozen=True)
 class NoEstimate:
-    """No pose from this frame: the named reason, and a sentence with the numbers."""
+    """No pose from this frame: the named reason, and a sentence with the numbers.
+
+    `glimpse` (3,) m, world: where something shows that may be the connector, but too little of it to tell.
+    """
 
     stamp: float
     camera: str
     reason: NotSeen
     message: str
+    glimpse: FloatArray | None = None
 
 
 def pose_covariance(axis: FloatArray, position: float, angle: float) -> FloatArray:

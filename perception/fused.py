@@ -12,29 +12,20 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
-from interfaces.cell import CameraSpec, Connector, KnownCell, pose_along
-from interfaces.frame import Intrinsics, RgbdFrame
+from interfaces.cell import Connector, KnownCell, pose_along
+from interfaces.frame import RgbdFrame
 from perception.cable_end import cable_leaves
-from perception.camera_model import FURTHEST, NEAREST, project
+from perception.camera_model import project
 from perception.cylinder import COARSE, FINE, Fit, Sight, depth_misses, fit, nearest_on_rays, thinned
 from perception.estimate import LEFT, ROLL_VARIANCE, Estimate, NoEstimate
-from perception.outline import outline
+from perception.patch import D415, MIN_AREA, Cut, Patch, Stereo, directions, look, patches
 from perception.registration import FIXED, CameraErrors, Registration, expected_errors, register
 from perception.segmentation import NotSeen, SegmentationParameters, color_mask
 
 FloatArray = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-MIN_AREA = 40  # pixels; choice: 3 % of the connector at 0.75 m; less tells no shape
 MIN_READINGS, MIN_EDGES = 12, 8
-PATCHES = 4  # the largest patches of the colour are tried
-MARGIN = 60  # pixels round a patch that are looked at: what is beyond its ends tells too, and beyond its shadow
-DISPARITY_NOISE = 0.2  # pixels; RealSense in honest use, 0.08 at its best
-QUANTUM = 0.0003  # m: deviation of a reading rounded to millimetres
-INDEPENDENT_AREA = 20.0  # pixels an independent reading; choice: a stereo matching window of some 5 pixels
-EDGE_WIDTH = 0.5  # pixels: deviation of an outline point
-EDGE_SHARE = 0.6  # of the outline's points count as independent: neighbours are rounded alike
-POINTS, EDGES = 200, 160  # at most, for speed; neighbouring readings err alike, more change no result
 SIDE_SEEN = 2.0  # choice: a patch so many times longer than wide shows which way the axis runs in the image
 TILTS = np.deg2rad([-80.0, -65.0, -40.0, 0.0, 40.0, 65.0, 80.0])  # of the starts, out of the image: noise tilts a stub
 TURNS = np.deg2rad([0.0, 45.0, 90.0, 135.0])  # of the starts, in the image, where the patch does not show it
@@ -60,55 +51,23 @@ MAX_SURPRISE = 40.0  # of the camera's correction; choice: errors as expected ex
 MAX_MISSING = 0.15  # share of the axis that should show and does not; a shorter rod of 7 cm misses a tenth
 
 
-@dataclass(frozen=True)
-class _Stereo:
-    """A depth imager: its `baseline` in m, and its `noise`, a reading's deviation over its square in 1/m."""
-
-    baseline: float
-    noise: float
-
-    @classmethod
-    def of(cls, camera: CameraSpec) -> "_Stereo":
-        """That of a camera of the cell."""
-        focal = 0.5 * camera.width / float(np.tan(np.deg2rad(camera.depth_fov_deg) / 2))
-        return cls(camera.baseline, DISPARITY_NOISE / (focal * camera.baseline))
-
-
-D415 = _Stereo(0.055, 0.0055)  # of a camera that is not in the cell
-
-
-@dataclass(frozen=True, eq=False)
-class _Cut:
-    """A `window` of the frame: the `mask` (h, w) of one patch of the colour there, and of the `others`.
-
-    `broken_off`: the patch reaches the picture's rim.
-    """
-
-    mask: Mask
-    others: Mask
-    window: tuple[slice, slice]
-    broken_off: bool
-
-
-@dataclass(frozen=True, eq=False)
-class _Patch:
-    """A patch of the colour in the camera's frame: what to fit, and what is seen around it."""
-
-    cut: _Cut
-    depth: NDArray[np.float32]  # (h, w) m, scale corrected
-    intrinsics: Intrinsics  # of the window
-    sight: Sight
-    area: int
-
-
 @dataclass(frozen=True, eq=False)
 class _Found:
     """A fit that holds, in the camera's frame; `sign` is +1 where the axis points from cable to tip, 0 if not seen."""
 
-    patch: _Patch
+    patch: Patch
     fit: Fit
     whole: bool
     sign: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Refused:
+    """A patch that is not the connector, or shows too little of it, and why; see `NoEstimate`."""
+
+    reason: NotSeen
+    message: str
+    glimpse: FloatArray | None = None
 
 
 class Fused:
@@ -117,7 +76,7 @@ class Fused:
     def __init__(self, known: KnownCell) -> None:
         self._connector, self._boxes = known.connector, known.boxes
         self._errors: dict[str, CameraErrors] = {c.name: expected_errors(known, c.name) for c in known.cameras}
-        self._stereo: dict[str, _Stereo] = {c.name: _Stereo.of(c) for c in known.cameras}
+        self._stereo: dict[str, Stereo] = {c.name: Stereo.of(c) for c in known.cameras}
         self._color = SegmentationParameters.for_color(known.connector.color)
 
     def estimate(
@@ -129,7 +88,7 @@ class Fused:
         near: FloatArray | None = None,
     ) -> Estimate | NoEstimate:
         """See `Technique.estimate`."""
-        cuts = _patches(color_mask(frame.rgb, self._color))
+        cuts = patches(color_mask(frame.rgb, self._color))
         if not cuts:
             message = f"no patch of {MIN_AREA} pixels has the connector's colour"
             return NoEstimate(frame.stamp, frame.camera, NotSeen.NO_COLOR, message)
@@ -140,87 +99,38 @@ class Fused:
         results = [self._find(frame, cut, camera) for cut in cuts]
         found = [r for r in results if isinstance(r, _Found)]
         if not found:
-            reason, message = next(r for r in results if not isinstance(r, _Found))
-            return NoEstimate(frame.stamp, frame.camera, reason, message)
+            refused = [r for r in results if isinstance(r, _Refused)]
+            told = next((r for r in refused if r.glimpse is not None), refused[0])
+            return NoEstimate(frame.stamp, frame.camera, told.reason, told.message, told.glimpse)
         return _estimate(frame, camera, _choose(found, camera, near), axis)
 
-    def _find(self, frame: RgbdFrame, cut: _Cut, camera: Registration) -> _Found | tuple[NotSeen, str]:
-        patch = _look(frame, cut, camera.scale, self._stereo.get(frame.camera, D415))
+    def _find(self, frame: RgbdFrame, cut: Cut, camera: Registration) -> _Found | _Refused:
+        patch = look(frame, cut, camera.scale, self._stereo.get(frame.camera, D415))
         readings, edges = len(patch.sight.points), int(np.count_nonzero(~patch.sight.inside))
         if readings < MIN_READINGS:
-            return NotSeen.NO_DEPTH, f"{readings} depth readings on {patch.area} pixels, {MIN_READINGS} are needed"
+            return _Refused(
+                NotSeen.NO_DEPTH, f"{readings} depth readings on {patch.area} pixels, {MIN_READINGS} are needed"
+            )
         if edges < MIN_EDGES:
-            return NotSeen.TOO_SMALL, f"{edges} points of its outline are in sight, {MIN_EDGES} are needed"
+            return _Refused(NotSeen.TOO_SMALL, f"{edges} points of its outline are in sight, {MIN_EDGES} are needed")
         best, *others = _fits(patch, self._connector)
         refusal = _refusal(patch, best, self._connector)
         if refusal is not None:
-            return NotSeen.NOT_ITS_SHAPE, refusal
+            return _Refused(NotSeen.NOT_ITS_SHAPE, refusal)
         center = camera.world_from_camera.apply(best.center)
         for box in self._boxes:  # a flat piece of its colour on a panel, partly hidden, fits best there
             if np.all(np.abs(center - box.center) < 0.5 * np.asarray(box.size)):
-                return NotSeen.NOT_ITS_SHAPE, f"it would lie within the {box.name.replace('_', ' ')}"
+                return _Refused(NotSeen.NOT_ITS_SHAPE, f"it would lie within the {box.name.replace('_', ' ')}")
         whole, leaves = _ends(patch, best, self._connector)
         if leaves == [False, False]:
-            return NotSeen.NOT_ITS_SHAPE, "no cable leaves either of its ends"
+            return _Refused(NotSeen.NOT_ITS_SHAPE, "no cable leaves either of its ends")
         if True not in leaves and (less := _too_little(patch, best, self._connector)) is not None:
-            return NotSeen.TOO_SMALL, f"no cable shows, and {less}"
+            return _Refused(NotSeen.TOO_SMALL, f"no cable shows, and {less}", center)
         sign = float(leaves[0] is True) - float(leaves[1] is True)
         return _Found(patch, _doubted(best, others), whole, sign)
 
 
-def _patches(binary: NDArray[np.uint8]) -> list[_Cut]:
-    """The largest patches of a colour mask (H, W), largest first."""
-    contours, _ = cv2.findContours(binary, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-    patches = []
-    for contour in sorted(contours, key=cv2.contourArea, reverse=True)[:PATCHES]:
-        u, v, width, height = cv2.boundingRect(contour)
-        u0, v0 = max(0, u - MARGIN), max(0, v - MARGIN)
-        window = np.s_[v0 : v + height + MARGIN, u0 : u + width + MARGIN]
-        filled = np.zeros_like(binary[window])
-        cv2.drawContours(filled, [contour], -1, 255, cv2.FILLED, offset=(-u0, -v0))
-        cv2.bitwise_and(filled, binary[window], dst=filled)
-        if cv2.countNonZero(filled) >= MIN_AREA:
-            broken_off = u == 0 or v == 0 or u + width == binary.shape[1] or v + height == binary.shape[0]
-            patches.append(_Cut(filled > 0, binary[window] > filled, window, broken_off))
-    return patches
-
-
-def _look(frame: RgbdFrame, cut: _Cut, scale: float, stereo: _Stereo) -> _Patch:
-    """Gather the readings and the outline of the patch."""
-    mask, window = cut.mask, cut.window
-    k, v0, u0 = frame.intrinsics, window[0].start, window[1].start
-    depth = frame.depth[window]
-    depth = np.where((depth > NEAREST) & (depth < FURTHEST), depth * np.float32(scale), np.float32(0))
-    here = Intrinsics(mask.shape[1], mask.shape[0], k.fx, k.fy, k.cx - u0, k.cy - v0)
-    core = cv2.erode(mask.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
-    v, u = np.nonzero(core & (depth > 0))
-    chosen = np.s_[:: 1 + len(u) // POINTS]
-    z = depth[v, u][chosen].astype(float)
-    points = _directions(np.column_stack([u, v])[chosen], here) * z[:, None]
-    edge = outline(mask, depth, stereo.baseline * k.fx)
-    some = np.s_[:: 1 + len(edge.pixels) // EDGES]
-    rays = _directions(edge.pixels[some], here)
-    rays /= np.linalg.norm(rays, axis=1)[:, None]
-    independent = len(u) / INDEPENDENT_AREA / max(1, len(points))
-    sight = Sight(
-        points,
-        stereo.noise * z**2 + QUANTUM,
-        rays,
-        np.full(len(rays), EDGE_WIDTH / k.fx),
-        edge.covered[some],
-        min(1.0, independent),
-        min(1.0, EDGE_SHARE * len(edge.pixels) / max(1, len(rays))),
-    )
-    return _Patch(cut, depth, here, sight, int(np.count_nonzero(mask)))
-
-
-def _directions(pixels: NDArray[np.generic], k: Intrinsics) -> FloatArray:
-    """Points (n, 3) at depth 1 on the rays of `pixels` (n, 2)."""
-    u, v = np.asarray(pixels, float).T
-    return np.column_stack([(u - k.cx) / k.fx, (v - k.cy) / k.fy, np.ones(len(u))])
-
-
-def _fits(patch: _Patch, connector: Connector) -> list[Fit]:
+def _fits(patch: Patch, connector: Connector) -> list[Fit]:
     """The best fits of all starts, best first: roughly from each, then in full from the most promising ones."""
 
     def burden(found: Fit) -> float:
@@ -281,7 +191,7 @@ def _starts(sight: Sight, connector: Connector) -> list[tuple[FloatArray, FloatA
     return starts
 
 
-def _missing(patch: _Patch, found: Fit, connector: Connector) -> float:
+def _missing(patch: Patch, found: Fit, connector: Connector) -> float:
     """Share of the axis that should show, nothing being before it, and does not show the patch."""
     along = np.linspace(-0.45, 0.45, 19) * connector.length
     points = found.center + along[:, None] * found.axis
@@ -294,12 +204,10 @@ def _missing(patch: _Patch, found: Fit, connector: Connector) -> float:
     return float(np.count_nonzero(open_to_view & ~patch.cut.mask[v, u])) / len(along)
 
 
-def _refusal(patch: _Patch, found: Fit, connector: Connector) -> str | None:
+def _refusal(patch: Patch, found: Fit, connector: Connector) -> str | None:
     """Why the patch is not the connector, in a sentence; None when it may be."""
     sight, size = patch.sight, (connector.radius, connector.length)
     misses, far = nearest_on_rays(sight.rays, found.center, found.axis, *size)
-    if patch.cut.broken_off and not _both_sides(patch, found, connector):
-        return "it goes on beyond the picture, and only one side of it shows"
     pixels = np.abs(misses / far * patch.intrinsics.fx)[~sight.inside]
     edge, stray = float(np.median(pixels)), float(np.mean(pixels > 1.0))
     if edge > MAX_EDGE_MISS or stray > MAX_STRAY:
@@ -318,7 +226,7 @@ def _refusal(patch: _Patch, found: Fit, connector: Connector) -> str | None:
     return None
 
 
-def _too_little(patch: _Patch, found: Fit, connector: Connector) -> str | None:
+def _too_little(patch: Patch, found: Fit, connector: Connector) -> str | None:
     """Why what shows of the body, but for its cable, may be a bit of anything; None where it is enough."""
     if patch.cut.broken_off:
         return "it goes on beyond the picture"
@@ -328,7 +236,7 @@ def _too_little(patch: _Patch, found: Fit, connector: Connector) -> str | None:
     return f"{1e3 * shown:.0f} mm of its length, {1e3 * least:.0f} are needed" if shown < least else None
 
 
-def _both_sides(patch: _Patch, found: Fit, connector: Connector) -> bool:
+def _both_sides(patch: Patch, found: Fit, connector: Connector) -> bool:
     """Whether the outline shows on either side of the axis: how thick it is."""
     rays = patch.sight.rays[~patch.sight.inside]
     _, far = nearest_on_rays(rays, found.center, found.axis, connector.radius, connector.length)
@@ -336,19 +244,19 @@ def _both_sides(patch: _Patch, found: Fit, connector: Connector) -> bool:
     return bool(min(np.count_nonzero(aside > 0), np.count_nonzero(aside < 0)) >= SIDE_EDGES)
 
 
-def _beside(patch: _Patch, found: Fit, connector: Connector) -> int:
+def _beside(patch: Patch, found: Fit, connector: Connector) -> int:
     """Pixels of the colour close to the patch, at its depth, that the fitted body does not explain."""
     kernel = np.ones((2 * BESIDE + 1, 2 * BESIDE + 1), np.uint8)
     v, u = np.nonzero(patch.cut.others & (cv2.dilate(patch.cut.mask.astype(np.uint8), kernel) > 0))
     if not len(u):
         return 0
-    rays = _directions(np.column_stack([u, v]), patch.intrinsics)
+    rays = directions(np.column_stack([u, v]), patch.intrinsics)
     rays /= np.linalg.norm(rays, axis=1)[:, None]
     misses, far = nearest_on_rays(rays, found.center, found.axis, connector.radius, connector.length)
     return int(np.count_nonzero(misses / far * patch.intrinsics.fx > 1.0))
 
 
-def _ends(patch: _Patch, found: Fit, connector: Connector) -> tuple[bool, list[bool | None]]:
+def _ends(patch: Patch, found: Fit, connector: Connector) -> tuple[bool, list[bool | None]]:
     """Whether an end is in sight, so that the length gives the centre; and whether the cable leaves either end."""
     rays = patch.sight.rays[~patch.sight.inside]
     _, far = nearest_on_rays(rays, found.center, found.axis, connector.radius, connector.length)
@@ -362,7 +270,7 @@ def _ends(patch: _Patch, found: Fit, connector: Connector) -> tuple[bool, list[b
     return any(seen), leaves
 
 
-def _extent(patch: _Patch, found: Fit) -> float:
+def _extent(patch: Patch, found: Fit) -> float:
     """Length m of what shows, along the axis."""
     return float(np.ptp(np.percentile((patch.sight.points - found.center) @ found.axis, [1, 99])))
 

@@ -95,6 +95,9 @@ class FakeMotion:
         self.shifts.append((arm, way))
         return Task(self._steps(), lambda: self.cancelled.append(arm))
 
+    def straight(self, arm: str, goal: RigidTransform, *, speed: float = 1.0) -> Task:
+        return Task(self._steps(), lambda: self.cancelled.append(arm))
+
     def sees(self, world_from_camera: RigidTransform, points: Vector) -> bool:
         return True
 

@@ -1,3 +1,4 @@
+from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 
@@ -11,6 +12,8 @@ from interfaces.cause import CauseCode
 from interfaces.cell import FixedMount, KnownCell
 from motion.failure import PlanningError
 from motion.viewpoints import spiral
+from perception.estimate import Estimate, NoEstimate
+from perception.segmentation import NotSeen
 
 PLACE = np.array([0.40, 0.10, 0.25])
 
@@ -70,6 +73,23 @@ def test_a_glimpse_is_no_find(stage: Stage) -> None:
     stage.perception.shows = lambda _, t: seen(t, PLACE, "wrist") if 0.6 <= t < 0.73 else unseen(t)  # two frames
     assert stage.run(stage.tree(search(10)), 60.0) is Status.FAILURE
     assert stage.belief.connector is None
+
+
+def test_what_shows_too_little_is_looked_at_next(stage: Stage) -> None:
+    place = PLACE + np.array([0.0, 0.12, -0.05])
+    little = replace(unseen(0.0, "wrist"), reason=NotSeen.TOO_SMALL, glimpse=place)
+
+    def shows(_: str, t: float) -> Estimate | NoEstimate:
+        return replace(little, stamp=t) if len(stage.motion.moves) == 1 else seen(t, place, "wrist")
+
+    stage.perception.shows = shows
+    first = places(stage, 1)[0]
+    assert stage.run(stage.tree(search(300)), 60.0) is Status.SUCCESS
+    assert len(stage.motion.moves) == 2
+    assert eye(stage, 0) == pytest.approx(first)
+    assert np.linalg.norm(eye(stage, 1) - place) == pytest.approx(DISTANCE)
+    assert stage.belief.connector is not None
+    assert stage.belief.connector.translation == pytest.approx(place, abs=1e-3)
 
 
 def test_stops_out_of_reach_are_skipped_and_counted(stage: Stage) -> None:
