@@ -121,6 +121,13 @@ def test_what_only_has_its_colour_is_refused(fused: Fused, panels: list[Thing], 
         assert result.reason is NotSeen.NOT_ITS_SHAPE
 
 
+def test_a_bit_of_it_will_do_where_it_is_expected(fused: Fused, panels: list[Thing]) -> None:
+    for seed in range(4):
+        frame = seen([*panels, *plug(), screen(0.8, left=False)], seed=seed)  # no cable, and 18 mm of the tip
+        assert isinstance(fused.estimate(frame, REAR_POSE), NoEstimate)
+        assert off(fused.estimate(frame, REAR_POSE, near=PLACE + 0.01))[0] < 0.045
+
+
 def test_a_bit_of_something_without_a_cable_is_refused(fused: Fused, panels: list[Thing]) -> None:
     lid = Block(PLACE - np.array([0.05, 0.1, 0.11]), PLACE + np.array([-0.03, 0.1, 0.006]), PURPLE)
     for seed in range(4):
