@@ -24,7 +24,7 @@ GATES = (0.06, 0.03, 0.015, 0.010)  # m: readings further off show something els
 MIN_SHARE = 0.25  # choice: of a way that faces look; where fewer come within the gate, other things stand before them
 AROUND = 2  # readings away: 34 mm at 0.7 m
 UNEVEN = 0.017  # m; choice: three deviations of a difference
-MAX_THROUGH = 0.2  # choice: of the readings on faces that may lie behind them; noise makes no such share
+BEHIND, MAX_THROUGH = 0.03, 0.2  # m behind a face, and the share of readings there: noise makes no such share
 MIN_READINGS = 30  # of 1,590 at 848x480
 NOISE = 0.004  # m, of depth at the panels, 0.86 m away
 
@@ -112,7 +112,7 @@ def _equations(
     arms: FloatArray, origin: FloatArray, lower: FloatArray, upper: FloatArray, gate: float
 ) -> tuple[FloatArray, FloatArray, int, float]:
     """Normal equations (7, 7), (7,) of position, turn and scale, how many readings came within the `gate` (m), and the
-    share of those on faces that lie further behind them.
+    share of those on faces that lie `BEHIND` them.
 
     `arms` (h, w, 3) lead from the camera at `origin` (3,) to the readings, world frame, 0 where there is none; boxes
     reach from `lower` to `upper` (m, 3).
@@ -130,7 +130,7 @@ def _equations(
                 off = side * arms[v, u, axis] * (1.0 - first)
                 faces[v, u], firsts[v, u], offs[v, u] = 2 * axis + (side > 0), first, off
                 met[faces[v, u]] += 1
-                through += off < -gate
+                through += off < -BEHIND
     told = np.zeros((height, width), np.bool_)
     for v in range(height):
         for u in range(width):
