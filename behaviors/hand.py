@@ -1,6 +1,7 @@
 """Small steps of the right hand that several states share."""
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
 from behaviors.leaf import Failed, Steps, StepsLeaf
@@ -27,6 +28,10 @@ class HandLeaf(StepsLeaf):
         if held is None:
             raise Failed(CauseCode.SLIPPED, "the hand holds nothing any more")
         return held
+
+    def seen(self, since: float) -> NDArray[np.float64] | None:
+        """What the rear camera sees of the hand and around it: `motion.service.Seen`."""
+        return self.services.perception.surface("rear", since)
 
     def grip(self, world_from_connector: RigidTransform) -> Steps:
         """Close the jaw and feel whether something is in it; belief: held as it was thought to lie."""

@@ -30,7 +30,7 @@ class Regrasp(HandLeaf):
         far = _distance_to_axis(points, connector, half) > CLEAR
         kept = far | np.array([tuple(p) in seen for p in points.tolist()], bool)
         motion.set_obstacles(points[kept], occupancy.h)
-        yield motion.pick(HAND, connector, cable=cable_course(self.services.known, connector))
+        yield motion.pick(HAND, connector, cable=cable_course(self.services.known, connector), seen=self.seen)
         try:
             yield from self.grip(connector)
         except Failed:

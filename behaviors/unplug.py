@@ -25,7 +25,7 @@ class Unplug(HandLeaf):
         """See the class."""
         known, motion = self.services.known, self.services.motion
         plug = known.socket(self.get_input("socket")).world_from_plug(known.connector.length)
-        yield motion.pick(HAND, plug, shallow=SHALLOW)
+        yield motion.pick(HAND, plug, shallow=SHALLOW, seen=self.seen)
         yield from self.grip(plug)
         axis = plug.rotation.apply([1.0, 0.0, 0.0])
         yield motion.shift(HAND, -DRAW_OUT * axis, checked=False)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from interfaces.cell import Box
 from motion.distance_grid import FAR, DistanceGrid
-from motion.kinematics import LOWER, TOOL_OFFSET, UPPER, ArmKinematics, FloatArray, link_frames_in
+from motion.kinematics import LOWER, TOOL_OFFSET, UPPER, ArmKinematics, FloatArray, world_spheres
 from motion.spheres import CAMERA_ACROSS, CAMERA_RADIUS, JAW_OPENING, LINKS, spheres_at
 
 IntArray = NDArray[np.int64]
@@ -53,21 +53,9 @@ def _grid_distance(p: FloatArray, distance: NDArray[np.float32], lower: FloatArr
 
 
 @nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
-def _world_spheres(base: FloatArray, q: FloatArray, links: IntArray, local: FloatArray) -> FloatArray:
-    frames = link_frames_in(base, q)
-    out = np.empty_like(local)
-    for n in range(local.shape[0]):
-        f = frames[links[n]]
-        for r in range(3):
-            out[n, r] = f[r, 0] * local[n, 0] + f[r, 1] * local[n, 1] + f[r, 2] * local[n, 2] + f[r, 3]
-        out[n, 3] = local[n, 3]
-    return out
-
-
-@nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
 def _nearest(q, base, links, local, pairs, boxes, others, distance, lower, h):  # type: ignore[no-untyped-def]
     """(clearance, what) over everything."""
-    world = _world_spheres(base, q, links, local)
+    world = world_spheres(base, q, links, local)
     best, what = FAR, _ITSELF
     for n in range(world.shape[0]):
         if links[n] < _FIRST_MOVING_LINK:
@@ -112,7 +100,7 @@ def _meets_box(p, reach, boxes):  # type: ignore[no-untyped-def]
 @nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
 def _free(q, base, links, local, pairs, boxes, others, distance, lower, h, margin):  # type: ignore[no-untyped-def]
     """Whether `_nearest` would keep `margin` (own links: 0), at a fifth of the cost."""
-    world = _world_spheres(base, q, links, local)
+    world = world_spheres(base, q, links, local)
     for n in range(world.shape[0] - 1, -1, -1):  # gripper first: it meets things most often
         if links[n] < _FIRST_MOVING_LINK:
             continue
@@ -235,4 +223,4 @@ class CollisionModel:
     def spheres(self, q: FloatArray) -> FloatArray:
         """The arm's spheres (n, 4) in world at joints (6,) rad, for another arm's model."""
         base, links, local = self._arguments[:3]
-        return np.asarray(_world_spheres(base, np.asarray(q, float), links, local))
+        return np.asarray(world_spheres(base, np.asarray(q, float), links, local))

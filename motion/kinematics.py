@@ -56,6 +56,19 @@ def link_frames_in(base: FloatArray, q: FloatArray) -> FloatArray:
     return out
 
 
+@nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
+def world_spheres(base: FloatArray, q: FloatArray, links: NDArray[np.int64], local: FloatArray) -> FloatArray:
+    """Spheres (n, 4) m in the world, from those in the frames of their `links` (n,)."""
+    frames = link_frames_in(base, q)
+    out = np.empty_like(local)
+    for n in range(local.shape[0]):
+        f = frames[links[n]]
+        for r in range(3):
+            out[n, r] = f[r, 0] * local[n, 0] + f[r, 1] * local[n, 1] + f[r, 2] * local[n, 2] + f[r, 3]
+        out[n, 3] = local[n, 3]
+    return out
+
+
 def wrap(q: FloatArray) -> FloatArray:
     """Angles brought into [-pi, pi)."""
     return (q + np.pi) % (2 * np.pi) - np.pi

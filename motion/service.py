@@ -16,6 +16,7 @@ from interfaces.cause import CauseCode
 from interfaces.cell import KnownCell
 from interfaces.devices import Arm, Clock, Gripper
 from interfaces.trajectory import Trajectory
+from motion.arm_offsets import joint_offsets
 from motion.arm_watch import ArmWatch, rest_of
 from motion.bodies import NO_POINTS, Bodies
 from motion.cable_path import natural_ways
@@ -29,6 +30,7 @@ from motion.straight import straight_line
 from motion.task import Task
 
 FloatArray = NDArray[np.float64]
+Seen = Callable[[float], FloatArray | None]  # points (n, 3) m seen in a picture taken from that second on; None: none yet
 
 MARGIN = 0.015  # m between the arm's spheres and anything while it moves freely
 JAW_REACH = 0.13  # m round a connector's centre where the jaw may be: half its length, a finger's width, 5 cm of palm
@@ -45,6 +47,7 @@ ARRIVAL = 1.0  # s that a late arm has to come there
 FOLLOWS = 3  # times that an arm which does not follow is stopped and led on, each time at half the speed
 REST = 1.0  # s between them: what jams may come free
 JAW_COMMANDS, JAW_SECONDS = 3, 1.0  # a jaw that does not follow is told again, after so many seconds
+LOOK = 1.0  # s that a camera has to show the arm; a sound one needs 0.2
 JAW_SLACK = 0.005  # m short of its gap that a jaw counts as open
 
 
@@ -149,13 +152,19 @@ class Motion(Bodies):
         return self._task(arm, steps())
 
     def pick(
-        self, arm: str, world_from_connector: RigidTransform, *, shallow: float = 0.0, cable: FloatArray | None = None
+        self,
+        arm: str,
+        world_from_connector: RigidTransform,
+        *,
+        shallow: float = 0.0,
+        cable: FloatArray | None = None,
+        seen: Seen | None = None,
     ) -> Task:
         """Open the jaw, bring it around the connector near its cable side; the jaw stays open.
 
         `shallow` metres is by how much the connector lies nearer to the finger tips than the pads' middle. The arm
         keeps clear of the `cable`'s points (n, 3) m, except where the jaw takes hold: pushing the cable moves the
-        connector.
+        connector. Before the last straight way it is set right by what a camera has `seen` of it.
         """
 
         def steps() -> Iterator[None]:
@@ -168,7 +177,9 @@ class Motion(Bodies):
             way = min(ways, key=lambda way: float(np.abs(way[0] - path[-1]).max()))
             yield from self._follow(arm, path, 1.0)
             yield from self._open_jaw(arm, OPEN_GAP - JAW_SLACK)
-            yield from self._follow(arm, np.vstack([self.joints(arm), way[1:]]), APPROACH_SPEED)
+            offsets = yield from self._offsets(arm, seen)
+            way = way - offsets if offsets.any() else way[1:]  # by way of where it should stand now
+            yield from self._follow(arm, np.vstack([self.joints(arm), way]), APPROACH_SPEED)
             self.keep_clear(NO_POINTS)
 
         return self._task(arm, steps())
@@ -252,6 +263,16 @@ class Motion(Bodies):
                 yield
         message = f"the {arm} jaw stands {1e3 * gripper.reading().gap:.1f} mm open, told {JAW_COMMANDS} times to open"
         raise self.give_up(arm, CauseCode.GRIPPER_FAILED, f"{message} to {1e3 * OPEN_GAP:.0f} mm")
+
+    def _offsets(self, arm: str, seen: Seen | None) -> Generator[None, None, FloatArray]:
+        """The encoders' offsets (6,) rad of an arm at rest, by a picture taken from now on; 0 if none comes."""
+        start = self._clock.now()
+        while seen is not None and self._clock.now() < start + LOOK:
+            points = seen(start)
+            if points is not None:
+                return joint_offsets(self.kinematics[arm], self.joints(arm), self.grippers[arm].reading().gap, points)
+            yield
+        return np.zeros(6)
 
     def _pause(self, seconds: float) -> Iterator[None]:
         end = self._clock.now() + seconds

@@ -13,9 +13,10 @@ from interfaces.cell import KnownCell
 from interfaces.devices import Camera, Clock
 from interfaces.frame import RgbdFrame
 from perception.camera_health import CameraHealth
+from perception.camera_model import NEAREST, rays
 from perception.estimate import Estimate, NoEstimate
 from perception.occupancy import ASSUMED_DEPTH, Occupancy, Spheres
-from perception.registration import expected_errors, register
+from perception.registration import Registration, expected_errors, register
 from perception.segmentation import NotSeen
 from perception.technique import TechniqueName, make_technique
 from perception.track import ConnectorTrack
@@ -24,6 +25,7 @@ from perception.track import ConnectorTrack
 VOXEL = 0.010  # m; obstacles stand within 0.1 of the connector, and a hand must pass between
 NEW_THING = 80  # voxels: the front of a piece of 9 cm
 BESIDE = 0.03  # m; choice: nearer to what is mapped it is the noise of that thing's edges, up to 100 voxels a look
+SPARSE, FAR = 3, 1.5  # each so-manieth row and column of `surface`, up to so many metres
 REGION = (np.array([0.16, -0.44, 0.01]), np.array([0.50, 0.44, 0.62]))
 
 
@@ -86,6 +88,21 @@ class Perception:
             health.feed(newest)
         return health.trouble(self._clock.now())
 
+    def surface(self, camera: str, since: float) -> NDArray[np.float64] | None:
+        """Points (n, 3) m, world, that the newest frame shows, the camera set right by the known boxes.
+
+        None while there is no frame from `since` (s) on; no points of a camera in `trouble`.
+        """
+        if self.trouble(camera) is not None:
+            return np.empty((0, 3))
+        frame = self.frame(camera)
+        if frame is None or frame.stamp < since:
+            return None
+        place = self._place(frame)
+        depth, arms = frame.depth[::SPARSE, ::SPARSE] * place.scale, rays(frame.intrinsics)[::SPARSE, ::SPARSE]
+        seen = (depth > NEAREST) & (depth < FAR)  # NaN compares false
+        return np.asarray(place.world_from_camera.apply(arms[seen] * depth[seen, None]))
+
     def map_obstacles(self, camera: str) -> int:
         """Take the newest frame into the occupancy, its camera set right by the known boxes; the number of full voxels.
 
@@ -94,7 +111,7 @@ class Perception:
         frame = self.frame(camera)
         if frame is not None:
             depth = ASSUMED_DEPTH if camera == "rear" else 0.0
-            place = register(frame, self._pose_of(frame), self._known.boxes, expected_errors(self._known, camera))
+            place = self._place(frame)
             scaled = replace(frame, depth=frame.depth * np.float32(place.scale))
             self.occupancy.integrate(scaled, place.world_from_camera, self._arm_spheres(), depth)
         return len(self.occupancy.occupied_points())
@@ -114,3 +131,7 @@ class Perception:
             self.occupancy = before
             return 0
         return filled
+
+    def _place(self, frame: RgbdFrame) -> Registration:
+        """A frame's camera, set right by the known boxes."""
+        return register(frame, self._pose_of(frame), self._known.boxes, expected_errors(self._known, frame.camera))

@@ -1,3 +1,4 @@
+import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform
 
@@ -23,6 +24,17 @@ def test_the_right_pose_is_grasped(name: str) -> None:
         assert scene.truth.held()
         assert not scene.truth.plugged()  # drawn off the stand
         assert not scene.truth.contact_peaks()  # it saw the piece before the ninth
+
+
+def test_an_arm_that_is_far_off_sees_itself_and_takes_hold() -> None:
+    """By its encoders alone the jaw closed beside the connector."""
+    with Scene(study_cell(), "5", 525) as scene:
+        services = services_of(scene)
+        assert grasp(scene, services, believed(scene)) == ""
+        arm = scene.world.arms["right"]
+        off = services.motion.tool("right").inv().apply(arm.tool_pose().translation)
+        assert float(np.linalg.norm(off)) > 0.012
+        assert not scene.truth.contact_peaks()
 
 
 def test_a_wrong_pose_is_not_grasped() -> None:

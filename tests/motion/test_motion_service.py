@@ -2,6 +2,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from arm_surface import surface
 from fake_devices import TICK, FakeGripper, Rig
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
@@ -231,6 +232,35 @@ def test_a_pick_brings_the_open_jaw_round_the_connector(rig: Rig, shallow: float
     assert min(abs(offset @ axis - known) for known in GRIP_OFFSETS) < 1e-3
     assert np.linalg.norm(offset - (offset @ axis) * axis) < 1e-3
     assert abs(tool.rotation.apply([0.0, 1.0, 0.0]) @ axis) < 1e-3  # the fingers close across it
+
+
+def test_an_arm_seen_to_be_off_takes_hold_where_the_connector_is(rig: Rig) -> None:
+    plug = rig.known.socket("back_4").world_from_plug(rig.known.connector.length)
+    off = np.array([0.01, 0.02, -0.02, 0.04, 0.02, 0.03])
+    kin = rig.motion.kinematics["right"]
+    asked: list[float] = []
+
+    def seen(since: float) -> Points | None:
+        asked.append(since)
+        return surface(kin, rig.motion.joints("right") + off, OPEN_GAP) if rig.clock.t > since + 0.2 else None
+
+    rig.run(rig.motion.pick("right", plug, seen=seen))
+    assert min(asked) == max(asked) > rig.arms["right"].followed[0][0]
+    blind = Rig(rig.known)
+    blind.run(blind.motion.pick("right", plug))
+    there, wanted = kin.tool(rig.motion.joints("right") + off), kin.tool(blind.motion.joints("right"))
+    missed = kin.tool(blind.motion.joints("right") + off)
+    assert np.linalg.norm(missed.translation - wanted.translation) > 0.010
+    assert np.linalg.norm(there.translation - wanted.translation) < 0.004
+
+
+@pytest.mark.parametrize("points", [None, np.empty((0, 3))])
+def test_a_camera_that_shows_no_arm_changes_nothing(rig: Rig, points: Points | None) -> None:
+    plug = rig.known.socket("back_4").world_from_plug(rig.known.connector.length)
+    rig.run(rig.motion.pick("right", plug, seen=lambda _since: points))
+    blind = Rig(rig.known)
+    blind.run(blind.motion.pick("right", plug))
+    assert rig.motion.joints("right") == pytest.approx(blind.motion.joints("right"))
 
 
 def test_the_way_to_a_pick_keeps_off_the_cable_and_the_cable_is_forgotten(rig: Rig) -> None:

@@ -103,6 +103,31 @@ def test_a_wrong_depth_scale_moves_no_obstacle(known: KnownCell) -> None:
     assert front == pytest.approx(FOAM.lower[0], abs=0.010)  # uncorrected 0.018 behind
 
 
+def test_a_surface_is_seen_where_it_is_in_the_next_picture(known: KnownCell) -> None:
+    eye = Eye()
+    eyes = perception(known, eye)
+    assert eyes.surface("rear", 0.0) is None
+    eye.show(seen(FOAM, scale=0.03), number=1, stamp=0.0)
+    assert eyes.surface("rear", 0.01) is None  # an older picture may show something else
+    points = eyes.surface("rear", 0.0)
+    assert points is not None
+    front = points[np.all((points > FOAM.lower + [-0.03, 0.02, 0.02]) & (points < FOAM.upper - [0.05, 0.02, 0.02]), 1)]
+    assert len(front) > 300
+    assert float(np.median(front[:, 0])) == pytest.approx(FOAM.lower[0], abs=0.004)  # uncorrected 0.018 behind
+
+
+def test_nothing_is_seen_by_a_camera_in_trouble(known: KnownCell) -> None:
+    eye = Eye()
+    eyes = perception(known, eye)
+    blank = replace(seen(FOAM), depth=np.zeros((480, 848), np.float32))
+    for number in range(3):
+        eye.show(replace(blank, rgb=np.zeros_like(blank.rgb)), number=number, stamp=0.0)
+        eyes.trouble("rear")
+    points = eyes.surface("rear", 0.0)
+    assert points is not None
+    assert points.shape == (0, 3)
+
+
 def test_an_obstacle_is_mapped_and_an_arm_is_not(known: KnownCell) -> None:
     eye = Eye()
     eye.show(seen(FOAM), number=1, stamp=0.0)
