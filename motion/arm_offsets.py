@@ -36,7 +36,9 @@ def joint_offsets(kin: ArmKinematics, q: FloatArray, opening: float, points: Flo
         there = np.abs(off) < gate
         if np.count_nonzero(there) < MIN_READINGS:
             return np.zeros(6)
-        slopes = _slopes(kin.link_frames(q + offsets), points[there], spheres[nearest[there], :3], links[nearest[there]])
+        slopes = _slopes(
+            kin.link_frames(q + offsets), points[there], spheres[nearest[there], :3], links[nearest[there]]
+        )
         info = np.eye(6) / DEVIATION**2 + slopes.T @ slopes / NOISE**2
         offsets -= np.linalg.solve(info, offsets / DEVIATION**2 + slopes.T @ off[there] / NOISE**2)
     return offsets
@@ -49,9 +51,7 @@ def _depths(points: FloatArray, spheres: FloatArray) -> tuple[FloatArray, NDArra
     return outside[np.arange(len(points)), nearest], nearest
 
 
-def _slopes(
-    frames: FloatArray, points: FloatArray, centers: FloatArray, links: NDArray[np.int64]
-) -> FloatArray:
+def _slopes(frames: FloatArray, points: FloatArray, centers: FloatArray, links: NDArray[np.int64]) -> FloatArray:
     """How a point's distance (m) to its sphere changes with each joint (rad), (n, 6), for link frames (7, 4, 4)."""
     away = points - centers
     away /= np.linalg.norm(away, axis=1, keepdims=True)

@@ -36,7 +36,7 @@ def test_an_arm_that_is_where_its_encoders_say_stays_there() -> None:
 
 
 def test_things_beside_the_arm_do_not_draw_it() -> None:
-    truth = READY + [0.03, 0.02, 0.01, 0.03, -0.02, 0.03]
+    truth = READY + np.array([0.03, 0.02, 0.01, 0.03, -0.02, 0.03])
     beside = KIN.tool(truth).apply([0.02, 0.0, -0.09])
     steps = np.arange(-0.03, 0.03, 0.004)
     board = beside + np.stack(np.meshgrid(steps, steps, [0.0]), -1).reshape(-1, 3)
@@ -45,6 +45,6 @@ def test_things_beside_the_arm_do_not_draw_it() -> None:
     assert tool_error(corrected, truth) < 0.004
 
 
-@pytest.mark.parametrize("points", [np.empty((0, 3)), seen(READY + 0.02)[::40], seen(READY) + [0.0, 0.0, 1.0]])
+@pytest.mark.parametrize("points", [np.empty((0, 3)), seen(READY + 0.02)[::40], seen(READY) + np.array([0, 0, 1.0])])
 def test_where_little_of_it_is_seen_the_encoders_count(points: Floats) -> None:
     assert not joint_offsets(KIN, READY, GAP, points).any()
