@@ -1,13 +1,12 @@
 """The renderer that needs nothing but PyBullet: ten times slower than OpenGL, and there when no EGL is."""
 
-from typing import Any
-
 import numpy as np
 import pybullet as p
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from interfaces.frame import Intrinsics
+from sim.meshes import corners
 from sim.picture import BACKGROUND, FAR, NEAR, Image, LightState
 from sim.visuals import VisualItem, Visuals
 
@@ -61,14 +60,16 @@ class TinyRenderer:
 
 
 def _body(client: int, item: VisualItem) -> int:
-    size: dict[int, dict[str, Any]] = {
-        p.GEOM_MESH: {"fileName": item.file, "meshScale": item.size},
-        p.GEOM_BOX: {"halfExtents": [s / 2 for s in item.size]},
-        p.GEOM_SPHERE: {"radius": item.size[0]},
-        p.GEOM_CYLINDER: {"length": item.size[0], "radius": item.size[1]},
-        p.GEOM_CAPSULE: {"length": item.size[0], "radius": item.size[1]},
-    }
-    shape = p.createVisualShape(item.kind, rgbaColor=[*item.color, 1.0], **size[item.kind], physicsClientId=client)
+    rows = corners(item)
+    shape = p.createVisualShape(
+        p.GEOM_MESH,
+        vertices=rows[:, :3].tolist(),
+        normals=rows[:, 3:].tolist(),
+        indices=list(range(len(rows))),
+        uvs=[[0.0, 0.0]] * len(rows),
+        rgbaColor=[*item.color, 1.0],
+        physicsClientId=client,
+    )
     return int(p.createMultiBody(0, -1, shape, physicsClientId=client))
 
 

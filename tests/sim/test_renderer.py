@@ -134,12 +134,11 @@ def test_both_renderers_see_the_same(scene: Visuals) -> None:
     fast, slow = renderer_of(scene, "moderngl"), renderer_of(scene, "tiny")
     a, b = (r.render(scene.snapshot(), CAMERA, K, LIGHT) for r in (fast, slow))
     assert set(np.unique(a.ids)) == set(np.unique(b.ids))
-    assert (a.ids == b.ids).mean() > 0.99
+    assert (a.ids == b.ids).mean() > 0.999
     both = (a.ids == b.ids) & (a.ids >= 0)
-    error = np.abs(a.depth - b.depth)
-    assert np.quantile(error[both & (a.ids < 2)], 0.999) < 0.001
-    # the arm has fewer facets in OpenGL; TinyRenderer's own sphere is too coarse to compare, 5 mm off
-    assert np.quantile(error[both & (a.ids > 2)], 0.95) < 0.002
+    assert np.quantile(np.abs(a.depth - b.depth)[both], 0.999) < 0.001
+    for thing in np.unique(a.ids[a.ids > 0]):  # no outline is wider in one of them: what measures it would be refused
+        assert abs((b.ids == thing).sum() / (a.ids == thing).sum() - 1.0) < 0.01
     # the light falls from the same side: the same faces are bright
     boxes = both & (a.ids == 1)
     assert np.corrcoef(a.rgb[boxes][:, 0], b.rgb[boxes][:, 0])[0, 1] > 0.8
