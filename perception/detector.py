@@ -16,7 +16,7 @@ from interfaces.cell import KnownCell
 from interfaces.frame import RgbdFrame
 from perception.camera_model import NEAREST, project, rays
 from perception.estimate import LEFT, Estimate, NoEstimate, pose_covariance
-from perception.rgbd_pose import MIN_POINTS, min_max_axis, rotation_about, without_outliers
+from perception.rgbd_pose import MIN_POINTS, min_max_axis, seen_pose, without_outliers
 from perception.segmentation import NoSegment, NotSeen, SegmentationParameters, segment
 
 FloatArray = NDArray[np.float64]
@@ -120,17 +120,17 @@ class Detector:
         center = depth * np.array([(u - k.cx) / k.fx, (v - k.cy) / k.fy, 1.0])
         borrowed = self._borrowed_axis(frame, box)
         own = np.array([np.cos(box.angle), np.sin(box.angle), 0.0])
-        direction = world_from_camera.rotation.apply(own if borrowed is None else borrowed)
-        direction *= 1.0 if direction @ (LEFT if axis is None else axis) >= 0 else -1.0
-        position = world_from_camera.apply(center)
-        pose = RigidTransform.from_components(position, rotation_about(direction, world_from_camera.rotation))
+        hint = LEFT if axis is None else axis
+        pose = seen_pose(center, own if borrowed is None else borrowed, world_from_camera, hint)
+        position, direction = pose[:3, 3], pose[:3, 0]
         covariance = pose_covariance(
             direction, POSITION_DEVIATION, OWN_DEVIATION if borrowed is None else BORROWED_DEVIATION
         )
         width, height = box.edges
         extent = depth * float(np.hypot(width / k.fx, height / k.fy))
         stamp, camera, area = frame.stamp, frame.camera, round(width * height)
-        return Estimate(stamp, camera, position, direction, pose, covariance, len(readings), area, extent, False)
+        whole = RigidTransform.from_matrix(pose)
+        return Estimate(stamp, camera, position, direction, whole, covariance, len(readings), area, extent, False)
 
     def _answer(self, rgb: NDArray[np.uint8]) -> tuple[NDArray[np.float32], float]:
         """The network's output (7, 60, 108), and how much smaller than `rgb` it saw the image."""

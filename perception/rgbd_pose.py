@@ -2,7 +2,7 @@
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import RigidTransform, Rotation
+from scipy.spatial.transform import RigidTransform
 
 from interfaces.cell import KnownCell
 from interfaces.frame import RgbdFrame
@@ -45,28 +45,38 @@ class Rgbd:
             message = f"{len(points)} depth readings on {found.area} pixels of the connector, {MIN_POINTS} are needed"
             return NoEstimate(frame.stamp, frame.camera, NotSeen.NO_DEPTH, message)
         here = min_max_axis(points)
-        extent = float(np.subtract(*np.percentile(points @ here, [99, 1])))
-        position, way = world_from_camera.apply(n_mean(points)), world_from_camera.rotation.apply(here)
-        way *= 1.0 if way @ (LEFT if axis is None else axis) >= 0 else -1.0
-        pose = RigidTransform.from_components(position, rotation_about(way, world_from_camera.rotation))
+        along = np.sort(points @ here)
+        extent = float(along[int(0.99 * len(along))] - along[int(0.01 * len(along))])
+        pose = seen_pose(n_mean(points), here, world_from_camera, LEFT if axis is None else axis)
+        position, way = pose[:3, 3], pose[:3, 0]
         too_long = extent - self._length  # what shows more than the connector is that much in doubt
         spread = pose_covariance(way, max(POSITION_DEVIATION, too_long), ANGLE_DEVIATION)
         return Estimate(
-            frame.stamp, frame.camera, position, way, pose, spread, len(points), found.area, extent, whole=False
+            frame.stamp,
+            frame.camera,
+            position,
+            way,
+            RigidTransform.from_matrix(pose),
+            spread,
+            len(points),
+            found.area,
+            extent,
+            whole=False,
         )
 
 
 def without_outliers(points: FloatArray) -> FloatArray:
     """Those of `points` (n, 3) that lie within `DEVIATIONS` standard deviations of the mean along every axis."""
-    deviation = np.abs(points - points.mean(axis=0))
-    return np.asarray(points[np.all(deviation <= DEVIATIONS * points.std(axis=0) + 1e-9, axis=1)])
+    square = (points - points.mean(axis=0)) ** 2
+    u, v, w = (square <= DEVIATIONS**2 * square.mean(axis=0) + 1e-18).T
+    return np.asarray(points[u & v & w])
 
 
 def n_mean(points: FloatArray) -> FloatArray:
     """Per axis, the mean of the n middle values of `points` (m, 3); (3,). n is `MIDDLE_SHARE` of m."""
     n = max(1, round(MIDDLE_SHARE * len(points)))
     start = (len(points) - n) // 2
-    return np.asarray(np.sort(points, axis=0)[start : start + n].mean(axis=0))
+    return np.asarray(np.partition(points, (start, start + n - 1), axis=0)[start : start + n].mean(axis=0))
 
 
 def min_max_axis(points: FloatArray) -> FloatArray:
@@ -77,16 +87,26 @@ def min_max_axis(points: FloatArray) -> FloatArray:
     n = max(1, round(END_SHARE * len(points)))
     spreads, vectors = [], []
     for k in (0, 1):
-        order = np.argsort(points[:, k], kind="stable")
+        order = np.argpartition(points[:, k], (n, len(points) - n))
         vectors.append(points[order[-n:]].mean(axis=0) - points[order[:n]].mean(axis=0))
         spreads.append(vectors[k][k])
     vector = vectors[int(np.argmax(spreads))]
     return np.asarray(vector / np.linalg.norm(vector))
 
 
-def rotation_about(axis: FloatArray, world_from_camera: Rotation) -> Rotation:
-    """The rotation whose x is `axis` and whose z is as near as can be to the camera's up (forward if up aligns)."""
-    up, forward = world_from_camera.apply([[0.0, -1.0, 0.0], [0.0, 0.0, 1.0]])
-    y = np.cross(up if abs(axis @ up) < 0.95 else forward, axis)
+def seen_pose(center: FloatArray, axis: FloatArray, world_from_camera: RigidTransform, hint: FloatArray) -> FloatArray:
+    """world_from_connector (4, 4) of a `center` (3,) and a unit `axis` (3,) in the optical frame.
+
+    The axis points where `hint` (3,), world, does; z is as near as can be to the camera's up (forward if up aligns).
+    Plain arithmetic: scipy's transforms would take a third of the technique's time.
+    """
+    camera = world_from_camera.as_matrix()
+    out = np.eye(4)
+    out[:3, 3] = camera[:3, :3] @ center + camera[:3, 3]
+    x = camera[:3, :3] @ axis
+    x *= 1.0 if x @ hint >= 0 else -1.0
+    up, forward = -camera[:3, 1], camera[:3, 2]
+    y = np.cross(up if abs(x @ up) < 0.95 else forward, x)
     y /= np.linalg.norm(y)
-    return Rotation.from_matrix(np.column_stack([axis, y, np.cross(axis, y)]))
+    out[:3, 0], out[:3, 1], out[:3, 2] = x, y, np.cross(x, y)
+    return out
