@@ -25,9 +25,10 @@ from interfaces.frame import RgbdFrame
 from interfaces.quote import quoted
 from perception.calibration import undistorted
 from perception.estimate import Estimate, NoEstimate
+from perception.fiducial import Fiducial
 from perception.fusion import fuse
 from perception.registration import expected_errors, register
-from perception.technique import TECHNIQUES, TechniqueName, make_technique
+from perception.technique import TECHNIQUES, Technique, TechniqueName, make_technique
 
 NEEDS_NO_DEPTH = ("fiducial",)
 TIP_NOT_TOLD = "the picture does not tell which end is the tip"
@@ -75,7 +76,10 @@ def run(technique: str, files: Sequence[Files], known: KnownCell, unit: float, d
         "technique": name,
         "frame": "world" if in_world else "camera",
         **_told(result),
-        "frames": [{**_names(look.files), "camera": look.frame.camera, **_told(look.result)} for look in looks],
+        "frames": [
+            {**_names(look.files), "camera": look.frame.camera, **_told(look.result), **_clip(finder, look)}
+            for look in looks
+        ],
     }
     if draw is not None:
         _draw(draw, looks[0], result, told, name)
@@ -199,6 +203,21 @@ def _told(result: Estimate | NoEstimate) -> dict[str, Any]:
         "sign_seen": result.sign_seen,
     }
     return {"found": True, "pose": pose, "points": result.points, "mask_area": result.mask_area}
+
+
+def _clip(finder: Technique, look: Look) -> dict[str, Any]:
+    """Where the stow clip's seat is, for a technique that reads the clip's tag."""
+    if not isinstance(finder, Fiducial):
+        return {}
+    seat = finder.seat(look.frame, look.world_from_camera)
+    if isinstance(seat, NoEstimate):
+        return {"clip": {"found": False, "reason": str(seat.reason), "message": seat.message}}
+    pose = {
+        "position": _rounded(seat.pose.translation, 5),
+        "quaternion": _rounded(seat.pose.rotation.as_quat(canonical=True), 6),
+        "covariance": [[float(f"{value:.3e}") for value in row] for row in seat.covariance],
+    }
+    return {"clip": {"found": True, "pose": pose}}
 
 
 def _rounded(values: NDArray[np.float64], digits: int) -> list[float]:

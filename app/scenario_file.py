@@ -190,9 +190,7 @@ class _Source:
         name = repr(at(document.value, ("tree",)))
         tree = self._once(case, _named, (name, tree_at), document, "tree", folder)
         if tree:
-            self._once(
-                case, check_tree_file, (tree, tree_at, id(cell)), tree, tree_at, names_of(cell) if cell else None
-            )
+            self._once(case, check_tree_file, (tree, tree_at, id(cell)), tree, tree_at, names_of(cell))
         return cell, tree
 
     def _told(self, error: Error) -> Finding:

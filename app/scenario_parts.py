@@ -22,10 +22,12 @@ def tree_text(value: TreeInput) -> str:
     return str(value).lower() if isinstance(value, bool) else str(value)
 
 
-def names_of(cell: Cell) -> dict[str, list[str]]:
-    """What a tree may name of the cell, by kind."""
+def names_of(cell: Cell | None) -> dict[str, list[str]]:
+    """What a tree may name of the cell, by kind; without a cell, what it may name in any."""
     from perception.technique import TECHNIQUES  # late: it brings the compiler with it
 
+    if cell is None:
+        return {"technique": list(TECHNIQUES)}
     techniques: list[str] = [name for name in TECHNIQUES if name != "fiducial" or cell.known.connector.tag is not None]
     return {"socket": [socket.name for socket in cell.known.sockets], "technique": techniques}
 
@@ -41,7 +43,7 @@ def check_inputs(document: Document, tree: Path | None, cell: Cell | None) -> No
     given = {key: tree_text(value) for key, value in values.items() if value is not None}
     if found := [
         Finding(*document.place(("inputs", key)), f"inputs.{cut(key)}: {message}")
-        for key, message in of_tree(tree, given, names=names_of(cell) if cell else None)
+        for key, message in of_tree(tree, given, names=names_of(cell))
     ]:
         raise Findings(found)
 

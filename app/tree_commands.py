@@ -8,6 +8,7 @@ import typer
 from app.findings import Finding, Findings, nearest
 from app.resources import resolve, shipped
 from app.scenario_file import check_tree_file
+from app.scenario_parts import names_of
 from interfaces.quote import quoted
 
 app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Look at behaviour trees.")
@@ -98,7 +99,7 @@ def check(
     names = trees or list(shipped("tree"))
     for name in names:
         try:
-            check_tree_file(resolve("tree", name, Path()))
+            check_tree_file(resolve("tree", name, Path()), names=names_of(None))
         except Findings as error:
             found += error.items
     if found:

@@ -89,3 +89,12 @@ def test_an_encoding_without_a_sign_shows_a_question_mark() -> None:
     told = shell("PYTHONIOENCODING=latin-1 regrasp trees show recovery > told")
     assert (told.returncode, told.stderr) == (0, "")
     assert Path("told").read_text(encoding="latin-1").splitlines()[-1] == "?? safe_stop  SafeStop"
+
+
+def test_a_technique_that_no_cell_has_is_a_finding_without_a_cell(tmp_path: Path) -> None:
+    leaf = '<UseTechnique name="look" technique="fuzed"/>'
+    tree = f'<root main_tree_to_execute="m"><BehaviorTree ID="m">{leaf}</BehaviorTree></root>'
+    (tmp_path / "tree.xml").write_text(tree)
+    assert "technique='fuzed' is unknown; did you mean fused?" in shell("regrasp trees check tree.xml").stderr
+    (tmp_path / "tree.xml").write_text(tree.replace("fuzed", "fiducial"))
+    assert shell("regrasp trees check tree.xml").returncode == 0

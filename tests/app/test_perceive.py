@@ -167,6 +167,17 @@ def test_a_tag_needs_no_depth_and_the_others_do(shots: Shots) -> None:
     assert finding(*files, "--technique", "fiducial").startswith("--cell:1: the cell's connector has no tag")
 
 
+def test_the_clips_tag_tells_where_its_seat_is(shots: Shots) -> None:
+    tag = ["--technique", "fiducial", "--cell", "thesis_tags", "--camera", "rear"]
+    [frame] = answer(*frame_of(shots, 0), *tag)["frames"]
+    clip = frame["clip"]
+    assert clip["found"], clip
+    seat = load_scenario("no_obstacle", ["cell=thesis_tags"]).cell.known.clip.world_from_seat.translation
+    assert clip["pose"]["position"] == pytest.approx(seat.tolist(), abs=0.02)
+    assert np.shape(clip["pose"]["covariance"]) == (6, 6)
+    assert "clip" not in answer(*frame_of(shots, 0))["frames"][0]
+
+
 def test_what_is_not_there_is_not_found_and_why_is_told(shots: Shots, tmp_path: Path) -> None:
     result = invoke(*frame_of(shots, 0), "--color", "0,200,40", "--draw", tmp_path / "seen.png")
     assert result.exit_code == 1
