@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
-from interfaces.cell import Connector, KnownCell, pose_along
+from interfaces.cell import Box, Connector, KnownCell, pose_along
 from interfaces.frame import RgbdFrame
 from perception.cable_end import cable_leaves
 from perception.camera_model import project
@@ -120,8 +120,9 @@ class Fused:
             return _Refused(NotSeen.NOT_ITS_SHAPE, refusal)
         center = camera.world_from_camera.apply(best.center)
         for box in self._boxes:  # a flat piece of its colour on a panel, partly hidden, fits best there
-            if np.all(np.abs(center - box.center) < 0.5 * np.asarray(box.size)):
-                return _Refused(NotSeen.NOT_ITS_SHAPE, f"it would lie within the {box.name.replace('_', ' ')}")
+            if _behind_face(box, camera.world_from_camera.translation, center):
+                message = f"it would lie within the {box.name.replace('_', ' ')} or behind it"
+                return _Refused(NotSeen.NOT_ITS_SHAPE, message)
         whole, leaves = _ends(patch, best, self._connector)
         if leaves == [False, False]:
             return _Refused(NotSeen.NOT_ITS_SHAPE, "no cable leaves either of its ends")
@@ -130,6 +131,14 @@ class Fused:
             return _Refused(NotSeen.TOO_SMALL, f"no cable shows, and {less}", center)
         sign = float(leaves[0] is True) - float(leaves[1] is True)
         return _Found(patch, _doubted(best, others), whole, sign)
+
+
+def _behind_face(box: Box, eye: FloatArray, place: FloatArray) -> bool:
+    """Whether the way from the camera at `eye` (3,) m to a place (3,) m leads into the box."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        low, high = ((np.add(box.center, side * np.divide(box.size, 2)) - eye) / (place - eye) for side in (-1, 1))
+    enters, leaves = np.nanmax(np.minimum(low, high)), np.nanmin(np.maximum(low, high))
+    return bool(0.0 < enters < min(leaves, 1.0))
 
 
 def _fits(patch: Patch, connector: Connector) -> list[Fit]:

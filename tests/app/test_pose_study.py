@@ -110,6 +110,15 @@ def test_negatives_show_no_connector_but_much_of_its_colour() -> None:
     assert np.median([f.rgb[v, u, 0] for f in frames]) < 60  # black where it would be red, were it there
 
 
+def test_a_red_sticker_that_a_cable_crosses_is_not_found_behind_its_panel() -> None:
+    """What shows of it fitted a connector that leans through the panel, its middle 14 mm behind the face."""
+    cell = study_cell()
+    rear = cell.known.camera("rear").mount
+    assert isinstance(rear, FixedMount)
+    frame = list(negative_frames(cell, 545))[7]
+    assert isinstance(make_technique("fused", cell.known).estimate(frame, rear.world_from_camera), NoEstimate)
+
+
 def test_coverage_of_two_seeds(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     setup = Setup(study_cell(overrides=SMALL), ["rgbd", "blind"], maker=maker)
     assert run_coverage([setup], range(1, 3), 1, tmp_path) == 0
