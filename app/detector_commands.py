@@ -31,19 +31,23 @@ def add_to(app: typer.Typer) -> None:
 def train_detector(
     out: Annotated[Path, typer.Option(help="The folder for detector.onnx and evaluation.json.")],
     cell: _Cell = "thesis",
-    pictures: Annotated[int, typer.Option(min=24, help="Random pictures to train on.")] = 8000,
-    steps: Annotated[int, typer.Option(min=1, help="Training steps of 32 parts of pictures each.")] = 14000,
+    pictures: Annotated[int, typer.Option(min=24, help="Random pictures to train on.")] = 16000,
+    steps: Annotated[int, typer.Option(min=1, help="Training steps of 32 parts of pictures each.")] = 36000,
+    start: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="An ONNX file of ours to go on from, at a slower rate.")
+    ] = None,
     held_out: Annotated[int, typer.Option(min=1, help="Pictures of each class to evaluate on at the end.")] = 60,
     seed: _Seed = TRAINING_SEED,
 ) -> None:
     """Train the network of the technique `detector` on random pictures of a cell, then evaluate it.
 
-    Needs the extra `train` (torch, onnx). Ctrl-C keeps the best network so far. To use it, put its detector.onnx in the
-    place of perception/detector.onnx.
+    Needs the extra `train` (torch, onnx), some 20 minutes to draw the pictures and 40 to learn. Ctrl-C keeps the best
+    network so far. To use it, put its detector.onnx in the place of perception/detector.onnx.
 
     \b
-    Example:
+    Examples:
       regrasp train-detector --out results/detector
+      regrasp train-detector --out results/better --start results/detector/detector.onnx --steps 20000
     """
     wrong = output.unwritable(out)
     if (out / "detector.onnx").exists():
@@ -53,17 +57,25 @@ def train_detector(
         import torch  # noqa: F401
     except ImportError as error:
         wrong.append(Finding("train-detector", 1, f"{error.name} is not installed; pip install 'regrasp[train]'"))
+    if start is not None and not start.is_file():
+        wrong.append(Finding(shown(start), 1, "is no file; name an ONNX file that `regrasp train-detector` made"))
     if wrong:
         raise Findings(wrong)
     loaded = _load(cell)
     from app.detector_data import make_pictures
-    from app.detector_train import train
+    from app.detector_train import read_weights, train
 
+    weights = None
+    if start is not None:
+        try:
+            weights = read_weights(start.read_bytes())
+        except ValueError as error:
+            raise Findings([Finding(shown(start), 1, f"{error}; name one that `train-detector` made")]) from None
     out.mkdir(parents=True, exist_ok=True)
     with _progress("drawing pictures", pictures) as tell:
         drawn = make_pictures(loaded, seed, pictures, tell)
     with _progress("training", steps) as tell:
-        train(drawn, seed, steps, lambda model, _score: write_whole(out / "detector.onnx", model), tell)
+        train(drawn, seed, steps, lambda model, _score: write_whole(out / "detector.onnx", model), tell, weights)
     evaluate_detector(out / "detector.onnx", cell, held_out, out=out / "evaluation.json")
 
 

@@ -2,21 +2,32 @@
 
 import io
 import warnings
-from collections.abc import Callable
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from functools import partial
 from itertools import pairwise
 
 import cv2
 import numpy as np
+import onnx
+import onnx.numpy_helper
 import torch
+from numpy.typing import NDArray
 from torch import nn
 
 from app.detector_data import CLEAR, Pictures, draw_patch, target_maps
 from app.detector_score import LEAST_SCORE, Answer, average_precision, true_box
 from perception.detector import HEIGHT, WIDTH, decode
 
-CHANNELS = (8, 16, 32, 64, 96)  # at strides 2 to 32; choice: measured 3 ms of processor time an answer
+CHANNELS = (16, 32, 64, 96)  # at strides 4 to 32
+DEPTHS = (1, 3, 3)  # convolutions at strides 8 to 32, after the one that shrinks
+WIDTH_UP = 32  # channels on the way up and of the answer's head; choice: 3.6 ms of processor time an answer in all
 RATE, BATCH = 4e-3, 32  # choice: usual for AdamW on a small network; not tuned
 CHECK_EVERY = 500  # steps; choice: a check takes as long as some 25 of them
+AHEAD = 3  # batches
+# Learning in bfloat16 takes two thirds of the time where the processor has instructions for it, and for ever elsewhere.
+HALF = torch.cpu._is_avx512_bf16_supported()  # torch has no public way to ask
 KEPT_BACK = 12  # one picture of so many is kept back to choose the best network by
 OPSET = 17  # of ONNX; choice: OpenCV 5 reads it
 
@@ -26,31 +37,38 @@ def _convolution(inputs: int, outputs: int, stride: int = 1, kernel: int = 3) ->
     return nn.Sequential(layer, nn.BatchNorm2d(outputs), nn.ReLU(inplace=True))
 
 
-class Network(nn.Module):
-    """From images (n, 3, h, w), 0 to 1, to maps (n, 7, h / 4, w / 4) as in `perception.detector.decode`.
+Weights = dict[str, tuple[torch.Tensor, ...]]  # of each convolution, by its name in the network: weight, bias
 
-    Down to stride 32, where a cell sees 150 px around it, and up to stride 4 again, each level added to its like.
+
+class Network(nn.Module):
+    """From images (n, 3, h, w), 0 to 1, to maps (n, 7, h / 8, w / 8) as in `perception.detector.decode`.
+
+    Down to stride 32, where a cell sees 370 px, and up to stride 8 again, each level added to its like:
+    a pyramid of features (Lin et al. 2017). Finer cells had half as much of the processor's time for what they mean.
     """
 
     def __init__(self) -> None:
         super().__init__()
-        levels = list(pairwise(CHANNELS))
-        self.stem = _convolution(3, CHANNELS[0], 2)
-        self.down = nn.ModuleList(nn.Sequential(_convolution(a, b, 2), _convolution(b, b)) for a, b in levels)
-        self.up = nn.ModuleList(_convolution(b, a, kernel=1) for a, b in levels[1:])
-        last = nn.Conv2d(CHANNELS[1], 7, 1)
+        self.stem = nn.Sequential(_convolution(3, CHANNELS[0] // 2, 2), _convolution(CHANNELS[0] // 2, CHANNELS[0], 2))
+        self.down = nn.ModuleList(
+            nn.Sequential(_convolution(a, b, 2), *(_convolution(b, b) for _ in range(depth)))
+            for (a, b), depth in zip(pairwise(CHANNELS), DEPTHS, strict=True)
+        )
+        self.side = nn.ModuleList(_convolution(channels, WIDTH_UP, kernel=1) for channels in CHANNELS[1:])
+        last = nn.Conv2d(WIDTH_UP, 7, 1)
         nn.init.constant_(last.bias[:1], -4.0)  # nothing is likely at first: few cells hold a connector
-        self.head = nn.Sequential(_convolution(CHANNELS[1], CHANNELS[1]), last)
+        self.head = nn.Sequential(_convolution(WIDTH_UP, WIDTH_UP), last)
 
     def forward(self, x: torch.Tensor) -> torch.Tensor:
         """See the class."""
         x = self.stem(x)
         levels = []
-        for step in self.down:
-            x = step(x)
-            levels.append(x)
-        for step, level in zip(reversed(self.up), reversed(levels[:-1]), strict=True):
-            x = level + nn.functional.interpolate(step(x), size=level.shape[-2:], mode="nearest")
+        for down, side in zip(self.down, self.side, strict=True):
+            x = down(x)
+            levels.append(side(x))
+        x = levels.pop()
+        for level in reversed(levels):
+            x = level + nn.functional.interpolate(x, size=level.shape[-2:], mode="nearest")
         out = self.head(x)
         return torch.cat([out[:, :1].sigmoid(), out[:, 1:]], dim=1)
 
@@ -61,29 +79,38 @@ def train(
     steps: int,
     keep: Callable[[bytes, float], None],
     tell: Callable[[int, str], None] = lambda _step, _words: None,
+    start: Weights | None = None,
 ) -> None:
     """Train on most of the pictures, and `keep` each network, an ONNX file, that is the best so far.
 
+    From random weights, or from `start` at a slower rate.
+
     The best has the highest average precision on the pictures kept back. `tell` is called after every step. One thread
-    and one seed: the same network on the same kind of machine.
+    learns, another makes the next parts of pictures; one seed: the same network on the same kind of machine.
     """
     torch.manual_seed(seed)
     torch.set_num_threads(1)
     count = len(pictures.images) - len(pictures.images) // KEPT_BACK
-    network, best = Network().to(memory_format=torch.channels_last), -1.0  # 1.4 times as fast on a processor
-    optimizer = torch.optim.AdamW(network.parameters(), RATE, weight_decay=1e-4)
-    schedule = torch.optim.lr_scheduler.OneCycleLR(optimizer, RATE, total_steps=steps)
-    learned = pictures.part(0, count)
-    for step in range(1, steps + 1):
-        images, wanted = _batch(learned, np.random.default_rng([seed, step]))
-        error = loss(network(images), wanted)
+    network, learned = Network().to(memory_format=torch.channels_last), pictures.part(0, count)  # 1.4 times as fast
+    kept_back = pictures.part(count, len(pictures.images))
+    best, rate, draws = -1.0, RATE, [seed]
+    if start is not None:
+        take_over(network, start, learned.images[:BATCH])
+        best, rate, draws = _precision(network, kept_back), RATE / 4, [seed, 1]  # other parts of the pictures
+        keep(to_onnx(network), best)
+    optimizer = torch.optim.AdamW(network.parameters(), rate, weight_decay=1e-4)
+    schedule = torch.optim.lr_scheduler.OneCycleLR(optimizer, rate, total_steps=steps)
+    for step, (images, wanted) in enumerate(_batches(learned, draws, steps), 1):
+        with torch.autocast("cpu", torch.bfloat16, enabled=HALF):
+            maps = network(images)
+        error = loss(maps.float(), wanted)
         optimizer.zero_grad()
         error.backward()
         optimizer.step()
         schedule.step()
         tell(step, f"loss {error.item():.2f}, best AP50 {max(best, 0):.3f}")
         if step % CHECK_EVERY == 0 or step == steps:
-            score = _precision(network, pictures.part(count, len(pictures.images)))
+            score = _precision(network, kept_back)
             if score > best:
                 best = score
                 keep(to_onnx(network), score)
@@ -99,7 +126,7 @@ def loss(maps: torch.Tensor, wanted: torch.Tensor) -> torch.Tensor:
 
 
 def to_onnx(network: Network) -> bytes:
-    """The network as an ONNX file: `image` (1, 3, 240, 432) RGB 0 to 1 in, `maps` (1, 7, 60, 108) out."""
+    """The network as an ONNX file: `image` (1, 3, 240, 432) RGB 0 to 1 in, `maps` (1, 7, 30, 54) out."""
     file, example = io.BytesIO(), (torch.zeros(1, 3, HEIGHT, WIDTH),)
     network.eval()
     with warnings.catch_warnings(action="ignore", category=DeprecationWarning):  # the newer way needs onnxscript, too
@@ -108,6 +135,73 @@ def to_onnx(network: Network) -> bytes:
         )
     network.train()
     return file.getvalue()
+
+
+def read_weights(model: bytes) -> Weights:
+    """Weight and bias of each convolution of an ONNX file that `to_onnx` made. Raises ValueError for another's."""
+    try:
+        graph = onnx.load_from_string(model).graph
+    except Exception as error:  # protobuf's own, which differ by its version
+        raise ValueError("is no ONNX file") from error
+    values = {t.name: torch.from_numpy(onnx.numpy_helper.to_array(t).copy()) for t in graph.initializer}
+    convolutions = {n.name: n.input[1:] for n in graph.node if n.op_type == "Conv"}
+    found = {name.split("/")[-2]: tuple(values[i] for i in inputs) for name, inputs in convolutions.items()}
+    expected = {name: layer.weight.shape for name, layer in _layers(Network()).items()}
+    if {name: parts[0].shape for name, parts in found.items()} != expected:
+        raise ValueError("has other layers than the network that is trained")
+    return found
+
+
+@torch.no_grad()
+def take_over(network: Network, weights: Weights, images: NDArray[np.uint8]) -> None:
+    """Give the network these weights: it then answers as the file did that they were read from.
+
+    A file has each convolution and its normalization in one; they are two again by what `images` (n, h, w, 3) make of
+    the convolution.
+    """
+    hooks = []
+    for name, layer in _layers(network).items():
+        weight, bias = weights[name]
+        layer.weight.copy_(weight)
+        if layer.bias is not None:
+            layer.bias.copy_(bias)
+            continue
+        normalization = network.get_submodule(f"{name.rsplit('.', 1)[0]}.1")
+        normalization.bias.copy_(bias)
+        hooks.append(layer.register_forward_hook(partial(_normalize, normalization)))
+    network.eval()
+    network(torch.stack([_tensor(image) for image in images]))
+    network.train()
+    for hook in hooks:
+        hook.remove()
+
+
+def _layers(network: Network) -> dict[str, nn.Conv2d]:
+    return {name: layer for name, layer in network.named_modules() if isinstance(layer, nn.Conv2d)}
+
+
+def _normalize(normalization: nn.BatchNorm2d, _layer: nn.Module, _inputs: object, output: torch.Tensor) -> None:
+    """Let it make its layer's output standard, as in training, and undo that."""
+    variance, mean = torch.var_mean(output, dim=(0, 2, 3), correction=0)
+    normalization.running_mean.copy_(mean)
+    normalization.running_var.copy_(variance)
+    normalization.weight.copy_((variance + normalization.eps).sqrt())
+    normalization.bias.add_(mean)
+
+
+def _batches(pictures: Pictures, draws: Sequence[int], steps: int) -> Iterator[tuple[torch.Tensor, torch.Tensor]]:
+    """One for each step, `AHEAD` of them made while the network learns."""
+    with ThreadPoolExecutor(1) as pool:
+        waiting: deque[Future[tuple[torch.Tensor, torch.Tensor]]] = deque()
+        try:
+            for step in range(1, steps + 1):
+                waiting.append(pool.submit(_batch, pictures, np.random.default_rng([*draws, step])))
+                if len(waiting) > AHEAD:
+                    yield waiting.popleft().result()
+            while waiting:
+                yield waiting.popleft().result()
+        finally:
+            pool.shutdown(cancel_futures=True)
 
 
 def _batch(pictures: Pictures, rng: np.random.Generator) -> tuple[torch.Tensor, torch.Tensor]:

@@ -22,9 +22,9 @@ from perception.segmentation import NoSegment, NotSeen, SegmentationParameters, 
 FloatArray = NDArray[np.float64]
 Box = tuple[float, float, float, float]
 
-WIDTH, HEIGHT = 432, 240  # px of the network's input: half a camera's image, and whole numbers of its 16 px cells
-STRIDE = 4  # px of the input that a cell of the output covers
-MIN_SCORE = 0.4  # choice: the most right and fewest false boxes among look-alikes (harmonic mean), by tenths
+WIDTH, HEIGHT = 432, 240  # px of the network's input: half a camera's image, and whole numbers of its cells
+STRIDE = 8  # px of the input that a cell of the output covers
+MIN_SCORE = 0.5  # choice: the most right and fewest false boxes among look-alikes (harmonic mean), by tenths
 MOST = 10  # boxes looked at in an image; choice: more than a cell holds
 OVERLAP = 0.5  # intersection over union at which two boxes are one; choice: that of AP50
 WINDOW = 0.3  # of the box's edges: where depth is read; choice: most of a slanting connector's box is beside it
@@ -133,7 +133,7 @@ class Detector:
         return Estimate(stamp, camera, position, direction, whole, covariance, len(readings), area, extent, False)
 
     def _answer(self, rgb: NDArray[np.uint8]) -> tuple[NDArray[np.float32], float]:
-        """The network's output (7, 60, 108), and how much smaller than `rgb` it saw the image."""
+        """The network's output (7, 30, 54), and how much smaller than `rgb` it saw the image."""
         canvas, scale = fitted(rgb)
         self._net.setInput(cv2.dnn.blobFromImage(canvas, 1 / 255))
         maps = self._net.forward()
@@ -190,7 +190,7 @@ def fitted(image: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], float]:
 
 
 def decode(maps: NDArray[np.float32], scale: float, min_score: float) -> list[Detection]:
-    """Detections from the network's output (7, 60, 108).
+    """Detections from the network's output (7, 30, 54).
 
     Maps: likelihood, offset of the box's middle from the cell's (u, v, cells), logarithm of its edges (u, v, cells),
     and the axis as in_plane^2 (cos 2 angle, sin 2 angle), which is the same for both its signs.

@@ -81,5 +81,5 @@ def test_what_is_asked_of_the_network_reads_as_the_target(
 def test_one_that_shows_too_little_is_left_out() -> None:
     maps = target_maps([Target((40.0, 40.0, 44.0, 44.0), (1.0, 0.0), False)])
     assert not maps[:8].any()
-    assert maps[8, 10, 10] == 0
-    assert maps[8, 30, 30] == 1
+    assert maps[8, 5, 5] == 0
+    assert maps[8, 15, 15] == 1

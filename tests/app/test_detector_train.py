@@ -8,6 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from app.cli import app
+from perception.detector import shipped_network
 
 torch = pytest.importorskip("torch", reason="the extra train is missing")
 pytest.importorskip("onnx", reason="the extra train is missing")
@@ -15,8 +16,8 @@ pytest.importorskip("onnx", reason="the extra train is missing")
 SIZES = ("--pictures", "24", "--steps", "2", "--held-out", "1")
 
 
-def train(out: Path) -> Any:
-    return CliRunner().invoke(app, ["train-detector", "--out", str(out), *SIZES])
+def train(out: Path, *more: str) -> Any:
+    return CliRunner().invoke(app, ["train-detector", "--out", str(out), *SIZES, *more])
 
 
 def test_a_tiny_training_leaves_a_network_and_its_figures_and_the_seed_decides(tmp_path: Path) -> None:
@@ -29,6 +30,33 @@ def test_a_tiny_training_leaves_a_network_and_its_figures_and_the_seed_decides(t
     assert 1000 < (first / "detector.onnx").stat().st_size < 2 * 1024 * 1024
     assert (first / "detector.onnx").read_bytes() == (again / "detector.onnx").read_bytes()
     assert (first / "evaluation.json").read_bytes() == (again / "evaluation.json").read_bytes()
+
+
+def test_another_training_goes_on_from_a_network(tmp_path: Path) -> None:
+    from app.detector_train import Network, read_weights, take_over, to_onnx
+
+    model = shipped_network()
+    network = Network()
+    images = np.random.default_rng(0).integers(0, 256, (4, 240, 432, 3), np.uint8)
+    take_over(network, read_weights(model), images)
+    answers = []
+    for file in (model, to_onnx(network)):
+        net = cv2.dnn.readNetFromONNX(np.frombuffer(file, np.uint8))
+        net.setInput(cv2.dnn.blobFromImage(images[0], 1 / 255))
+        answers.append(net.forward())
+    np.testing.assert_allclose(answers[0], answers[1], atol=1e-3)
+    (tmp_path / "shipped.onnx").write_bytes(model)
+    result = train(tmp_path / "better", "--start", str(tmp_path / "shipped.onnx"))
+    assert result.exit_code == 0, result.output
+    assert (tmp_path / "better" / "detector.onnx").exists()
+
+
+@pytest.mark.parametrize("content", [b"", b"no network", b"\x08\x08"])
+def test_what_is_no_network_of_ours_is_no_start(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / "other.onnx").write_bytes(content)
+    result = train(tmp_path / "out", "--start", str(tmp_path / "other.onnx"))
+    assert (result.exit_code, (tmp_path / "out").exists()) == (2, False)
+    assert "name one that `train-detector` made" in result.stderr
 
 
 def test_ctrl_c_keeps_the_best_so_far(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -61,4 +89,4 @@ def test_opencv_computes_what_torch_does() -> None:
     net = cv2.dnn.readNetFromONNX(np.frombuffer(to_onnx(network), np.uint8))
     net.setInput(image)
     assert np.abs(net.forward() - expected).max() < 1e-5
-    assert expected.std(axis=(2, 3)).min() > 5e-5  # the picture matters
+    assert expected.std(axis=(2, 3)).min() > 1e-5  # the picture matters

@@ -145,14 +145,14 @@ def test_broken_frames_give_a_reason_or_an_honest_pose(
 
 
 def test_maps_are_read_as_they_are_written() -> None:
-    maps = np.zeros((7, 60, 108), np.float32)
+    maps = np.zeros((7, 30, 54), np.float32)
     maps[:, 20, 30] = [0.9, 0.25, -0.5, np.log(6.0), np.log(3.0), 0.49 * np.cos(1.0), 0.49 * np.sin(1.0)]
     maps[:, 20, 32] = [0.8, -1.75, -0.5, np.log(6.0), np.log(3.0), 1.0, 0.0]  # the same box again
-    maps[:, 40, 90] = [0.2, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0]
+    maps[:, 25, 50] = [0.2, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0]
     found = decode(maps, 0.5, 0.1)
     assert [round(d.score, 3) for d in found] == [0.9, 0.2]
-    assert found[0].middle == pytest.approx(((30.75 * 4) / 0.5 - 0.5, 20.0 * 4 / 0.5 - 0.5))
-    assert found[0].edges == pytest.approx((6 * 8, 3 * 8), rel=1e-5)
+    assert found[0].middle == pytest.approx((30.75 * 8 / 0.5 - 0.5, 20.0 * 8 / 0.5 - 0.5))
+    assert found[0].edges == pytest.approx((6 * 16, 3 * 16), rel=1e-5)
     assert (found[0].angle, found[0].in_plane) == pytest.approx((0.5, 0.7), rel=1e-5)
 
 
