@@ -248,10 +248,12 @@ def _too_little(patch: Patch, found: Fit, connector: Connector) -> str | None:
 
 
 def _both_sides(patch: Patch, found: Fit, connector: Connector) -> bool:
-    """Whether the outline shows on either side of the axis: how thick it is."""
+    """Whether the outline shows on either side of the axis, between the ends: how thick it is."""
     rays = patch.sight.rays[~patch.sight.inside]
     _, far = nearest_on_rays(rays, found.center, found.axis, connector.radius, connector.length)
-    aside = (far[:, None] * rays - found.center) @ np.cross(found.axis, found.center)
+    from_center = far[:, None] * rays - found.center
+    between = np.abs(from_center @ found.axis) < connector.length / 2 - END
+    aside = from_center[between] @ np.cross(found.axis, found.center)
     return bool(min(np.count_nonzero(aside > 0), np.count_nonzero(aside < 0)) >= SIDE_EDGES)
 
 
