@@ -105,7 +105,8 @@ def test_the_light_changes_for_both_cameras(make: Make) -> None:
     world = make("light_changes", factor=0.4, direction=(0.2, -1.0, 1.0))
     before, during, after = split(frames(world, "rear", 1.5))
     assert during[0].rgb.mean() == pytest.approx(0.4 * before[0].rgb.mean(), rel=0.3)
-    assert np.array_equal(before[0].rgb, after[0].rgb)
+    # the light is the same again; the cable has moved by a part of a pixel
+    assert np.mean(before[0].rgb != after[0].rgb) < 0.002
 
 
 # --- arms
