@@ -181,7 +181,7 @@ def tags(width: int) -> tuple[Call, Call]:
 def looks(cell: Cell, width: int) -> dict[str, tuple[Call, Call]]:
     """The connector's pose from a rear frame of `width` x 480 pixels, and stages of it; OpenCV's own share of each.
 
-    That is colour space, ranges and contours; for `rgbd` what the thesis's chain calls beside: dilate, fill, erode.
+    That is colour space, ranges and contours.
     """
     frame, pose = rear_frame(cell, width)
     known, color = cell.known, SegmentationParameters.for_color(cell.known.connector.color)
@@ -193,19 +193,6 @@ def looks(cell: Cell, width: int) -> dict[str, tuple[Call, Call]]:
         mask = masks[0] if len(masks) == 1 else cv2.bitwise_or(*masks)
         return cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
 
-    kernel = np.ones((3, 3), np.uint8)
-
-    def chain() -> Any:
-        hsv = cv2.cvtColor(frame.rgb, cv2.COLOR_RGB2HSV)
-        masks = [cv2.inRange(hsv, low, high) for low, high in spans]
-        mask = masks[0] if len(masks) == 1 else cv2.bitwise_or(*masks)
-        mask = cv2.dilate(mask, kernel, iterations=color.dilate)
-        contours, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-        u, v, width, height = cv2.boundingRect(max(contours, key=cv2.contourArea))
-        patch = cv2.drawContours(np.zeros((height, width), np.uint8), contours, -1, 255, cv2.FILLED, offset=(-u, -v))
-        patch = cv2.bitwise_and(patch, mask[v : v + height, u : u + width])
-        return cv2.countNonZero(cv2.erode(patch, kernel, iterations=color.erode))
-
     rgbd, fused = Rgbd(known), Fused(known)
     unregistered = Fused(known.model_copy(update={"boxes": ()}))
     assert not any(isinstance(t.estimate(frame, pose), NoEstimate) for t in (rgbd, fused, unregistered))
@@ -216,10 +203,7 @@ def looks(cell: Cell, width: int) -> dict[str, tuple[Call, Call]]:
         "fused, the camera registered": lambda: register(frame, pose, known.boxes, FIXED),
         "fused, all but registered": lambda: unregistered.estimate(frame, pose),
     }
-    return {
-        f"{width}x480 {name} / bare OpenCV calls": (call, chain if name == "rgbd" else bare)
-        for name, call in ours.items()
-    }
+    return {f"{width}x480 {name} / bare OpenCV calls": (call, bare) for name, call in ours.items()}
 
 
 def detections(cell: Cell, width: int) -> tuple[Call, Call]:

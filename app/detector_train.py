@@ -91,8 +91,8 @@ def train(
     torch.manual_seed(seed)
     torch.set_num_threads(1)
     count = len(pictures.images) - len(pictures.images) // KEPT_BACK
-    network, learned = Network().to(memory_format=torch.channels_last), pictures.part(0, count)  # 1.4 times as fast
-    kept_back = pictures.part(count, len(pictures.images))
+    learned, kept_back = pictures.part(0, count), pictures.part(count, len(pictures.images))
+    network = Network().to(memory_format=torch.channels_last)  # 1.4 times as fast on a processor
     best, rate, draws = -1.0, RATE, [seed]
     if start is not None:
         take_over(network, start, learned.images[:BATCH])

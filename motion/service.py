@@ -30,9 +30,8 @@ from motion.straight import straight_line
 from motion.task import Task
 
 FloatArray = NDArray[np.float64]
-Seen = Callable[
-    [float], FloatArray | None
-]  # points (n, 3) m seen in a picture taken from that second on; None: none yet
+# Points (n, 3) m of what a camera saw from that second on; None while there is no such picture.
+Seen = Callable[[float], FloatArray | None]
 
 MARGIN = 0.015  # m between the arm's spheres and anything while it moves freely
 JAW_REACH = 0.13  # m round a connector's centre where the jaw may be: half its length, a finger's width, 5 cm of palm
