@@ -21,7 +21,7 @@ from app.tick_log import TickLog
 from behaviors import LEAVES
 from interfaces.cell import TAG_DICTIONARY, Cell
 from interfaces.frame import RgbdFrame
-from perception.detector import Detector, fitted, shipped_network
+from perception.detector import Detector, fitted, network_input, pixel_sizes, shipped_network
 from perception.estimate import NoEstimate
 from perception.fused import Fused
 from perception.registration import FIXED, register
@@ -210,7 +210,7 @@ def detections(cell: Cell, width: int) -> tuple[Call, Call]:
     """The connector's pose by the network from a rear frame of `width` x 480 pixels, and the network alone."""
     (frame, pose), detector = rear_frame(cell, width), Detector(cell.known)
     network = cv2.dnn.readNetFromONNX(np.frombuffer(shipped_network(), np.uint8))
-    blob = cv2.dnn.blobFromImage(fitted(frame.rgb)[0], 1 / 255)
+    blob = network_input(fitted(frame.rgb)[0], pixel_sizes(frame.depth, frame.intrinsics))[None]
 
     def bare() -> Any:
         network.setInput(blob)

@@ -126,11 +126,14 @@ def _detector(cell: "Cell", model: Path | None) -> Any:
     import cv2
     import numpy as np
 
+    from interfaces.frame import Intrinsics, RgbdFrame
     from perception.detector import HEIGHT, WIDTH, Detector
 
     try:
         detector = Detector(cell.known, model.read_bytes() if model else None)
-        detector.detect(np.zeros((HEIGHT, WIDTH, 3), np.uint8))
+        blank = np.zeros((HEIGHT, WIDTH), np.float32)
+        k = Intrinsics.from_fov(WIDTH, HEIGHT, 1.0)
+        detector.detect(RgbdFrame("blank", 0, 0.0, np.zeros((*blank.shape, 3), np.uint8), blank, k))
         return detector
     except (cv2.error, ValueError):
         message = "holds no such network; name an ONNX file that `regrasp train-detector` made"

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from interfaces.cell import Cell
 from perception.camera_model import project
-from perception.detector import HEIGHT, STRIDE, WIDTH, fitted
+from perception.detector import HEIGHT, STRIDE, WIDTH, fitted, pixel_sizes
 from perception.segmentation import SegmentationParameters, color_mask
+from sim.depth_noise import DepthNoise
 from sim.random_scene import RandomScene, Shot
 
 FloatArray = NDArray[np.float64]
@@ -28,6 +29,7 @@ NEAR_CONNECTOR, NEAR_LIKE = (
     0.3,
 )  # share of the patches that are cut about the connector, about its colour elsewhere
 LIKES = 16  # places of its colour kept of a picture
+BLIND = 0.05  # share of the patches without any depth
 MOSAIC = 0.15  # share of the patches that are made of four
 
 
@@ -35,12 +37,13 @@ MOSAIC = 0.15  # share of the patches that are made of four
 class Pictures:
     """So many small pictures and their truth.
 
-    `images` (n, 240, 432, 3) uint8; `masks` (n, 240, 432) uint8, 255 where the connector shows; `axes` (n, 2): where
-    its unit axis points in the image, as long as it is seen (`Detection.in_plane`); `likes` (n, 16, 2): pixels (u, v)
-    of its colour elsewhere, -1 where there is none.
+    `images` (n, 240, 432, 3) uint8; `sizes` (n, 240, 432) uint16: `pixel_sizes` in micrometres; `masks` (n, 240, 432)
+    uint8, 255 where the connector shows; `axes` (n, 2): where its unit axis points in the image, as long as it is seen
+    (`Detection.in_plane`); `likes` (n, 16, 2): pixels (u, v) of its colour elsewhere, -1 where there is none.
     """
 
     images: NDArray[np.uint8]
+    sizes: NDArray[np.uint16]
     masks: NDArray[np.uint8]
     axes: NDArray[np.float32]
     likes: NDArray[np.int16]
@@ -48,7 +51,7 @@ class Pictures:
     def part(self, first: int, after: int) -> "Pictures":
         """Pictures `first` to `after` - 1, not copied."""
         some = slice(first, after)
-        return Pictures(self.images[some], self.masks[some], self.axes[some], self.likes[some])
+        return Pictures(self.images[some], self.sizes[some], self.masks[some], self.axes[some], self.likes[some])
 
 
 @dataclass(frozen=True)
@@ -64,6 +67,7 @@ def make_pictures(cell: Cell, seed: int, count: int, tell: Callable[[int], None]
     """`count` pictures of scenes drawn from `seed`; `tell` is called with the number that is done."""
     out = Pictures(
         np.zeros((count, HEIGHT, WIDTH, 3), np.uint8),
+        np.zeros((count, HEIGHT, WIDTH), np.uint16),
         np.zeros((count, HEIGHT, WIDTH), np.uint8),
         np.zeros((count, 2), np.float32),
         np.full((count, LIKES, 2), -1, np.int16),
@@ -72,9 +76,12 @@ def make_pictures(cell: Cell, seed: int, count: int, tell: Callable[[int], None]
     for first in range(0, count, SHOTS):
         rng = np.random.default_rng([seed, first])
         scene = RandomScene(cell, rng)
+        noise = {spec.name: DepthNoise(spec, cell.hidden.errors, seed + first) for spec in cell.known.cameras}
         for i in range(first, min(first + SHOTS, count)):
             shot = scene.shot(present=i % ABSENT != ABSENT - 1)
             out.images[i], _ = fitted(shot.rgb)
+            depth = noise[shot.camera.name].apply(shot.depth, i)
+            out.sizes[i] = np.rint(pixel_sizes(depth, shot.camera.intrinsics) * 1e6)
             out.masks[i] = fitted(shot.mask * np.uint8(255))[0]
             out.axes[i] = axis_in_image(shot)
             out.likes[i] = _likes(out.images[i], out.masks[i], color, rng)
@@ -104,22 +111,28 @@ def axis_in_image(shot: Shot) -> FloatArray:
     return np.nan_to_num((there - here) / max(length, 1e-12) * square)
 
 
-def draw_patch(pictures: Pictures, rng: np.random.Generator) -> tuple[NDArray[np.uint8], list[Target]]:
-    """A patch (160, 160, 3) of pictures, changed at random, and what there is to find in it."""
+def draw_patch(
+    pictures: Pictures, rng: np.random.Generator
+) -> tuple[NDArray[np.uint8], NDArray[np.float32], list[Target]]:
+    """A patch (160, 160, 3) of pictures and its `pixel_sizes`, changed at random, and what there is to find in it."""
     if rng.random() >= MOSAIC:
-        image, targets = _cut(pictures, rng, PATCH)
-        return _recolored(image, rng), targets
+        image, sizes, targets = _cut(pictures, rng, PATCH)
+        return _recolored(image, rng), sizes, targets
     half = PATCH // 2
-    out, all_targets = np.zeros((PATCH, PATCH, 3), np.uint8), []
+    out, out_sizes = np.zeros((PATCH, PATCH, 3), np.uint8), np.zeros((PATCH, PATCH), np.float32)
+    all_targets = []
     for u, v in ((0, 0), (half, 0), (0, half), (half, half)):
-        out[v : v + half, u : u + half], targets = _cut(pictures, rng, half)
+        there = slice(v, v + half), slice(u, u + half)
+        out[there], out_sizes[there], targets = _cut(pictures, rng, half)
         for t in targets:
             box = (t.box[0] + u, t.box[1] + v, t.box[2] + u, t.box[3] + v)
             all_targets.append(Target(box, t.axis, t.counts))
-    return _recolored(out, rng), all_targets
+    return _recolored(out, rng), out_sizes, all_targets
 
 
-def _cut(pictures: Pictures, rng: np.random.Generator, size: int) -> tuple[NDArray[np.uint8], list[Target]]:
+def _cut(
+    pictures: Pictures, rng: np.random.Generator, size: int
+) -> tuple[NDArray[np.uint8], NDArray[np.float32], list[Target]]:
     """A square of `size` px, turned, zoomed, sheared and mirrored, with parts cut out."""
     i = int(rng.integers(len(pictures.images)))
     image, mask = pictures.images[i], pictures.masks[i]
@@ -134,15 +147,19 @@ def _cut(pictures: Pictures, rng: np.random.Generator, size: int) -> tuple[NDArr
     matrix = np.column_stack([change, rng.uniform(0.1, 0.9, 2) * size - change @ middle])
     image = cv2.warpAffine(image, matrix, (size, size), flags=cv2.INTER_LINEAR)
     mask = cv2.warpAffine(mask, matrix, (size, size), flags=cv2.INTER_LINEAR)
-    _cut_out(image, mask, rng)
+    zoom = float(np.sqrt(abs(np.linalg.det(change))))
+    sizes = cv2.warpAffine(pictures.sizes[i], matrix, (size, size), flags=cv2.INTER_NEAREST) * np.float32(1e-6 / zoom)
+    if rng.random() < BLIND:
+        sizes[:] = 0.0
+    _cut_out(image, sizes, mask, rng)
     mask = np.asarray(mask >= 128, np.uint8)
     area = cv2.countNonZero(mask)
     if not area:
-        return image, []
+        return image, sizes, []
     u, v, width, height = cv2.boundingRect(mask)
     axis = change @ pictures.axes[i]
     axis *= np.linalg.norm(pictures.axes[i]) / max(float(np.linalg.norm(axis)), 1e-9)
-    return image, [Target((u, v, u + width, v + height), tuple(axis.tolist()), area >= CLEAR)]
+    return image, sizes, [Target((u, v, u + width, v + height), tuple(axis.tolist()), area >= CLEAR)]
 
 
 def _change(rng: np.random.Generator) -> FloatArray:
@@ -156,14 +173,17 @@ def _change(rng: np.random.Generator) -> FloatArray:
     return np.asarray(zoom * turn @ shear @ np.diag([rng.choice([-1.0, 1.0]), 1.0]))
 
 
-def _cut_out(image: NDArray[np.uint8], mask: NDArray[np.uint8], rng: np.random.Generator) -> None:
-    """Cover up to three rectangles, a tenth of a whole picture's edges each, with plain colours."""
+def _cut_out(
+    image: NDArray[np.uint8], sizes: NDArray[np.float32], mask: NDArray[np.uint8], rng: np.random.Generator
+) -> None:
+    """Cover up to three rectangles, a tenth of a whole picture's edges each, with plain colours, nearer or unread."""
     if rng.random() < 0.5:
         return
     for _ in range(3):
         u, v = rng.integers(0, image.shape[0], 2)
         there = slice(v, v + HEIGHT // 10), slice(u, u + WIDTH // 10)
         image[there], mask[there] = rng.integers(0, 256, 3), 0
+        sizes[there] = sizes[v, u] * rng.choice([0.0, rng.uniform(0.6, 1.0)])
 
 
 def _recolored(image: NDArray[np.uint8], rng: np.random.Generator) -> NDArray[np.uint8]:

@@ -116,7 +116,9 @@ def true_box(mask: NDArray[np.bool_]) -> Box | None:
 
 def answer(detector: Detector, shot: Shot, cell: Cell, number: int) -> Answer:
     """What the detector says to a picture, whose depth gets the noise of seed and frame `number`."""
-    found, truth = detector.detect(shot.rgb, LEAST_SCORE), true_box(shot.mask)
+    depth = DepthNoise(shot.camera, cell.hidden.errors, number).apply(shot.depth, 1)
+    frame = RgbdFrame(shot.camera.name, number, 0.0, shot.rgb, depth, shot.camera.intrinsics)
+    found, truth = detector.detect(frame, LEAST_SCORE), true_box(shot.mask)
     if truth is None:
         return Answer(found)
     out = Answer(found, truth, shot.occlusion)
@@ -127,8 +129,6 @@ def answer(detector: Detector, shot: Shot, cell: Cell, number: int) -> Answer:
     across = float(np.hypot(*axis)) > SEEN_ACROSS
     turned = np.rad2deg(best.angle - np.arctan2(axis[1], axis[0]))
     angle_error = abs((turned + 90) % 180 - 90) if across else None
-    depth = DepthNoise(shot.camera, cell.hidden.errors, number).apply(shot.depth, 1)
-    frame = RgbdFrame(shot.camera.name, number, 0.0, shot.rgb, depth, shot.camera.intrinsics)
     true_axis = shot.world_from_connector.rotation.apply([1.0, 0.0, 0.0])
     pose = detector.estimate(frame, shot.world_from_camera, axis=true_axis)
     if not isinstance(pose, Estimate) or not out.right()[0]:

@@ -13,18 +13,17 @@ import numpy as np
 import onnx
 import onnx.numpy_helper
 import torch
-from numpy.typing import NDArray
 from torch import nn
 
 from app.detector_data import CLEAR, Pictures, draw_patch, target_maps
 from app.detector_score import LEAST_SCORE, Answer, average_precision, true_box
-from perception.detector import HEIGHT, WIDTH, decode
+from perception.detector import HEIGHT, WIDTH, decode, network_input
 
 CHANNELS = (16, 32, 64, 96)  # at strides 4 to 32
 DEPTHS = (1, 3, 3)  # convolutions at strides 8 to 32, after the one that shrinks
 WIDTH_UP = 32  # channels on the way up and of the answer's head; choice: 3.6 ms of processor time an answer in all
 RATE, BATCH = 4e-3, 32  # choice: usual for AdamW on a small network; not tuned
-CHECK_EVERY = 500  # steps; choice: a check takes as long as some 25 of them
+CHECK_EVERY = 2000  # steps; choice: a check takes as long as some 100 of them
 AHEAD = 3  # batches
 # Learning in bfloat16 takes two thirds of the time where the processor has instructions for it, and for ever elsewhere.
 HALF = torch.cpu._is_avx512_bf16_supported()  # torch has no public way to ask
@@ -41,7 +40,7 @@ Weights = dict[str, tuple[torch.Tensor, ...]]  # of each convolution, by its nam
 
 
 class Network(nn.Module):
-    """From images (n, 3, h, w), 0 to 1, to maps (n, 7, h / 8, w / 8) as in `perception.detector.decode`.
+    """From inputs (n, 4, h, w) of `network_input` to maps (n, 7, h / 8, w / 8) as in `decode`: `perception.detector`.
 
     Down to stride 32, where a cell sees 370 px, and up to stride 8 again, each level added to its like:
     a pyramid of features (Lin et al. 2017). Finer cells had half as much of the processor's time for what they mean.
@@ -49,7 +48,7 @@ class Network(nn.Module):
 
     def __init__(self) -> None:
         super().__init__()
-        self.stem = nn.Sequential(_convolution(3, CHANNELS[0] // 2, 2), _convolution(CHANNELS[0] // 2, CHANNELS[0], 2))
+        self.stem = nn.Sequential(_convolution(4, CHANNELS[0] // 2, 2), _convolution(CHANNELS[0] // 2, CHANNELS[0], 2))
         self.down = nn.ModuleList(
             nn.Sequential(_convolution(a, b, 2), *(_convolution(b, b) for _ in range(depth)))
             for (a, b), depth in zip(pairwise(CHANNELS), DEPTHS, strict=True)
@@ -95,7 +94,7 @@ def train(
     network = Network().to(memory_format=torch.channels_last)  # 1.4 times as fast on a processor
     best, rate, draws = -1.0, RATE, [seed]
     if start is not None:
-        take_over(network, start, learned.images[:BATCH])
+        take_over(network, start, _inputs(learned, slice(BATCH)))
         best, rate, draws = _precision(network, kept_back), RATE / 4, [seed, 1]  # other parts of the pictures
         keep(to_onnx(network), best)
     optimizer = torch.optim.AdamW(network.parameters(), rate, weight_decay=1e-4)
@@ -126,12 +125,12 @@ def loss(maps: torch.Tensor, wanted: torch.Tensor) -> torch.Tensor:
 
 
 def to_onnx(network: Network) -> bytes:
-    """The network as an ONNX file: `image` (1, 3, 240, 432) RGB 0 to 1 in, `maps` (1, 7, 30, 54) out."""
-    file, example = io.BytesIO(), (torch.zeros(1, 3, HEIGHT, WIDTH),)
+    """The network as an ONNX file: `input` (1, 4, 240, 432) in, `maps` (1, 7, 30, 54) out."""
+    file, example = io.BytesIO(), (torch.zeros(1, 4, HEIGHT, WIDTH),)
     network.eval()
     with warnings.catch_warnings(action="ignore", category=DeprecationWarning):  # the newer way needs onnxscript, too
         torch.onnx.export(
-            network, example, file, dynamo=False, input_names=["image"], output_names=["maps"], opset_version=OPSET
+            network, example, file, dynamo=False, input_names=["input"], output_names=["maps"], opset_version=OPSET
         )
     network.train()
     return file.getvalue()
@@ -153,10 +152,10 @@ def read_weights(model: bytes) -> Weights:
 
 
 @torch.no_grad()
-def take_over(network: Network, weights: Weights, images: NDArray[np.uint8]) -> None:
+def take_over(network: Network, weights: Weights, inputs: torch.Tensor) -> None:
     """Give the network these weights: it then answers as the file did that they were read from.
 
-    A file has each convolution and its normalization in one; they are two again by what `images` (n, h, w, 3) make of
+    A file has each convolution and its normalization in one; they are two again by what `inputs` (n, 4, h, w) make of
     the convolution.
     """
     hooks = []
@@ -170,7 +169,7 @@ def take_over(network: Network, weights: Weights, images: NDArray[np.uint8]) -> 
         normalization.bias.copy_(bias)
         hooks.append(layer.register_forward_hook(partial(_normalize, normalization)))
     network.eval()
-    network(torch.stack([_tensor(image) for image in images]))
+    network(inputs)
     network.train()
     for hook in hooks:
         hook.remove()
@@ -205,13 +204,16 @@ def _batches(pictures: Pictures, draws: Sequence[int], steps: int) -> Iterator[t
 
 
 def _batch(pictures: Pictures, rng: np.random.Generator) -> tuple[torch.Tensor, torch.Tensor]:
-    images, targets = zip(*(draw_patch(pictures, rng) for _ in range(BATCH)), strict=True)
-    batch = torch.stack([_tensor(i) for i in images]).contiguous(memory_format=torch.channels_last)
-    return batch, torch.from_numpy(np.stack([target_maps(t) for t in targets]))
+    images, sizes, targets = zip(*(draw_patch(pictures, rng) for _ in range(BATCH)), strict=True)
+    inputs = np.stack([network_input(*pair) for pair in zip(images, sizes, strict=True)])
+    wanted = torch.from_numpy(np.stack([target_maps(t) for t in targets]))
+    return torch.from_numpy(inputs).contiguous(memory_format=torch.channels_last), wanted
 
 
-def _tensor(image: np.typing.NDArray[np.uint8]) -> torch.Tensor:
-    return torch.from_numpy(image.transpose(2, 0, 1) / np.float32(255))
+def _inputs(pictures: Pictures, which: slice) -> torch.Tensor:
+    """Whole pictures as the network sees them, (n, 4, 240, 432)."""
+    pairs = zip(pictures.images[which], pictures.sizes[which] * np.float32(1e-6), strict=True)
+    return torch.from_numpy(np.stack([network_input(*pair) for pair in pairs]))
 
 
 @torch.no_grad()
@@ -219,10 +221,10 @@ def _precision(network: Network, pictures: Pictures) -> float:
     """Average precision on whole pictures; those where too little shows are left out."""
     network.eval()
     answers = []
-    for image, mask in zip(pictures.images, pictures.masks >= 128, strict=True):
+    for i, mask in enumerate(pictures.masks >= 128):
         if 0 < cv2.countNonZero(mask.astype(np.uint8)) < CLEAR:
             continue
-        maps = network(_tensor(image)[None])[0].numpy()
+        maps = network(_inputs(pictures, slice(i, i + 1)))[0].numpy()
         answers.append(Answer(decode(maps, 1.0, LEAST_SCORE), true_box(mask)))
     network.train()
     return average_precision(answers)

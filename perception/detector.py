@@ -1,11 +1,13 @@
 """The connector found by a small network of our own (Hwang 2024, section 3.2.2, has a YOLOv5 in its place).
 
 The network is a CenterNet (Zhou et al. 2019): a map of how likely each cell holds the middle of a connector's visible
-part, and maps of that part's box and of the axis' direction. `regrasp train-detector` makes the file.
+part, and maps of that part's box and of the axis' direction. Unlike the thesis's it sees depth, too: as the size of
+what a pixel shows, so that a rod nearby and a can afar are none. `regrasp train-detector` makes the file.
 """
 
 from dataclasses import dataclass
 from importlib.resources import files
+from typing import Any
 
 import cv2
 import numpy as np
@@ -13,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
 from interfaces.cell import KnownCell
-from interfaces.frame import RgbdFrame
+from interfaces.frame import Intrinsics, RgbdFrame
 from perception.camera_model import NEAREST, project, rays
 from perception.estimate import LEFT, Estimate, NoEstimate, pose_covariance
 from perception.rgbd_pose import MIN_POINTS, min_max_axis, seen_pose, without_outliers
@@ -23,6 +25,7 @@ FloatArray = NDArray[np.float64]
 Box = tuple[float, float, float, float]
 
 WIDTH, HEIGHT = 432, 240  # px of the network's input: half a camera's image, and whole numbers of its cells
+LEAST_SIZE = 3e-4  # m; of what a pixel of the input shows; choice: finer than any camera here has
 STRIDE = 8  # px of the input that a cell of the output covers
 MIN_SCORE = 0.5  # choice: the most right and fewest false boxes among look-alikes (harmonic mean), by tenths
 MOST = 10  # boxes looked at in an image; choice: more than a cell holds
@@ -88,9 +91,9 @@ class Detector:
         self._net = cv2.dnn.readNetFromONNX(np.frombuffer(data, np.uint8))
         self._color = SegmentationParameters.for_color(known.connector.color)
 
-    def detect(self, rgb: NDArray[np.uint8], min_score: float = MIN_SCORE) -> list[Detection]:
-        """The connectors in `rgb` (H, W, 3) that score at least so, the likeliest first."""
-        return decode(*self._answer(rgb), min_score)
+    def detect(self, frame: RgbdFrame, min_score: float = MIN_SCORE) -> list[Detection]:
+        """The connectors in `frame` that score at least so, the likeliest first."""
+        return decode(*self._answer(frame), min_score)
 
     def estimate(
         self,
@@ -101,7 +104,7 @@ class Detector:
         near: FloatArray | None = None,
     ) -> Estimate | NoEstimate:
         """See `Technique.estimate`."""
-        maps, scale = self._answer(frame.rgb)
+        maps, scale = self._answer(frame)
         good = decode(maps, scale, MIN_SCORE)
         if not good:
             message = f"the likeliest box scores {maps[0].max():.2f}, {MIN_SCORE} is needed"
@@ -132,10 +135,10 @@ class Detector:
         whole = RigidTransform.from_matrix(pose)
         return Estimate(stamp, camera, position, direction, whole, covariance, len(readings), area, extent, False)
 
-    def _answer(self, rgb: NDArray[np.uint8]) -> tuple[NDArray[np.float32], float]:
-        """The network's output (7, 30, 54), and how much smaller than `rgb` it saw the image."""
-        canvas, scale = fitted(rgb)
-        self._net.setInput(cv2.dnn.blobFromImage(canvas, 1 / 255))
+    def _answer(self, frame: RgbdFrame) -> tuple[NDArray[np.float32], float]:
+        """The network's output (7, 30, 54), and how much smaller than `frame` it saw the image."""
+        image, scale = fitted(frame.rgb)
+        self._net.setInput(network_input(image, pixel_sizes(frame.depth, frame.intrinsics))[None])
         maps = self._net.forward()
         if maps.shape != (1, 7, HEIGHT // STRIDE, WIDTH // STRIDE):
             raise ValueError(f"a network that answers with maps of shape {maps.shape} is none of ours")
@@ -178,15 +181,37 @@ def shipped_network() -> bytes:
     return files("perception").joinpath("detector.onnx").read_bytes()
 
 
-def fitted(image: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], float]:
-    """An image (H, W, ...) shrunk to the network's input (240, 432, ...), black beside it, and the factor."""
+def fitted(image: NDArray[Any], interpolation: int = cv2.INTER_AREA) -> tuple[NDArray[Any], float]:
+    """An image (H, W, ...) shrunk to the network's input (240, 432, ...), zero beside it, and the factor."""
     height, width = image.shape[:2]
     scale = min(WIDTH / width, HEIGHT / height)
     size = max(1, round(scale * width)), max(1, round(scale * height))
-    small = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
-    canvas = np.zeros((HEIGHT, WIDTH, *small.shape[2:]), np.uint8)
+    small = cv2.resize(image, size, interpolation=interpolation)
+    canvas = np.zeros((HEIGHT, WIDTH, *small.shape[2:]), image.dtype)
     canvas[: size[1], : size[0]] = small
     return canvas, scale
+
+
+def pixel_sizes(depth: NDArray[np.float32], intrinsics: Intrinsics) -> NDArray[np.float32]:
+    """The width (240, 432) m of what a pixel of the network's input shows, from `depth` (H, W) m; 0 without reading."""
+    small, scale = fitted(depth, cv2.INTER_NEAREST)
+    small[~((small > NEAREST) & (small < FAR))] = 0.0  # NaN compares false
+    small *= np.float32(1.0 / (intrinsics.fx * scale))
+    return small
+
+
+def network_input(image: NDArray[np.uint8], sizes: NDArray[np.float32]) -> NDArray[np.float32]:
+    """What the network sees (4, h, w): `image` (h, w, 3) RGB from 0 to 1, and half the logarithm of `sizes` (h, w) m.
+
+    The logarithm is over `LEAST_SIZE`, and 0 where there is no reading.
+    """
+    out = np.empty((4, *sizes.shape), np.float32)
+    out[:3] = cv2.dnn.blobFromImage(image, 1 / 255)[0]
+    np.maximum(sizes, np.float32(LEAST_SIZE), out=out[3])
+    cv2.log(out[3], dst=out[3])
+    out[3] -= np.float32(np.log(LEAST_SIZE))
+    out[3] *= np.float32(0.5)
+    return out
 
 
 def decode(maps: NDArray[np.float32], scale: float, min_score: float) -> list[Detection]:

@@ -162,7 +162,7 @@ def make_things(client: int, connector: Connector, rng: np.random.Generator, cou
 
 
 def _box(client: int, color: Color, rng: np.random.Generator) -> Thing:
-    half = rng.uniform(0.008, 0.05) * rng.uniform(0.45, 1.0, 3)
+    half = np.exp(rng.uniform(np.log(0.004), np.log(0.06), 3))  # from splints to plates
     return Thing(((shape(client, p.GEOM_BOX, color, halfExtents=half.tolist()), 0.0),))
 
 

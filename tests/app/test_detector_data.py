@@ -19,6 +19,7 @@ def pictures(cell: Cell) -> Pictures:
 def test_pictures_depend_on_the_seed_alone(cell: Cell, pictures: Pictures) -> None:
     again, other = make_pictures(cell, 5, 3), make_pictures(cell, 6, 3)
     assert np.array_equal(again.images, pictures.images[:3])
+    assert np.array_equal(again.sizes, pictures.sizes[:3])
     assert np.array_equal(again.masks, pictures.masks[:3])
     assert not np.array_equal(other.images, pictures.images[:3])
 
@@ -40,8 +41,9 @@ def test_masks_and_axes_belong_to_the_connector(pictures: Pictures) -> None:
 
 def test_patches_depend_on_the_generator_alone(pictures: Pictures) -> None:
     for i in range(10):
-        (a, truth), (b, again) = (draw_patch(pictures, np.random.default_rng(i)) for _ in range(2))
+        (a, sizes, truth), (b, same, again) = (draw_patch(pictures, np.random.default_rng(i)) for _ in range(2))
         assert np.array_equal(a, b)
+        assert np.array_equal(sizes, same)
         assert truth == again
 
 
@@ -53,7 +55,7 @@ def test_patches_keep_the_connector_in_its_box(pictures: Pictures, monkeypatch: 
     white.images[pictures.masks >= 128] = 255
     compared = 0
     for i in range(100):
-        image, targets = draw_patch(white, np.random.default_rng(i))
+        image, _, targets = draw_patch(white, np.random.default_rng(i))
         if len(targets) == 1 and targets[0].counts:
             compared += 1
             u0, v0, width, height = cv2.boundingRect((image[..., 0] >= 128).astype(np.uint8))

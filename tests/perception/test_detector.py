@@ -13,7 +13,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from interfaces.cell import KnownCell
 from interfaces.frame import Intrinsics, RgbdFrame
 from perception.camera_model import project
-from perception.detector import MIN_SCORE, Detector, decode, fitted, overlap
+from perception.detector import LEAST_SIZE, MIN_SCORE, Detector, decode, fitted, network_input, overlap, pixel_sizes
 from perception.estimate import Estimate, NoEstimate
 from perception.segmentation import NotSeen
 
@@ -55,7 +55,7 @@ def test_the_shipped_network_is_small() -> None:
 @pytest.mark.parametrize("degrees", [0.0, 30.0, 75.0, 120.0, 165.0])
 def test_box_and_angle_of_a_free_connector(detector: Detector, degrees: float) -> None:
     thing = Cylinder(MIDDLE, axis_at(degrees))
-    found = detector.detect(view(thing).rgb)
+    found = detector.detect(view(thing))
     assert len(found) == 1
     ends = project(MIDDLE + np.outer([-0.045, 0.045], thing.axis), K)
     side = 0.010 / 0.75 * K.fx * np.abs(axis_at(degrees + 90))[:2]
@@ -68,7 +68,7 @@ def test_box_and_angle_of_a_free_connector(detector: Detector, degrees: float) -
 @pytest.mark.parametrize("size", [(640, 480), (848, 480), (1280, 720), (424, 240)])
 def test_pictures_of_any_size(detector: Detector, size: tuple[int, int]) -> None:
     k = Intrinsics.from_fov(*size, np.deg2rad(65.0))
-    found = detector.detect(view(Cylinder(MIDDLE, axis_at(20.0)), k=k).rgb)
+    found = detector.detect(view(Cylinder(MIDDLE, axis_at(20.0)), k=k))
     assert len(found) == 1
     middle = np.array(found[0].middle)
     assert np.linalg.norm(middle - [k.cx, k.cy]) < 0.015 / 0.75 * k.fx
@@ -167,6 +167,35 @@ def test_a_picture_is_shrunk_without_a_change_of_shape() -> None:
     assert width == pytest.approx(100, abs=1.5)
 
 
+@given(st.floats(0.2, 5.0), st.sampled_from([(640, 480), (848, 480), (432, 240), (320, 240)]), st.floats(40.0, 90.0))
+def test_a_pixel_of_the_input_shows_as_much_as_geometry_says(z: float, size: tuple[int, int], fov: float) -> None:
+    k = Intrinsics.from_fov(*size, np.deg2rad(fov))
+    sizes = pixel_sizes(np.full(size[::-1], z, np.float32), k)
+    _, scale = fitted(np.zeros(size[::-1], np.uint8))
+    assert sizes.max() * scale * size[0] == pytest.approx(2 * z * np.tan(np.deg2rad(fov) / 2), rel=1e-5)
+    given_to_network = network_input(np.zeros((240, 432, 3), np.uint8), sizes)[3]
+    assert given_to_network.max() == pytest.approx(np.log(sizes.max() / LEAST_SIZE) / 2, abs=1e-5)
+
+
+@pytest.mark.parametrize("value", [0.0, -1.0, np.nan, np.inf, 1e30])
+def test_what_is_no_reading_has_no_size(value: float) -> None:
+    depth = np.full((480, 848), 0.5, np.float32)
+    depth[100:200] = value
+    sizes = pixel_sizes(depth, K)
+    assert not sizes[51:99].any()
+    seen = network_input(np.zeros((240, 432, 3), np.uint8), sizes)[3]
+    assert np.isfinite(seen).all()
+    assert not seen[51:99].any()
+
+
+def test_size_tells_the_connector_from_a_large_likeness(detector: Detector) -> None:
+    """The same picture, pixel by pixel, is the connector at 0.75 m and a thing of 0.3 m at 2.5 m."""
+    frame = view(Cylinder(MIDDLE, axis_at(20.0)))
+    far = dataclasses.replace(frame, depth=frame.depth * np.float32(2.5 / 0.75))
+    assert detector.detect(frame)
+    assert not detector.detect(far)
+
+
 @given(boxes, boxes)
 def test_overlap_is_a_share_and_symmetric(a: tuple[float, ...], b: tuple[float, ...]) -> None:
     share = overlap(a, b)  # type: ignore[arg-type]
@@ -178,4 +207,4 @@ def test_overlap_is_a_share_and_symmetric(a: tuple[float, ...], b: tuple[float, 
 def test_another_red_thing_is_no_connector(detector: Detector) -> None:
     red = Block(np.array([-0.04, -0.05, 0.7]), np.array([0.05, 0.05, 0.8]), (0.75, 0.05, 0.06))
     purple = Block(np.array([0.15, -0.1, 0.6]), np.array([0.3, 0.1, 0.7]), PURPLE)
-    assert detector.detect(view(red, purple).rgb) == []
+    assert detector.detect(view(red, purple)) == []
