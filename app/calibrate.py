@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from app.calibration_file import CalibrationFile, write_calibration
 from app.findings import Finding, Findings, shown
 from app.image_files import read_rgb
+from app.options import IMAGE_SUFFIXES
 from app.record import write_whole
 from app.table import print_table
 from interfaces.cell import CameraSpec
@@ -23,9 +24,9 @@ from sim.board import board_pictures, board_poses
 FloatArray = NDArray[np.float64]
 Picture = tuple[str, Callable[[], NDArray[np.uint8]]]  # a name, and what gives the RGB image
 
-SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
 MIN_VIEWS = 5  # choice: three determine a camera, five say how well
 MIN_SIDE = 64  # pixels; a smaller picture shows no board
+ALIKE = 0.02  # of the picture's width, by which corners move on average; choice: views nearer to each other are one
 MOST_DOUBT = 0.01  # of the focal length; choice: more comes of views that are all alike
 MAGNIFIED = 50.0  # residuals in the drawn pictures
 
@@ -51,9 +52,9 @@ def pictures_in(folder: Path) -> list[Picture]:
     """The image files of a folder in the order of their names. Raises `Findings`."""
     if not folder.is_dir():
         raise Findings([Finding(shown(folder), 1, "is no folder; name one that holds pictures of a checkerboard")])
-    files = sorted(path for path in folder.iterdir() if path.suffix.lower() in SUFFIXES)
+    files = sorted(path for path in folder.iterdir() if path.suffix.lower() in IMAGE_SUFFIXES)
     if len(files) < MIN_VIEWS:
-        message = f"holds {len(files)} images ({', '.join(SUFFIXES)}); take {MIN_VIEWS} or more of the board"
+        message = f"holds {len(files)} images ({', '.join(IMAGE_SUFFIXES)}); take {MIN_VIEWS} or more of the board"
         raise Findings([Finding(shown(folder), 1, message)])
     return [(path.name, partial(_read, path)) for path in files]
 
@@ -78,6 +79,9 @@ def run(
             f"take {MIN_VIEWS} or more that show all of it, and check --columns and --rows"
         )
         raise Findings([Finding(source, 1, message)])
+    if (different := _different(list(seen.values()), ALIKE * size[0])) < MIN_VIEWS:
+        message = f"only {different} of {len(seen)} views differ; hold the board in {MIN_VIEWS} or more ways"
+        raise Findings([Finding(source, 1, message)])
     found = calibrate(list(seen.values()), *size, board.columns, board.rows, board.square)
     doubt = max(found.deviations[0] / found.intrinsics.fx, found.deviations[1] / found.intrinsics.fy)
     if not doubt < MOST_DOUBT:  # nan too
@@ -88,6 +92,15 @@ def run(
     _write(out, found)
     if draw is not None:
         _draw(draw, pictures, seen, residuals, board)
+
+
+def _different(views: Sequence[FloatArray], least: float) -> int:
+    """How many of the views (n, 2) are at least so many pixels, on average, from all that came before."""
+    kept: list[FloatArray] = []
+    for view in views:
+        if all(np.linalg.norm(view - other, axis=1).mean() >= least for other in kept):
+            kept.append(view)
+    return len(kept)
 
 
 def _find_boards(

@@ -7,7 +7,7 @@ import typer
 
 from app import output
 from app.findings import Finding, Findings, nearest, shown
-from app.options import MOST_SEED
+from app.options import IMAGE_SUFFIXES, MOST_SEED
 from app.progress import late_imports
 from app.resources import resolve
 from app.scenario_file import load_cell
@@ -51,6 +51,8 @@ def calibrate(
     wrong = output.unwritable(out.parent) + (output.unwritable(draw) if draw else [])
     if out.is_dir():
         wrong.append(Finding(shown(out), 1, "is a folder; name a file"))
+    if out.suffix.lower() in IMAGE_SUFFIXES:
+        wrong.append(Finding(shown(out), 1, "is a picture's name, and a calibration is YAML; end it in .yaml"))
     if draw is not None and images is not None and draw.resolve() == images.resolve():
         wrong.append(Finding("--draw", 1, "is the folder of your pictures, which it would overwrite; name another"))
     if wrong:

@@ -98,6 +98,8 @@ def evaluate_detector(
     wrong = output.unwritable(out.parent) if out else []
     if out is not None and out.is_dir():
         wrong.append(Finding(shown(out), 1, "is a folder; name a file"))
+    if out is not None and out.suffix.lower() == ".onnx":
+        wrong.append(Finding(shown(out), 1, "is a network's name, and the figures are JSON; end it in .json"))
     if model is not None and not model.is_file():
         wrong.append(Finding(shown(model), 1, "is no file; name an ONNX file that `regrasp train-detector` made"))
     if wrong:

@@ -10,6 +10,7 @@ from interfaces.quote import quoted
 
 MOST_SEED = 2**31 - 1
 MOST_SEEDS = 10_000  # of one study
+IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
 
 Sets = Annotated[
     list[str] | None,

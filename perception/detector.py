@@ -27,7 +27,7 @@ Box = tuple[float, float, float, float]
 WIDTH, HEIGHT = 432, 240  # px of the network's input: half a camera's image, and whole numbers of its cells
 LEAST_SIZE = 3e-4  # m; of what a pixel of the input shows; choice: finer than any camera here has
 STRIDE = 8  # px of the input that a cell of the output covers
-MIN_SCORE = 0.5  # choice: the most right and fewest false boxes among look-alikes (harmonic mean), by tenths
+MIN_SCORE = 0.5  # choice: about as many missed as false ones on pictures drawn as the held-out ones are
 MOST = 10  # boxes looked at in an image; choice: more than a cell holds
 OVERLAP = 0.5  # intersection over union at which two boxes are one; choice: that of AP50
 WINDOW = 0.3  # of the box's edges: where depth is read; choice: most of a slanting connector's box is beside it
@@ -237,7 +237,8 @@ def decode(maps: NDArray[np.float32], scale: float, min_score: float) -> list[De
 
 
 def overlap(a: Box, b: Box) -> float:
-    """Intersection over union of two boxes."""
+    """Intersection over union of two boxes; 0 of two without area."""
     across, down = min(a[2], b[2]) - max(a[0], b[0]), min(a[3], b[3]) - max(a[1], b[1])
     shared = max(0.0, across) * max(0.0, down)
-    return shared / ((a[2] - a[0]) * (a[3] - a[1]) + (b[2] - b[0]) * (b[3] - b[1]) - shared)
+    union = (a[2] - a[0]) * (a[3] - a[1]) + (b[2] - b[0]) * (b[3] - b[1]) - shared
+    return shared / union if union > 0 else 0.0

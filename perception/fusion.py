@@ -26,8 +26,8 @@ def fuse(estimates: Sequence[Estimate]) -> Estimate:
     """One estimate by all, of the last one's time; `camera` names each, and counts are sums.
 
     Views of the whole connector count before those of a part, whose centre is another. One that is far off does not
-    count where most agree; where they do not, all count and the covariance spans them. Which end is which is settled by
-    most of those that saw the cable. Raises ValueError without an estimate.
+    count where most agree; where they do not, all count alike and the covariance spans them. Which end is which is
+    settled by most of those that saw the cable. Raises ValueError without an estimate.
     """
     if not estimates:
         raise ValueError("no estimate to fuse")
@@ -47,8 +47,10 @@ def _combined(estimates: Sequence[Estimate], common: float) -> Estimate:
     values, covariances = (np.array(part) for part in zip(*pairs, strict=True))
     kept, agreed = _agreeing(values, covariances)
     mean, covariance = _mean(values[kept], covariances[kept], common)
-    if not agreed:
-        covariance += np.cov(values[kept], rowvar=False, bias=True)
+    # Estimates that are sure in nearly the same plane and differ there have their weighted mean far away from all.
+    if not agreed or (len(kept) > 1 and _squares(mean - values[kept], covariances[kept]).max() > FAR):
+        mean = values[kept].mean(axis=0)
+        covariance = covariances[kept].mean(axis=0) + np.cov(values[kept], rowvar=False, bias=True)
     return _estimate([estimates[i] for i in kept], line, across, mean, covariance)
 
 
@@ -66,10 +68,15 @@ def _agreeing(values: FloatArray, covariances: FloatArray) -> tuple[list[int], b
     """Which of `values` (n, 5) count, and whether most agree: those near to the one in the middle, else all."""
     away = values[:, None] - values
     spread = covariances[:, None] + covariances
-    squares = np.einsum("nmi,nmi->nm", away, np.linalg.solve(spread, away[..., None])[..., 0])
+    squares = _squares(away, spread)
     middle = int(np.argmin(np.minimum(squares, FAR).sum(axis=1)))
     near = np.flatnonzero(squares[middle] < FAR).tolist()
     return (near, True) if 2 * len(near) > len(values) else (list(range(len(values))), False)
+
+
+def _squares(away: FloatArray, covariances: FloatArray) -> FloatArray:
+    """Squared Mahalanobis lengths (...) of vectors (..., n) by `covariances` (..., n, n)."""
+    return np.asarray(np.einsum("...i,...i->...", away, np.linalg.solve(covariances, away[..., None])[..., 0]))
 
 
 def _mean(values: FloatArray, covariances: FloatArray, common: float) -> tuple[FloatArray, FloatArray]:

@@ -57,9 +57,9 @@ def filter_collisions(
     sockets and the clip.
     """
     takers = [s.name for s in known.sockets] + [b.name for b in known.clip.bracket]
-    pairs = [(arm, -1, boxes["floor"]) for arm in arms]
+    pairs = [(arm, -1, boxes["floor"]) for arm in arms if "floor" in boxes]
     pairs += [(cable.body, cable.connector_link, boxes[name]) for name in takers]
-    clamp = (boxes[known.sockets[-1].name], boxes["right_panel"])
+    clamp = [boxes[name] for name in (known.sockets[-1].name, "right_panel") if name in boxes]
     pairs += [(cable.body, link, box) for link in range(CLAMPED_LINKS) for box in clamp]
     for body, link, box in pairs:
         p.setCollisionFilterPair(body, box, link, -1, 0, physicsClientId=client)

@@ -44,3 +44,10 @@ def test_a_folder_for_the_figures_is_refused_at_once(tmp_path: Path) -> None:
     result = invoke("evaluate-detector", "--out", str(tmp_path))
     assert result.exit_code == 2
     assert "is a folder; name a file" in result.output
+
+
+def test_figures_do_not_overwrite_a_network(tmp_path: Path) -> None:
+    (tmp_path / "mine.onnx").write_bytes(b"mine")
+    result = invoke("evaluate-detector", str(tmp_path / "mine.onnx"), "--out", str(tmp_path / "mine.onnx"))
+    assert (result.exit_code, (tmp_path / "mine.onnx").read_bytes()) == (2, b"mine")
+    assert "end it in .json" in result.output

@@ -204,6 +204,10 @@ def test_overlap_is_a_share_and_symmetric(a: tuple[float, ...], b: tuple[float, 
     assert overlap(a, a) == pytest.approx(1.0)  # type: ignore[arg-type]
 
 
+def test_boxes_without_area_do_not_overlap() -> None:
+    assert overlap((1.0, 1.0, 1.0, 1.0), (1.0, 1.0, 1.0, 1.0)) == 0.0
+
+
 def test_another_red_thing_is_no_connector(detector: Detector) -> None:
     red = Block(np.array([-0.04, -0.05, 0.7]), np.array([0.05, 0.05, 0.8]), (0.75, 0.05, 0.06))
     purple = Block(np.array([0.15, -0.1, 0.6]), np.array([0.3, 0.1, 0.7]), PURPLE)
