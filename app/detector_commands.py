@@ -32,7 +32,7 @@ def train_detector(
     out: Annotated[Path, typer.Option(help="The folder for detector.onnx and evaluation.json.")],
     cell: _Cell = "thesis",
     pictures: Annotated[int, typer.Option(min=24, help="Random pictures to train on.")] = 16000,
-    steps: Annotated[int, typer.Option(min=1, help="Training steps of 32 parts of pictures each.")] = 36000,
+    steps: Annotated[int, typer.Option(min=1, help="Training steps of 32 parts of pictures each.")] = 60000,
     start: Annotated[
         Path | None, typer.Option(metavar="FILE", help="An ONNX file of ours to go on from, at a slower rate.")
     ] = None,
@@ -41,7 +41,7 @@ def train_detector(
 ) -> None:
     """Train the network of the technique `detector` on random pictures of a cell, then evaluate it.
 
-    Needs the extra `train` (torch, onnx), some 20 minutes to draw the pictures and 40 to learn. Ctrl-C keeps the best
+    Needs the extra `train` (torch, onnx), some 25 minutes to draw the pictures and 50 to learn. Ctrl-C keeps the best
     network so far. To use it, put its detector.onnx in the place of perception/detector.onnx.
 
     \b

@@ -127,7 +127,7 @@ def _inside(covers: Sequence[Cover]) -> dict[str, list[int]]:
 
 
 def _write(out: Path | None, looks: Sequence[Look], techniques: Sequence[str], seeds: range) -> None:
-    if out is None:
+    if out is None or not looks:  # nothing was done, and nothing stands in the way of another try
         return
     out.mkdir(parents=True, exist_ok=True)
     figures = {

@@ -246,7 +246,8 @@ def load_cell(path: Path, assignments: Sequence[Assignment] = (), where: Place |
     document = parse(read_text(path, where), shown(path))
     if isinstance(document.value, dict) and "base" in document.value:
         document = _on_base(document, path.parent)
-    _, found = _attempt(apply, document, assignments)
+    fits = isinstance(document.value, dict)  # else that alone is wrong, and not what is laid over it
+    _, found = _attempt(apply, document, assignments if fits else ())
     cell, wrong = _attempt(validated, document, Cell)
     found += wrong
     if cell:

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from toy_scenario import write_scenario
 
 from app.findings import Finding, Findings
+from app.overrides import read
 from app.resources import shipped
 from app.scenario_file import load_cell, load_scenario
 from app.scenario_parts import tree_text
@@ -317,3 +318,12 @@ def test_inputs_reach_the_tree_as_a_tree_file_writes_them(scenario: Path) -> Non
     inputs = load_scenario("mine.yaml", ["inputs.tries=3"]).inputs
     assert inputs == {"tries": "3"}
     assert (tree_text(True), tree_text(0.25), tree_text("rear")) == ("true", "0.25", "rear")
+
+
+def test_of_a_cell_that_is_no_mapping_that_alone_is_told(tmp_path: Path) -> None:
+    (tmp_path / "cell.yaml").write_text("- 1\n- 2\n")
+    assignments, _ = read(["hidden.cable.stiffness.zero=0.005"])
+    with pytest.raises(Findings) as caught:
+        load_cell(tmp_path / "cell.yaml", assignments)
+    assert len(caught.value.items) == 1
+    assert "expected a mapping" in caught.value.items[0].message
