@@ -72,13 +72,14 @@ def perceive(
       regrasp perceive --rgb a.png --depth a.npy --rgb b.png --depth b.npy --intrinsics my_camera.yaml
       regrasp perceive --technique fiducial --cell thesis_tags --rgb photo.jpg --intrinsics my_camera.yaml
 
-    Metres, radians; quaternions x, y, z, w. The connector's x axis leads from the cable to the tip; sign_seen says that
-    the picture tells which end is which; without it the axis may as well lead the other way. covariance is that of position, then of a small turn; extent the length in
-    sight; whole says that position is the whole connector's middle, and not that of the part in sight. Several pictures
-    of a connector that lies still give one pose together, and each its own. Poses are in the camera's frame (x right, y
-    down, z forward), unless --camera or --camera-pose say where it stands in the cell's world: then `fused` also sets
-    the camera right by the floor and panels that it sees, which makes the distance ten times as sure; where it sees
-    none, it believes the place. `rgbd` and `detector` believe any depth.
+    Metres, radians; quaternions x, y, z, w. The connector's x axis leads from the cable to the tip; sign_seen says
+    that the picture tells which end is which; without it the axis may as well lead the other way. covariance is that
+    of position, then of a small turn; extent the length in sight; whole says that position is the whole connector's
+    middle, and not that of the part in sight. Several pictures of a connector that lies still give one pose together,
+    and each its own. Poses are in the camera's frame (x right, y down, z forward), unless --camera or --camera-pose
+    say where it stands in the cell's world: then `fused` also sets the camera right by the floor and panels that it
+    sees, which makes the distance ten times as sure; where it sees none, it believes the place. `rgbd` and `detector`
+    believe any depth.
 
     An intrinsics file is what `regrasp calibrate` writes: width, height, fx, fy, cx, cy (pixels) and, if you like,
     distortion: [k1, k2, p1, p2, k3]. A camera pose file holds position: [x, y, z] and quaternion: [x, y, z, w] of the
