@@ -1,8 +1,10 @@
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from app.pose_coverage import AXIS_LIMIT, POSITION_LIMIT, Cover, Look, coverage, distances, errors
+from app.pose_coverage import AXIS_LIMIT, POSITION_LIMIT, Cover, Look, _write, coverage, distances, errors
 from perception.estimate import ROLL_VARIANCE, Estimate
 
 X = np.array([1.0, 0.0, 0.0])
@@ -48,3 +50,8 @@ def test_coverage_counts_each_techniques_own() -> None:
     assert found["mean_error_m"] == pytest.approx(0.003)
     assert found["by_configuration"] == {"1": {"position": [1, 2], "axis": [2, 2]}}
     assert coverage("b", [Look("b", 3, ())])["mean_error_m"] is None
+
+
+def test_where_nothing_was_done_nothing_is_written(tmp_path: Path) -> None:
+    _write(tmp_path / "out", [], ["fused"], range(1))
+    assert not (tmp_path / "out").exists()

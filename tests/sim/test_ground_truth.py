@@ -75,3 +75,13 @@ def test_contact_peaks_are_a_copy(world: World) -> None:
     truth = GroundTruth(world)
     truth.contact_peaks()["left arm - floor"] = 9.0
     assert "left arm - floor" not in truth.contact_peaks()
+
+
+def test_a_cell_needs_neither_floor_nor_panels(cell: Cell) -> None:
+    bare = cell.model_copy(update={"known": cell.known.model_copy(update={"boxes": ()})})
+    world = World(bare, "zero", seed=1, renderer="tiny")
+    world.advance(0.1)
+    socket = next(s for s in bare.known.sockets if s.name == bare.known.plugged_into)
+    place = socket.world_from_plug(bare.known.connector.length).translation
+    assert np.linalg.norm(world.connector_pose().translation - place) < 0.02
+    world.close()
