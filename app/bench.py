@@ -181,16 +181,14 @@ def tags(width: int) -> tuple[Call, Call]:
 def looks(cell: Cell, width: int) -> dict[str, tuple[Call, Call]]:
     """The connector's pose from a rear frame of `width` x 480 pixels, and stages of it; OpenCV's own share of each.
 
-    That is colour space, ranges and contours.
+    That is colour space, range, dilation and contours of the whole picture.
     """
     frame, pose = rear_frame(cell, width)
     known, color = cell.known, SegmentationParameters.for_color(cell.known.connector.color)
-    spans = color.ranges()
+    (code, *span), kernel = color.range(), np.ones((3, 3), np.uint8)
 
     def bare() -> Any:
-        hsv = cv2.cvtColor(frame.rgb, cv2.COLOR_RGB2HSV)
-        masks = [cv2.inRange(hsv, low, high) for low, high in spans]
-        mask = masks[0] if len(masks) == 1 else cv2.bitwise_or(*masks)
+        mask = cv2.dilate(cv2.inRange(cv2.cvtColor(frame.rgb, code), *span), kernel)
         return cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
 
     rgbd, fused = Rgbd(known), Fused(known)

@@ -23,12 +23,17 @@ def rays(intrinsics: Intrinsics) -> NDArray[np.float32]:
     return out
 
 
-def deproject(depth: NDArray[np.float32], mask: NDArray[np.bool_], intrinsics: Intrinsics) -> FloatArray:
-    """Points (n, 3) m in the optical frame of those pixels of `mask` (H, W) whose `depth` (H, W) m is a reading."""
-    pixels = np.flatnonzero(mask)
-    z = depth.reshape(-1)[pixels]
+def deproject(
+    depth: NDArray[np.float32], mask: NDArray[np.bool_], intrinsics: Intrinsics, corner: tuple[int, int] = (0, 0)
+) -> FloatArray:
+    """Points (n, 3) m in the optical frame of those pixels of `mask` (h, w) whose `depth` (H, W) m is a reading.
+
+    The mask's first pixel is `corner` (u, v) of the image.
+    """
+    there = slice(corner[1], corner[1] + mask.shape[0]), slice(corner[0], corner[0] + mask.shape[1])
+    z = depth[there][mask]
     valid = (z > NEAREST) & (z < FURTHEST)  # false for NaN
-    return (rays(intrinsics).reshape(-1, 3)[pixels[valid]] * z[valid, None]).astype(np.float64)
+    return (rays(intrinsics)[there][mask][valid] * z[valid, None]).astype(np.float64)
 
 
 def project(points: FloatArray, intrinsics: Intrinsics) -> FloatArray:

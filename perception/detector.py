@@ -16,7 +16,7 @@ from scipy.spatial.transform import RigidTransform
 
 from interfaces.cell import KnownCell
 from interfaces.frame import Intrinsics, RgbdFrame
-from perception.camera_model import NEAREST, project, rays
+from perception.camera_model import NEAREST, deproject, project
 from perception.estimate import LEFT, Estimate, NoEstimate, pose_covariance
 from perception.rgbd_pose import MIN_POINTS, min_max_axis, seen_pose, without_outliers
 from perception.segmentation import NoSegment, NotSeen, SegmentationParameters, segment
@@ -132,7 +132,7 @@ class Detector:
         width, height = box.edges
         extent = depth * float(np.hypot(width / k.fx, height / k.fy))
         stamp, camera, area = frame.stamp, frame.camera, round(width * height)
-        whole = RigidTransform.from_matrix(pose)
+        whole = RigidTransform(pose, normalize=False)
         return Estimate(stamp, camera, position, direction, whole, covariance, len(readings), area, extent, False)
 
     def _answer(self, frame: RgbdFrame) -> tuple[NDArray[np.float32], float]:
@@ -150,9 +150,8 @@ class Detector:
         found = segment(frame.rgb[there], self._color)
         if isinstance(found, NoSegment):
             return None
-        depth = np.where(found.mask, frame.depth[there], 0.0)
-        seen = (depth > 0) & (depth < FAR)
-        cloud = (rays(frame.intrinsics)[there][seen] * depth[seen, None]).astype(float)
+        corner = there[1].start + found.corner[0], there[0].start + found.corner[1]
+        cloud = deproject(frame.depth, found.mask, frame.intrinsics, corner)
         cloud = cloud[:: 1 + len(cloud) // MOST_POINTS]
         points = without_outliers(cloud) if len(cloud) >= MIN_POINTS else cloud
         return min_max_axis(points) if len(points) >= MIN_POINTS else None

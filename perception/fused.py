@@ -8,6 +8,7 @@ the shape is refused.
 from dataclasses import dataclass, replace
 
 import cv2
+import numba
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
@@ -15,7 +16,7 @@ from scipy.spatial.transform import RigidTransform
 from interfaces.cell import Box, Connector, KnownCell, pose_along
 from interfaces.frame import RgbdFrame
 from perception.cable_end import cable_leaves
-from perception.camera_model import project
+from perception.camera_model import NEAREST
 from perception.cylinder import COARSE, FINE, Fit, Sight, depth_misses, fit, nearest_on_rays, thinned
 from perception.estimate import LEFT, ROLL_VARIANCE, Estimate, NoEstimate
 from perception.patch import D415, MIN_AREA, Cut, Patch, Stereo, directions, look, patches
@@ -34,6 +35,7 @@ PROMISING = (10, 4)  # starts that are fitted roughly, rough fits that are fitte
 ALIKE, ALIKE_COSINE = 0.02, 0.94  # m, and of 20 degrees: fits so near to each other end alike
 MISSING_COST = 100.0  # of a whole axis that should show: what is not there weighs like twenty points off
 DOUBT = 3.0  # of cost that makes another fit e times less likely; 1 by theory, whose noise has no outliers
+ALONG = np.linspace(-0.45, 0.45, 19)  # of its length: places on the axis that should show
 BEFORE = 0.7  # of the radius before the axis; choice: between what touches the body there and the surface of a cable
 HOPELESS = 4.0  # choice: a fit so many times worse than the best is no doubt, and not worth more steps
 END = 0.004  # m: outline points so near to an end belong to it
@@ -204,15 +206,35 @@ def _starts(sight: Sight, connector: Connector) -> list[tuple[FloatArray, FloatA
 
 def _missing(patch: Patch, found: Fit, connector: Connector) -> float:
     """Share of the axis that should show, nothing being before it, and does not show the patch."""
-    along = np.linspace(-0.45, 0.45, 19) * connector.length
-    points = found.center + along[:, None] * found.axis
-    pixels = np.nan_to_num(np.rint(project(points, patch.intrinsics)), nan=-1.0).astype(int)
-    inside = np.all((pixels >= 0) & (pixels < [patch.cut.mask.shape[1], patch.cut.mask.shape[0]]), axis=1)
-    u, v = pixels[inside].T
-    reading = patch.depth[v, u]
-    # The body shows a radius before its axis or more, a cable that goes on from a shorter rod does not.
-    open_to_view = reading > points[inside, 2] - BEFORE * connector.radius
-    return float(np.count_nonzero(open_to_view & ~patch.cut.mask[v, u])) / len(along)
+    k, before = patch.intrinsics, BEFORE * connector.radius
+    along = connector.length * ALONG
+    return _missing_share(patch.depth, patch.cut.mask, k.fx, k.fy, k.cx, k.cy, found.center, found.axis, along, before)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _missing_share(
+    depth: NDArray[np.float32],
+    mask: Mask,
+    fx: float,
+    fy: float,
+    cx: float,
+    cy: float,
+    center: FloatArray,
+    axis: FloatArray,
+    along: FloatArray,
+    before: float,
+) -> float:
+    missing = 0
+    for a in along:
+        x, y, z = center[0] + a * axis[0], center[1] + a * axis[1], center[2] + a * axis[2]
+        if z < NEAREST:
+            continue
+        u, v = round(fx * x / z + cx), round(fy * y / z + cy)
+        if not (0 <= u < mask.shape[1] and 0 <= v < mask.shape[0]):
+            continue
+        # The body shows a radius before its axis or more, a cable that goes on from a shorter rod does not.
+        missing += not mask[v, u] and depth[v, u] > z - before
+    return missing / len(along)
 
 
 def _refusal(patch: Patch, found: Fit, connector: Connector) -> str | None:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import RigidTransform, Rotation
+from scipy.spatial.transform import RigidTransform
 
 from interfaces.cell import Box, KnownCell, WristMount
 from interfaces.frame import RgbdFrame
@@ -91,7 +91,8 @@ def register(
     lower = np.array([np.asarray(box.center) - np.asarray(box.size) / 2 for box in boxes])
     upper = np.array([np.asarray(box.center) + np.asarray(box.size) / 2 for box in boxes])
     prior = np.diag(1.0 / np.repeat([errors.position, errors.turn, errors.scale], [3, 3, 1]) ** 2)
-    turn, place, scale = world_from_camera.rotation.as_matrix(), world_from_camera.translation, 1.0
+    told = world_from_camera.as_matrix()
+    turn, place, scale = told[:3, :3], told[:3, 3], 1.0
     information, moved, through = prior, np.zeros(7), 0.0
     for gate in GATES:
         seen, pull, count, through = _equations(scale * readings @ turn.T, place, lower, upper, gate)
@@ -101,7 +102,7 @@ def register(
         step = -np.linalg.solve(information, pull + prior @ moved)
         moved = moved + step
         turn, place, scale = _turn(step[3:6]) @ turn, place + step[:3], scale * (1.0 + float(step[6]))
-    pose = RigidTransform.from_components(place, Rotation.from_matrix(turn))
+    pose = RigidTransform(np.vstack([np.column_stack([turn, place]), [0, 0, 0, 1]]), normalize=False)
     covariance = np.asarray(np.linalg.inv(information), float)
     surprise = np.inf if through > MAX_THROUGH else float(moved @ prior @ moved)
     return Registration(pose, scale, covariance, surprise)

@@ -39,7 +39,7 @@ class Rgbd:
         found = segment(frame.rgb, self._parameters)
         if isinstance(found, NoSegment):
             return NoEstimate(frame.stamp, frame.camera, found.reason, found.message)
-        cloud = deproject(frame.depth, found.mask, frame.intrinsics)
+        cloud = deproject(frame.depth, found.mask, frame.intrinsics, found.corner)
         points = without_outliers(cloud) if len(cloud) >= MIN_POINTS else cloud
         if len(points) < MIN_POINTS:
             message = f"{len(points)} depth readings on {found.area} pixels of the connector, {MIN_POINTS} are needed"
@@ -56,7 +56,7 @@ class Rgbd:
             frame.camera,
             position,
             way,
-            RigidTransform.from_matrix(pose),
+            RigidTransform(pose, normalize=False),
             spread,
             len(points),
             found.area,
@@ -106,7 +106,8 @@ def seen_pose(center: FloatArray, axis: FloatArray, world_from_camera: RigidTran
     x = camera[:3, :3] @ axis
     x *= 1.0 if x @ hint >= 0 else -1.0
     up, forward = -camera[:3, 1], camera[:3, 2]
-    y = np.cross(up if abs(x @ up) < 0.95 else forward, x)
-    y /= np.linalg.norm(y)
-    out[:3, 0], out[:3, 1], out[:3, 2] = x, y, np.cross(x, y)
+    z = up if abs(x @ up) < 0.95 else forward
+    z = z - (z @ x) * x
+    z /= np.sqrt(z @ z)
+    out[:3, 0], out[:3, 1], out[:3, 2] = x, np.cross(z, x), z
     return out

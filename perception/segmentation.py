@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-HUE_STEPS = 180  # OpenCV's 8-bit hue counts half degrees
+HUE_STEPS, BLUE = 180, 120  # OpenCV's 8-bit hue counts half degrees
 
 
 class NotSeen(StrEnum):
@@ -51,25 +51,26 @@ class SegmentationParameters:
         hue, saturation, value = colorsys.rgb_to_hsv(*color)
         return cls(hue * HUE_STEPS, 8.0, round(255 * saturation / 2), round(255 * value / 5))
 
-    def ranges(self) -> list[tuple[NDArray[np.uint8], NDArray[np.uint8]]]:
-        """Lower and upper HSV corners; two pairs where the hue range passes through 0, as red's does."""
-        low, high = round(self.hue - self.hue_tolerance), round(self.hue + self.hue_tolerance)
-        spans = [(max(low, 0), min(high, HUE_STEPS - 1))]
-        if low < 0:
-            spans.append((low + HUE_STEPS, HUE_STEPS - 1))
-        if high >= HUE_STEPS:
-            spans.append((0, high - HUE_STEPS))
+    def range(self) -> tuple[int, NDArray[np.uint8], NDArray[np.uint8]]:
+        """OpenCV's code for the change of an RGB image to HSV, and the lower and upper corner (3,) in it.
+
+        Where the range of hues would pass through 0, as red's does, the code is the one that takes red for blue: there
+        hue h is 120 - h, and the range is whole.
+        """
+        code, low, high = cv2.COLOR_RGB2HSV, round(self.hue - self.hue_tolerance), round(self.hue + self.hue_tolerance)
+        if low < 0 or high >= HUE_STEPS:
+            code, low, high = cv2.COLOR_BGR2HSV, (BLUE - high) % HUE_STEPS, (BLUE - low) % HUE_STEPS
         floor = (self.min_saturation, self.min_value)
-        return [(np.array([a, *floor], np.uint8), np.array([b, 255, 255], np.uint8)) for a, b in spans]
+        return code, np.array([low, *floor], np.uint8), np.array([high, 255, 255], np.uint8)
 
 
 @dataclass(frozen=True, eq=False)
 class Segment:
-    """The connector's pixels: `mask` (H, W), its pixel count, and the box (u0, v0, u1, v1) that holds it, ends open."""
+    """The connector's pixels: their number, the first pixel (u, v) of the box that holds them, a `mask` of the box."""
 
-    mask: NDArray[np.bool_]
     area: int
-    box: tuple[int, int, int, int]
+    corner: tuple[int, int]
+    mask: NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -82,11 +83,8 @@ class NoSegment:
 
 def color_mask(rgb: NDArray[np.uint8], parameters: SegmentationParameters) -> NDArray[np.uint8]:
     """255 where the colour is the connector's, else 0; (H, W)."""
-    hsv = cv2.cvtColor(rgb, cv2.COLOR_RGB2HSV)
-    first, *others = (cv2.inRange(hsv, low, high) for low, high in parameters.ranges())
-    for other in others:
-        cv2.bitwise_or(first, other, dst=first)
-    return np.asarray(first, np.uint8)
+    code, low, high = parameters.range()
+    return np.asarray(cv2.inRange(cv2.cvtColor(rgb, code), low, high), np.uint8)
 
 
 def segment(rgb: NDArray[np.uint8], parameters: SegmentationParameters) -> Segment | NoSegment:
@@ -108,6 +106,4 @@ def segment(rgb: NDArray[np.uint8], parameters: SegmentationParameters) -> Segme
     if area < parameters.min_area:
         message = f"the largest patch of the connector's colour has {area} pixels, {parameters.min_area} are needed"
         return NoSegment(NotSeen.TOO_SMALL, message)
-    mask = np.zeros(binary.shape, np.bool_)
-    mask[v : v + height, u : u + width] = patch > 0
-    return Segment(mask, area, (u, v, u + width, v + height))
+    return Segment(area, (u, v), patch > 0)

@@ -15,6 +15,7 @@ def test_a_deprojected_pixel_projects_onto_itself(u: int, v: int, z: float) -> N
     depth[v, u] = z
     point = deproject(depth, depth > 0, CAMERA)
     assert point[0, 2] == pytest.approx(z, rel=1e-6)
+    assert deproject(depth, np.ones((1, 1), np.bool_), CAMERA, (u, v)) == pytest.approx(point)
     assert project(point, CAMERA)[0] == pytest.approx([u, v], abs=1e-3)
 
 
