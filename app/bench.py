@@ -52,8 +52,8 @@ def main() -> None:
             **looks(scenario.cell, 640),
             "848x480 tag to pose / bare OpenCV calls": tags(848),
             "640x480 tag to pose / bare OpenCV calls": tags(640),
-            "848x480 to pose by detector / its network's bare forward": detections(scenario.cell, 848),
-            "640x480 to pose by detector / its network's bare forward": detections(scenario.cell, 640),
+            **detections(scenario.cell, 848),
+            **detections(scenario.cell, 640),
         }
         print_table(("pair", "ours ms", "other ms", "ratio"), [_line(name, *pair) for name, pair in rows.items()])
     finally:
@@ -204,18 +204,27 @@ def looks(cell: Cell, width: int) -> dict[str, tuple[Call, Call]]:
     return {f"{width}x480 {name} / bare OpenCV calls": (call, bare) for name, call in ours.items()}
 
 
-def detections(cell: Cell, width: int) -> tuple[Call, Call]:
-    """The connector's pose by the network from a rear frame of `width` x 480 pixels, and the network alone."""
+def detections(cell: Cell, width: int) -> dict[str, tuple[Call, Call]]:
+    """The connector's pose by the network from a rear frame of `width` x 480 pixels, and stages; the network alone."""
     (frame, pose), detector = rear_frame(cell, width), Detector(cell.known)
     network = cv2.dnn.readNetFromONNX(np.frombuffer(shipped_network(), np.uint8))
-    blob = network_input(fitted(frame.rgb)[0], pixel_sizes(frame.depth, frame.intrinsics))[None]
+
+    def seen() -> Any:
+        return network_input(fitted(frame.rgb)[0], pixel_sizes(frame.depth, frame.intrinsics))[None]
+
+    blob = seen()
 
     def bare() -> Any:
         network.setInput(blob)
         return network.forward()
 
     assert not isinstance(detector.estimate(frame, pose), NoEstimate)
-    return lambda: detector.estimate(frame, pose), bare
+    ours: dict[str, Call] = {
+        "detector": lambda: detector.estimate(frame, pose),
+        "detector, its network's input": seen,
+        "detector, found but not placed": lambda: detector.detect(frame),
+    }
+    return {f"{width}x480 {name} / its network's bare forward": (call, bare) for name, call in ours.items()}
 
 
 if __name__ == "__main__":

@@ -40,7 +40,7 @@ Weights = dict[str, tuple[torch.Tensor, ...]]  # of each convolution, by its nam
 
 
 class Network(nn.Module):
-    """From inputs (n, 4, h, w) of `network_input` to maps (n, 7, h / 8, w / 8) as in `decode`: `perception.detector`.
+    """From inputs (n, 16, h / 2, w / 2) of `network_input` to maps (n, 7, h / 8, w / 8) as in `decode`.
 
     Down to stride 32, where a cell sees 370 px, and up to stride 8 again, each level added to its like:
     a pyramid of features (Lin et al. 2017). Finer cells had half as much of the processor's time for what they mean.
@@ -48,7 +48,9 @@ class Network(nn.Module):
 
     def __init__(self) -> None:
         super().__init__()
-        self.stem = nn.Sequential(_convolution(4, CHANNELS[0] // 2, 2), _convolution(CHANNELS[0] // 2, CHANNELS[0], 2))
+        self.stem = nn.Sequential(
+            _convolution(16, CHANNELS[0] // 2, kernel=2), _convolution(CHANNELS[0] // 2, CHANNELS[0], 2)
+        )
         self.down = nn.ModuleList(
             nn.Sequential(_convolution(a, b, 2), *(_convolution(b, b) for _ in range(depth)))
             for (a, b), depth in zip(pairwise(CHANNELS), DEPTHS, strict=True)
@@ -60,7 +62,7 @@ class Network(nn.Module):
 
     def forward(self, x: torch.Tensor) -> torch.Tensor:
         """See the class."""
-        x = self.stem(x)
+        x = self.stem(x)[..., :-1, :-1]  # kernels of 2 px with margins on both sides make one more than there was
         levels = []
         for down, side in zip(self.down, self.side, strict=True):
             x = down(x)
@@ -125,8 +127,8 @@ def loss(maps: torch.Tensor, wanted: torch.Tensor) -> torch.Tensor:
 
 
 def to_onnx(network: Network) -> bytes:
-    """The network as an ONNX file: `input` (1, 4, 240, 432) in, `maps` (1, 7, 30, 54) out."""
-    file, example = io.BytesIO(), (torch.zeros(1, 4, HEIGHT, WIDTH),)
+    """The network as an ONNX file: `input` (1, 16, 120, 216) in, `maps` (1, 7, 30, 54) out."""
+    file, example = io.BytesIO(), (torch.zeros(1, 16, HEIGHT // 2, WIDTH // 2),)
     network.eval()
     with warnings.catch_warnings(action="ignore", category=DeprecationWarning):  # the newer way needs onnxscript, too
         torch.onnx.export(
@@ -155,8 +157,8 @@ def read_weights(model: bytes) -> Weights:
 def take_over(network: Network, weights: Weights, inputs: torch.Tensor) -> None:
     """Give the network these weights: it then answers as the file did that they were read from.
 
-    A file has each convolution and its normalization in one; they are two again by what `inputs` (n, 4, h, w) make of
-    the convolution.
+    A file has each convolution and its normalization in one; they are two again by what `inputs`
+    (n, 16, h / 2, w / 2) make of the convolution.
     """
     hooks = []
     for name, layer in _layers(network).items():
@@ -211,7 +213,7 @@ def _batch(pictures: Pictures, rng: np.random.Generator) -> tuple[torch.Tensor, 
 
 
 def _inputs(pictures: Pictures, which: slice) -> torch.Tensor:
-    """Whole pictures as the network sees them, (n, 4, 240, 432)."""
+    """Whole pictures as the network sees them, (n, 16, 120, 216)."""
     pairs = zip(pictures.images[which], pictures.sizes[which] * np.float32(1e-6), strict=True)
     return torch.from_numpy(np.stack([network_input(*pair) for pair in pairs]))
 

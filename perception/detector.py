@@ -194,23 +194,28 @@ def fitted(image: NDArray[Any], interpolation: int = cv2.INTER_AREA) -> tuple[ND
 def pixel_sizes(depth: NDArray[np.float32], intrinsics: Intrinsics) -> NDArray[np.float32]:
     """The width (240, 432) m of what a pixel of the network's input shows, from `depth` (H, W) m; 0 without reading."""
     small, scale = fitted(depth, cv2.INTER_NEAREST)
-    small[~((small > NEAREST) & (small < FAR))] = 0.0  # NaN compares false
+    unread = cv2.inRange(small, NEAREST, FAR) == 0  # NaN, too
     small *= np.float32(1.0 / (intrinsics.fx * scale))
+    small[unread] = 0.0
     return small
 
 
 def network_input(image: NDArray[np.uint8], sizes: NDArray[np.float32]) -> NDArray[np.float32]:
-    """What the network sees (4, h, w): `image` (h, w, 3) RGB from 0 to 1, and half the logarithm of `sizes` (h, w) m.
+    """What the network sees (16, h / 2, w / 2) of `image` (h, w, 3) RGB and of the `sizes` (h, w) m of its pixels.
 
-    The logarithm is over `LEAST_SIZE`, and 0 where there is no reading.
+    Every four neighbours are one: first red, green, blue (0 to 1) and size of the upper left ones, then of those on
+    their right, and so below. A size is half its logarithm over `LEAST_SIZE`, 0 where there is no reading. OpenCV
+    takes a tenth less time for the whole network than with the same pixels side by side.
     """
-    out = np.empty((4, *sizes.shape), np.float32)
-    out[:3] = cv2.dnn.blobFromImage(image, 1 / 255)[0]
-    np.maximum(sizes, np.float32(LEAST_SIZE), out=out[3])
-    cv2.log(out[3], dst=out[3])
-    out[3] -= np.float32(np.log(LEAST_SIZE))
-    out[3] *= np.float32(0.5)
-    return out
+    height, width = sizes.shape
+    out = np.empty((2, 2, 4, height // 2, width // 2), np.float32)
+    apart = (height // 2, 2, width // 2, 2)
+    np.multiply(image.reshape(*apart, 3).transpose(1, 3, 4, 0, 2), np.float32(1 / 255), out=out[:, :, :3])
+    logarithm = cv2.log(np.maximum(sizes, np.float32(LEAST_SIZE)))
+    logarithm -= np.float32(np.log(LEAST_SIZE))
+    logarithm *= np.float32(0.5)
+    out[:, :, 3] = logarithm.reshape(apart).transpose(1, 3, 0, 2)
+    return out.reshape(16, height // 2, width // 2)
 
 
 def decode(maps: NDArray[np.float32], scale: float, min_score: float) -> list[Detection]:

@@ -183,9 +183,20 @@ def test_what_is_no_reading_has_no_size(value: float) -> None:
     depth[100:200] = value
     sizes = pixel_sizes(depth, K)
     assert not sizes[51:99].any()
-    seen = network_input(np.zeros((240, 432, 3), np.uint8), sizes)[3]
+    seen = network_input(np.zeros((240, 432, 3), np.uint8), sizes)
     assert np.isfinite(seen).all()
-    assert not seen[51:99].any()
+    assert not seen[:, 26:49].any()
+    assert seen[3::4, :25, :200].all()
+
+
+def test_the_network_sees_every_pixel_once() -> None:
+    rng = np.random.default_rng(0)
+    image, sizes = rng.integers(0, 256, (240, 432, 3), np.uint8), rng.uniform(1e-4, 1e-2, (240, 432)).astype(np.float32)
+    seen = network_input(image, sizes)
+    for k, (down, right) in enumerate([(0, 0), (0, 1), (1, 0), (1, 1)]):
+        assert seen[4 * k : 4 * k + 3] == pytest.approx(image[down::2, right::2].transpose(2, 0, 1) / 255, abs=1e-6)
+        size = np.maximum(sizes[down::2, right::2], LEAST_SIZE)
+        assert seen[4 * k + 3] == pytest.approx(np.log(size / LEAST_SIZE) / 2, abs=1e-5)
 
 
 def test_size_tells_the_connector_from_a_large_likeness(detector: Detector) -> None:
