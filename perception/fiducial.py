@@ -76,7 +76,7 @@ class Fiducial:
         found = self._find(frame, world_from_camera, self._connector, near)
         if isinstance(found, NoEstimate):
             return found
-        position, along = found.pose.translation, found.pose.rotation.apply([1.0, 0.0, 0.0])
+        position, along = found.pose.translation, found.pose.as_matrix()[:3, 0]
         return Estimate(
             frame.stamp,
             frame.camera,
@@ -131,7 +131,7 @@ def find_tag(frame: RgbdFrame, tag: Tag, near: FloatArray | None = None) -> TagP
     bodies = poses * _tag_from_body(tag)
     body = bodies[best]
     covariance = excess * _covariance(squares[best], body.translation, frame.intrinsics)
-    apart = np.hstack([bodies.translation - body.translation, (bodies.rotation * body.rotation.inv()).as_rotvec()])
+    apart = np.hstack([bodies.translation - body.translation, (bodies * body.inv()).rotation.as_rotvec()])
     covariance += (apart * shares[:, None]).T @ apart
     area = round(float(cv2.contourArea(corners.astype(np.float32))))
     return TagPose(body, covariance, len(readings), area, 1.0 - float(shares[best]))
@@ -245,7 +245,7 @@ def _cross_matrices(vectors: FloatArray) -> FloatArray:
 def _in_world(found: TagPose, world_from_camera: RigidTransform, errors: CameraErrors) -> TagPose:
     """The same in the world, by a camera whose pose has these errors."""
     pose = world_from_camera * found.pose
-    turn = np.kron(np.eye(2), world_from_camera.rotation.as_matrix())
+    turn = np.kron(np.eye(2), world_from_camera.as_matrix()[:3, :3])
     sway = np.eye(6)
     sway[:3, 3:] = -_cross_matrices(pose.translation - world_from_camera.translation)
     camera = sway @ np.diag([errors.position**2] * 3 + [errors.turn**2] * 3) @ sway.T
