@@ -219,25 +219,23 @@ def network_input(image: NDArray[np.uint8], sizes: NDArray[np.float32]) -> NDArr
 
 
 def decode(maps: NDArray[np.float32], scale: float, min_score: float) -> list[Detection]:
-    """Detections from the network's output (7, 30, 54).
+    """Detections from the network's output (7, 30, 54), the likeliest first; of boxes on one thing the likeliest.
 
     Maps: likelihood, offset of the box's middle from the cell's (u, v, cells), logarithm of its edges (u, v, cells),
     and the axis as in_plane^2 (cos 2 angle, sin 2 angle), which is the same for both its signs.
     """
-    heat = maps[0]
-    peaks = np.flatnonzero((heat >= min_score) & (heat == cv2.dilate(heat, np.ones((3, 3), np.uint8))))
-    found: list[Detection] = []
-    for cell in peaks[np.argsort(-heat.ravel()[peaks], kind="stable")][:MOST]:
-        row, column = divmod(int(cell), heat.shape[1])
-        score, du, dv, log_width, log_height, cosine, sine = maps[:, row, column].astype(float).tolist()
-        middle = np.array([column + 0.5 + du, row + 0.5 + dv])
-        half = np.exp(np.clip([log_width, log_height], -4, 6)) / 2
-        u0, v0, u1, v1 = (np.concatenate([middle - half, middle + half]) * STRIDE / scale - 0.5).tolist()
-        in_plane = float(np.clip(np.hypot(cosine, sine), 0.0, 1.0)) ** 0.5
-        detection = Detection(score, (u0, v0, u1, v1), float(np.arctan2(sine, cosine)) / 2, in_plane)
-        if all(overlap(detection.box, other.box) < OVERLAP for other in found):
-            found.append(detection)
-    return found
+    rows, columns = np.nonzero(maps[0] >= min_score)
+    if not len(rows):
+        return []
+    scores, du, dv, log_width, log_height, cosine, sine = maps[:, rows, columns].astype(float)
+    cell = STRIDE / scale
+    middles = cell * np.column_stack([columns + 0.5 + du, rows + 0.5 + dv]) - 0.5
+    edges = cell * np.exp(np.clip(np.column_stack([log_width, log_height]), -4, 6))
+    boxes = np.hstack([middles - edges / 2, middles + edges / 2]).tolist()
+    # CenterNet looks at peaks of the likelihood alone; beside one may be a better box, of a thing that is crossed.
+    kept = cv2.dnn.NMSBoxes(np.hstack([middles - edges / 2, edges]).tolist(), scores.tolist(), 0.0, OVERLAP)[:MOST]
+    angles, in_plane = np.arctan2(sine, cosine) / 2, np.clip(np.hypot(cosine, sine), 0.0, 1.0) ** 0.5
+    return [Detection(float(scores[i]), tuple(boxes[i]), float(angles[i]), float(in_plane[i])) for i in kept]
 
 
 def overlap(a: Box, b: Box) -> float:

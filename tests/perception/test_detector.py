@@ -156,6 +156,14 @@ def test_maps_are_read_as_they_are_written() -> None:
     assert (found[0].angle, found[0].in_plane) == pytest.approx((0.5, 0.7), rel=1e-5)
 
 
+def test_a_box_elsewhere_counts_though_its_cell_is_next_to_a_likelier_one() -> None:
+    maps = np.zeros((7, 30, 54), np.float32)
+    maps[0, 10, 20:23] = 0.9, 0.8, 0.7
+    maps[1, 10, 20:23] = 0.0, -1.0, 2.0  # the second's box is the first's, the third's is none of them
+    assert [round(d.score, 3) for d in decode(maps, 1.0, 0.5)] == [0.9, 0.7]
+    assert decode(maps, 1.0, 0.95) == []
+
+
 def test_a_picture_is_shrunk_without_a_change_of_shape() -> None:
     rgb = np.zeros((480, 640, 3), np.uint8)
     cv2.circle(rgb, (320, 240), 100, (255, 255, 255), -1)
