@@ -84,15 +84,29 @@ def test_the_pose_is_that_of_the_front_of_the_visible_part(detector: Detector) -
         assert np.allclose(result.world_from_connector.rotation.apply([1.0, 0.0, 0.0]), result.axis)
 
 
-def test_without_the_connectors_colour_the_axis_is_the_networks_own(known: KnownCell) -> None:
-    blue = known.model_copy(update={"connector": known.connector.model_copy(update={"color": (0.1, 0.1, 0.9)})})
+def test_where_few_readings_are_the_axis_is_the_networks_own(detector: Detector) -> None:
     frame = view(Cylinder(MIDDLE, axis_at(30.0)))
-    borrowed, own = (Detector(k).estimate(frame, EYE, axis=axis_at(30.0)) for k in (known, blue))
+    u, v = detector.detect(frame)[0].middle
+    depth = np.zeros_like(frame.depth)
+    few = np.s_[round(v) - 1 : round(v) + 2, round(u) - 1 : round(u) + 2]
+    depth[few] = frame.depth[few]
+    borrowed, own = (
+        detector.estimate(f, EYE, axis=axis_at(30.0)) for f in (frame, dataclasses.replace(frame, depth=depth))
+    )
     assert isinstance(borrowed, Estimate)
     assert isinstance(own, Estimate)
     assert own.axis[2] == 0.0
     assert np.rad2deg(np.arccos(own.axis @ axis_at(30.0))) < 12
     assert np.trace(own.covariance[3:, 3:]) > np.trace(borrowed.covariance[3:, 3:])
+
+
+def test_what_has_another_colour_than_the_cells_connector_is_not_it(known: KnownCell) -> None:
+    blue = known.model_copy(update={"connector": known.connector.model_copy(update={"color": (0.1, 0.1, 0.9)})})
+    frame = view(Cylinder(MIDDLE, axis_at(30.0)))
+    assert Detector(blue).detect(frame) == []
+    result = Detector(blue).estimate(frame, EYE)
+    assert isinstance(result, NoEstimate)
+    assert result.reason is NotSeen.NO_COLOR
 
 
 def test_of_two_the_one_near_the_last_place_is_taken(detector: Detector) -> None:
