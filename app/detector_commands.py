@@ -153,7 +153,9 @@ def _print(figures: dict[str, Any]) -> None:
     print_table(("hidden", f"found at {figures['min_score']}", "95 % interval"), lines)
     false, empty = figures["empty_pictures_with_a_box"]
     angle, place = figures["angle_error_deg"]["50%"], figures["position_error_m"]["50%"]
-    typer.echo(f"AP50 {figures['ap50']:.3f}; a false box in {false} of {empty} pictures without the connector")
+    low, high = figures["ap50_interval"]
+    typer.echo(f"AP50 {figures['ap50']:.3f}, 95 % interval {low:.3f} to {high:.3f}")
+    typer.echo(f"a false box in {false} of {empty} pictures without the connector")
     if angle is not None and place is not None:
         typer.echo(f"median error: axis in the image {angle:.1f} degrees, position {1000 * place:.1f} mm")
 

@@ -26,6 +26,7 @@ LEAST_SCORE = 0.01  # of the boxes that enter the average precision; choice: far
 LEAST_SEEN = 100  # px of the camera's picture; choice: a seventh of the connector at 0.75 m; less is left out
 OCCLUSION = ((0.0, 0.1), (0.1, 0.3), (0.3, 0.5), (0.5, 0.7))
 SHOTS = 8  # of one scene
+RESAMPLED = 1000  # times, for an interval; choice: its ends then hold to a tenth of its width
 SEEN_ACROSS = 0.5  # of its length: the axis of a connector seen along it says nothing in the image
 
 
@@ -65,11 +66,30 @@ class Answer:
 
 def average_precision(answers: Sequence[Answer]) -> float:
     """Area under the curve of precision, made to fall, over recall (all points)."""
-    hits = [(d.score, right) for a in answers for d, right in zip(a.found, a.right(), strict=True)]
-    total = sum(a.truth is not None for a in answers)
-    if not hits or not total:
+    return _area(np.vstack([np.empty((0, 2)), *map(_hits, answers)]), sum(a.truth is not None for a in answers))
+
+
+def precision_interval(answers: Sequence[Answer]) -> tuple[float, float]:
+    """The 95 % interval of the average precision by the bootstrap: as many pictures drawn from these, often."""
+    hits, there = [_hits(a) for a in answers], np.array([a.truth is not None for a in answers])
+    rng, areas = np.random.default_rng(0), []
+    for _ in range(RESAMPLED):
+        some = rng.integers(len(answers), size=len(answers))
+        areas.append(_area(np.concatenate([hits[i] for i in some]), int(there[some].sum())))
+    low, high = np.quantile(areas, [0.025, 0.975]).tolist()
+    return low, high
+
+
+def _hits(answer: Answer) -> NDArray[np.float64]:
+    """Of each box its score and whether it is right, 1 or 0; (n, 2)."""
+    return np.array([(d.score, r) for d, r in zip(answer.found, answer.right(), strict=True)], float).reshape(-1, 2)
+
+
+def _area(hits: NDArray[np.float64], total: int) -> float:
+    """See `average_precision`: of boxes (n, 2), score and rightness, and so many connectors."""
+    if not len(hits) or not total:
         return 0.0
-    right = np.array([r for _, r in sorted(hits, key=lambda hit: -hit[0])])
+    right = hits[np.argsort(-hits[:, 0], kind="stable"), 1]
     recall = np.cumsum(right) / total
     precision = np.cumsum(right) / np.arange(1, len(right) + 1)
     falling = np.maximum.accumulate(precision[::-1])[::-1]
@@ -149,6 +169,7 @@ def summary(answers: Sequence[Answer]) -> dict[str, Any]:
     return {
         "schema": 1,
         "ap50": average_precision(answers),
+        "ap50_interval": precision_interval(answers),
         "min_score": MIN_SCORE,
         "recall": [sum(a.seen for a in there), len(there)],
         "recall_by_occlusion": {name: [sum(a.seen for a in group), len(group)] for name, group in classes.items()},

@@ -1,7 +1,15 @@
 import numpy as np
 import pytest
 
-from app.detector_score import OCCLUSION, Answer, average_precision, held_out_shots, occlusion_class, true_box
+from app.detector_score import (
+    OCCLUSION,
+    Answer,
+    average_precision,
+    held_out_shots,
+    occlusion_class,
+    precision_interval,
+    true_box,
+)
 from interfaces.cell import Cell
 from perception.detector import Detection
 
@@ -24,6 +32,15 @@ def test_a_false_box_costs_by_its_score() -> None:
     assert average_precision([*answers, Answer([found(0.95)])]) == pytest.approx(2 / 3)  # precision 1/2, 2/3
     assert average_precision([*answers, Answer([found(0.7)])]) == pytest.approx(0.5 + 0.5 * 2 / 3)
     assert average_precision([*answers, Answer([found(0.1)])]) == 1.0
+
+
+def test_fewer_pictures_tell_the_precision_less_well() -> None:
+    some = [Answer([found(0.9 - 0.01 * i)] if i % 4 else [found(0.8, ELSEWHERE)], BOX) for i in range(40)]
+    (low, high), (lower, higher) = precision_interval(10 * some), precision_interval(some)
+    assert lower < low < average_precision(some) < high < higher
+    assert precision_interval(some) == (lower, higher)
+    assert precision_interval([Answer([found(0.9)], BOX), Answer([])]) == (0.0, 1.0)  # some draws have none
+    assert average_precision([]) == 0.0
 
 
 def test_a_second_box_on_the_connector_and_a_shifted_one_are_wrong() -> None:
