@@ -131,6 +131,7 @@ def _detector(cell: "Cell", model: Path | None) -> Any:
     from interfaces.frame import Intrinsics, RgbdFrame
     from perception.detector import HEIGHT, WIDTH, Detector
 
+    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)  # what is wrong we say ourselves
     try:
         detector = Detector(cell.known, model.read_bytes() if model else None)
         blank = np.zeros((HEIGHT, WIDTH), np.float32)
