@@ -196,18 +196,16 @@ def fitted(image: NDArray[Any], interpolation: int = cv2.INTER_AREA) -> tuple[ND
     height, width = image.shape[:2]
     scale = min(WIDTH / width, HEIGHT / height)
     size = max(1, round(scale * width)), max(1, round(scale * height))
-    small = cv2.resize(image, size, interpolation=interpolation)
-    canvas = np.zeros((HEIGHT, WIDTH, *small.shape[2:]), image.dtype)
-    canvas[: size[1], : size[0]] = small
+    canvas = np.zeros((HEIGHT, WIDTH, *image.shape[2:]), image.dtype)
+    cv2.resize(image, size, dst=canvas[: size[1], : size[0]], interpolation=interpolation)
     return canvas, scale
 
 
 def pixel_sizes(depth: NDArray[np.float32], intrinsics: Intrinsics) -> NDArray[np.float32]:
     """The width (240, 432) m of what a pixel of the network's input shows, from `depth` (H, W) m; 0 without reading."""
     small, scale = fitted(depth, cv2.INTER_NEAREST)
-    unread = cv2.inRange(small, NEAREST, FAR) == 0  # NaN, too
+    small = cv2.copyTo(small, cv2.inRange(small, NEAREST, FAR))  # NaN is in no range; what is not copied is 0
     small *= np.float32(1.0 / (intrinsics.fx * scale))
-    small[unread] = 0.0
     return small
 
 
@@ -222,10 +220,8 @@ def network_input(image: NDArray[np.uint8], sizes: NDArray[np.float32]) -> NDArr
     out = np.empty((2, 2, 4, height // 2, width // 2), np.float32)
     apart = (height // 2, 2, width // 2, 2)
     np.multiply(image.reshape(*apart, 3).transpose(1, 3, 4, 0, 2), np.float32(1 / 255), out=out[:, :, :3])
-    logarithm = cv2.log(np.maximum(sizes, np.float32(LEAST_SIZE)))
-    logarithm -= np.float32(np.log(LEAST_SIZE))
-    logarithm *= np.float32(0.5)
-    out[:, :, 3] = logarithm.reshape(apart).transpose(1, 3, 0, 2)
+    logarithm = cv2.log(np.maximum(sizes * np.float32(1 / LEAST_SIZE), np.float32(1.0)))
+    np.multiply(logarithm.reshape(apart).transpose(1, 3, 0, 2), np.float32(0.5), out=out[:, :, 3])
     return out.reshape(16, height // 2, width // 2)
 
 
