@@ -83,8 +83,9 @@ class Detector:
     """The thesis's learned technique as a `perception.technique.Technique`: the network knows what it was trained on.
 
     As there, the middle of the box gives the place in the image, the mean of a cluster of depth readings the depth, and
-    the orientation is borrowed from the RGB-D technique, here looking into the box alone. Where that sees nothing the
-    axis is the network's own, taken to lie across the view. `model` holds an ONNX file; None takes the shipped one.
+    the orientation is borrowed from the RGB-D technique, here looking into the box alone. Where that has too little
+    depth the axis is the network's own, taken to lie across the view. A box must show some of the connector's colour.
+    `model` holds an ONNX file; None takes the shipped one.
     """
 
     def __init__(self, known: KnownCell, model: bytes | None = None) -> None:
@@ -130,15 +131,14 @@ class Detector:
         own = np.array([np.cos(box.angle), np.sin(box.angle), 0.0])
         hint = LEFT if axis is None else axis
         pose = seen_pose(center, own if borrowed is None else borrowed, world_from_camera, hint)
-        position, direction = pose[:3, 3], pose[:3, 0]
+        position, direction = pose.translation, pose.as_matrix()[:3, 0]
         covariance = pose_covariance(
             direction, POSITION_DEVIATION, OWN_DEVIATION if borrowed is None else BORROWED_DEVIATION
         )
         width, height = box.edges
         extent = depth * float(np.hypot(width / k.fx, height / k.fy))
         stamp, camera, area = frame.stamp, frame.camera, round(width * height)
-        whole = RigidTransform(pose, normalize=False)
-        return Estimate(stamp, camera, position, direction, whole, covariance, len(readings), area, extent, False)
+        return Estimate(stamp, camera, position, direction, pose, covariance, len(readings), area, extent, False)
 
     def _answer(self, frame: RgbdFrame) -> tuple[NDArray[np.float32], float]:
         """The network's output (7, 30, 54), and how much smaller than `frame` it saw the image."""

@@ -48,7 +48,7 @@ class Rgbd:
         along = np.sort(points @ here)
         extent = float(along[int(0.99 * len(along))] - along[int(0.01 * len(along))])
         pose = seen_pose(n_mean(points), here, world_from_camera, LEFT if axis is None else axis)
-        position, way = pose[:3, 3], pose[:3, 0]
+        position, way = pose.translation, pose.as_matrix()[:3, 0]
         too_long = extent - self._length  # what shows more than the connector is that much in doubt
         spread = pose_covariance(way, max(POSITION_DEVIATION, too_long), ANGLE_DEVIATION)
         return Estimate(
@@ -56,7 +56,7 @@ class Rgbd:
             frame.camera,
             position,
             way,
-            RigidTransform(pose, normalize=False),
+            pose,
             spread,
             len(points),
             found.area,
@@ -94,8 +94,10 @@ def min_max_axis(points: FloatArray) -> FloatArray:
     return np.asarray(vector / np.linalg.norm(vector))
 
 
-def seen_pose(center: FloatArray, axis: FloatArray, world_from_camera: RigidTransform, hint: FloatArray) -> FloatArray:
-    """world_from_connector (4, 4) of a `center` (3,) and a unit `axis` (3,) in the optical frame.
+def seen_pose(
+    center: FloatArray, axis: FloatArray, world_from_camera: RigidTransform, hint: FloatArray
+) -> RigidTransform:
+    """world_from_connector of a `center` (3,) and a unit `axis` (3,) in the optical frame.
 
     The axis points where `hint` (3,), world, does; z is as near as can be to the camera's up (forward if up aligns).
     Plain arithmetic: scipy's transforms would take a third of the technique's time.
@@ -110,4 +112,4 @@ def seen_pose(center: FloatArray, axis: FloatArray, world_from_camera: RigidTran
     z = z - (z @ x) * x
     z /= np.sqrt(z @ z)
     out[:3, 0], out[:3, 1], out[:3, 2] = x, np.cross(z, x), z
-    return out
+    return RigidTransform(out, normalize=False)  # it is a rotation: to make it one would take as long again
