@@ -37,7 +37,7 @@ MOSAIC = 0.15  # share of the patches that are made of four
 class Pictures:
     """So many small pictures and their truth.
 
-    `images` (n, 240, 432, 3) uint8; `sizes` (n, 240, 432) uint16: `pixel_sizes` in micrometres; `masks` (n, 240, 432)
+    `images` (n, 240, 432, 3) uint8; `sizes` (n, 120, 216) uint16: `pixel_sizes` in micrometres; `masks` (n, 240, 432)
     uint8, 255 where the connector shows; `axes` (n, 2): where its unit axis points in the image, as long as it is seen
     (`Detection.in_plane`); `likes` (n, 16, 2): pixels (u, v) of its colour elsewhere, -1 where there is none.
     """
@@ -67,7 +67,7 @@ def make_pictures(cell: Cell, seed: int, count: int, tell: Callable[[int], None]
     """`count` pictures of scenes drawn from `seed`; `tell` is called with the number that is done."""
     out = Pictures(
         np.zeros((count, HEIGHT, WIDTH, 3), np.uint8),
-        np.zeros((count, HEIGHT, WIDTH), np.uint16),
+        np.zeros((count, HEIGHT // 2, WIDTH // 2), np.uint16),
         np.zeros((count, HEIGHT, WIDTH), np.uint8),
         np.zeros((count, 2), np.float32),
         np.full((count, LIKES, 2), -1, np.int16),
@@ -81,7 +81,7 @@ def make_pictures(cell: Cell, seed: int, count: int, tell: Callable[[int], None]
             shot = scene.shot(present=i % ABSENT != ABSENT - 1)
             out.images[i], _ = fitted(shot.rgb)
             depth = noise[shot.camera.name].apply(shot.depth, i)
-            out.sizes[i] = np.rint(pixel_sizes(depth, shot.camera.intrinsics) * 1e6)
+            out.sizes[i] = np.clip(1e6 * pixel_sizes(depth, shot.camera.intrinsics), 0, 65535).round()
             out.masks[i] = fitted(shot.mask * np.uint8(255))[0]
             out.axes[i] = axis_in_image(shot)
             out.likes[i] = _likes(out.images[i], out.masks[i], color, rng)
@@ -114,16 +114,16 @@ def axis_in_image(shot: Shot) -> FloatArray:
 def draw_patch(
     pictures: Pictures, rng: np.random.Generator
 ) -> tuple[NDArray[np.uint8], NDArray[np.float32], list[Target]]:
-    """A patch (160, 160, 3) of pictures and its `pixel_sizes`, changed at random, and what there is to find in it."""
+    """A patch (160, 160, 3) of pictures and its `pixel_sizes` (80, 80), changed at random, and what it shows."""
     if rng.random() >= MOSAIC:
         image, sizes, targets = _cut(pictures, rng, PATCH)
         return _recolored(image, rng), sizes, targets
     half = PATCH // 2
-    out, out_sizes = np.zeros((PATCH, PATCH, 3), np.uint8), np.zeros((PATCH, PATCH), np.float32)
+    out, out_sizes = np.zeros((PATCH, PATCH, 3), np.uint8), np.zeros((half, half), np.float32)
     all_targets = []
     for u, v in ((0, 0), (half, 0), (0, half), (half, half)):
-        there = slice(v, v + half), slice(u, u + half)
-        out[there], out_sizes[there], targets = _cut(pictures, rng, half)
+        there, there_too = ((slice(v // n, (v + half) // n), slice(u // n, (u + half) // n)) for n in (1, 2))
+        out[there], out_sizes[there_too], targets = _cut(pictures, rng, half)
         for t in targets:
             box = (t.box[0] + u, t.box[1] + v, t.box[2] + u, t.box[3] + v)
             all_targets.append(Target(box, t.axis, t.counts))
@@ -148,7 +148,9 @@ def _cut(
     image = cv2.warpAffine(image, matrix, (size, size), flags=cv2.INTER_LINEAR)
     mask = cv2.warpAffine(mask, matrix, (size, size), flags=cv2.INTER_LINEAR)
     zoom = float(np.sqrt(abs(np.linalg.det(change))))
-    sizes = cv2.warpAffine(pictures.sizes[i], matrix, (size, size), flags=cv2.INTER_NEAREST) * np.float32(1e-6 / zoom)
+    halved = np.column_stack([change, matrix[:, 2] / 2])  # as `matrix`, of every second pixel
+    sizes = cv2.warpAffine(pictures.sizes[i], halved, (size // 2, size // 2), flags=cv2.INTER_NEAREST)
+    sizes = sizes * np.float32(1e-6 / zoom)
     if rng.random() < BLIND:
         sizes[:] = 0.0
     _cut_out(image, sizes, mask, rng)
@@ -183,7 +185,8 @@ def _cut_out(
         u, v = rng.integers(0, image.shape[0], 2)
         there = slice(v, v + HEIGHT // 10), slice(u, u + WIDTH // 10)
         image[there], mask[there] = rng.integers(0, 256, 3), 0
-        sizes[there] = sizes[v, u] * rng.choice([0.0, rng.uniform(0.6, 1.0)])
+        nearer = rng.choice([0.0, rng.uniform(0.6, 1.0)])
+        sizes[v // 2 : (v + HEIGHT // 10) // 2, u // 2 : (u + WIDTH // 10) // 2] = nearer * sizes[v // 2, u // 2]
 
 
 def _recolored(image: NDArray[np.uint8], rng: np.random.Generator) -> NDArray[np.uint8]:

@@ -23,7 +23,7 @@ CHANNELS = (16, 32, 64, 96)  # at strides 4 to 32
 DEPTHS = (1, 3, 3)  # convolutions at strides 8 to 32, after the one that shrinks
 WIDTH_UP = 32  # channels on the way up and of the answer's head; choice: 3.6 ms of processor time an answer in all
 RATE, BATCH = 4e-3, 32  # choice: usual for AdamW on a small network; not tuned
-CHECK_EVERY = 2000  # steps; choice: a check takes as long as some 100 of them
+CHECK_EVERY = 6000  # steps; choice: a check takes as long as some 300 of them
 AHEAD = 3  # batches
 # Learning in bfloat16 takes two thirds of the time where the processor has instructions for it, and for ever elsewhere.
 HALF = torch.cpu._is_avx512_bf16_supported()  # torch has no public way to ask
@@ -40,7 +40,7 @@ Weights = dict[str, tuple[torch.Tensor, ...]]  # of each convolution, by its nam
 
 
 class Network(nn.Module):
-    """From inputs (n, 16, h / 2, w / 2) of `network_input` to maps (n, 7, h / 8, w / 8) as in `decode`.
+    """From inputs (n, 13, h / 2, w / 2) of `network_input` to maps (n, 7, h / 8, w / 8) as in `decode`.
 
     Down to stride 32, where a cell sees 370 px, and up to stride 8 again, each level added to its like:
     a pyramid of features (Lin et al. 2017). Finer cells had half as much of the processor's time for what they mean.
@@ -48,9 +48,8 @@ class Network(nn.Module):
 
     def __init__(self) -> None:
         super().__init__()
-        self.stem = nn.Sequential(
-            _convolution(16, CHANNELS[0] // 2, kernel=2), _convolution(CHANNELS[0] // 2, CHANNELS[0], 2)
-        )
+        half = CHANNELS[0] // 2
+        self.stem = nn.Sequential(_convolution(13, half, kernel=1), _convolution(half, CHANNELS[0], 2))
         self.down = nn.ModuleList(
             nn.Sequential(_convolution(a, b, 2), *(_convolution(b, b) for _ in range(depth)))
             for (a, b), depth in zip(pairwise(CHANNELS), DEPTHS, strict=True)
@@ -62,7 +61,7 @@ class Network(nn.Module):
 
     def forward(self, x: torch.Tensor) -> torch.Tensor:
         """See the class."""
-        x = self.stem(x)[..., :-1, :-1]  # kernels of 2 px with margins on both sides make one more than there was
+        x = self.stem(x)
         levels = []
         for down, side in zip(self.down, self.side, strict=True):
             x = down(x)
@@ -127,8 +126,8 @@ def loss(maps: torch.Tensor, wanted: torch.Tensor) -> torch.Tensor:
 
 
 def to_onnx(network: Network) -> bytes:
-    """The network as an ONNX file: `input` (1, 16, 120, 216) in, `maps` (1, 7, 30, 54) out."""
-    file, example = io.BytesIO(), (torch.zeros(1, 16, HEIGHT // 2, WIDTH // 2),)
+    """The network as an ONNX file: `input` (1, 13, 120, 216) in, `maps` (1, 7, 30, 54) out."""
+    file, example = io.BytesIO(), (torch.zeros(1, 13, HEIGHT // 2, WIDTH // 2),)
     network.eval()
     with warnings.catch_warnings(action="ignore", category=DeprecationWarning):  # the newer way needs onnxscript, too
         torch.onnx.export(
@@ -158,7 +157,7 @@ def take_over(network: Network, weights: Weights, inputs: torch.Tensor) -> None:
     """Give the network these weights: it then answers as the file did that they were read from.
 
     A file has each convolution and its normalization in one; they are two again by what `inputs`
-    (n, 16, h / 2, w / 2) make of the convolution.
+    (n, 13, h / 2, w / 2) make of the convolution.
     """
     hooks = []
     for name, layer in _layers(network).items():
@@ -213,7 +212,7 @@ def _batch(pictures: Pictures, rng: np.random.Generator) -> tuple[torch.Tensor, 
 
 
 def _inputs(pictures: Pictures, which: slice) -> torch.Tensor:
-    """Whole pictures as the network sees them, (n, 16, 120, 216)."""
+    """Whole pictures as the network sees them, (n, 13, 120, 216)."""
     pairs = zip(pictures.images[which], pictures.sizes[which] * np.float32(1e-6), strict=True)
     return torch.from_numpy(np.stack([network_input(*pair) for pair in pairs]))
 

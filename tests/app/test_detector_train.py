@@ -37,7 +37,7 @@ def test_another_training_goes_on_from_a_network(tmp_path: Path) -> None:
 
     model = shipped_network()
     network = Network()
-    inputs = np.random.default_rng(0).random((4, 16, 120, 216), np.float32)
+    inputs = np.random.default_rng(0).random((4, 13, 120, 216), np.float32)
     take_over(network, read_weights(model), torch.from_numpy(inputs))
     answers = []
     for file in (model, to_onnx(network)):
@@ -82,7 +82,7 @@ def test_opencv_computes_what_torch_does() -> None:
 
     torch.manual_seed(1)
     network = Network()
-    image = np.random.default_rng(0).random((1, 16, 120, 216), np.float32)
+    image = np.random.default_rng(0).random((1, 13, 120, 216), np.float32)
     with torch.no_grad():
         network(torch.from_numpy(image))  # fills the running means
         expected = network.eval()(torch.from_numpy(image)).numpy()
