@@ -41,8 +41,9 @@ def train_detector(
 ) -> None:
     """Train the network of the technique `detector` on random pictures of a cell, then evaluate it.
 
-    Needs the extra `train` (torch, onnx), some 20 minutes to draw the pictures, 75 to learn, and 16 GB of memory.
-    Ctrl-C keeps the best network so far. To use it, put its detector.onnx in the place of perception/detector.onnx.
+    Needs the extra `train` (torch, onnx), some 20 minutes to draw the pictures and 80 to learn, and 15 GB of free
+    memory (half with --pictures 16000). Ctrl-C keeps the best network so far. To use it, put its detector.onnx in the
+    place of perception/detector.onnx.
 
     \b
     Examples:

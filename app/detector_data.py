@@ -148,7 +148,8 @@ def _cut(
     image = cv2.warpAffine(image, matrix, (size, size), flags=cv2.INTER_LINEAR)
     mask = cv2.warpAffine(mask, matrix, (size, size), flags=cv2.INTER_LINEAR)
     zoom = float(np.sqrt(abs(np.linalg.det(change))))
-    halved = np.column_stack([change, matrix[:, 2] / 2])  # as `matrix`, of every second pixel
+    # As `matrix`, of every second pixel; no half pixel more, as a reading is of the upper left one of its four.
+    halved = np.column_stack([change, matrix[:, 2] / 2])
     sizes = cv2.warpAffine(pictures.sizes[i], halved, (size // 2, size // 2), flags=cv2.INTER_NEAREST)
     sizes = sizes * np.float32(1e-6 / zoom)
     if rng.random() < BLIND:

@@ -17,11 +17,11 @@ from torch import nn
 
 from app.detector_data import CLEAR, Pictures, draw_patch, target_maps
 from app.detector_score import LEAST_SCORE, Answer, average_precision, true_box
-from perception.detector import HEIGHT, WIDTH, decode, network_input
+from perception.detector import HEIGHT, INPUT, WIDTH, decode, network_input
 
 CHANNELS = (16, 32, 64, 96)  # at strides 4 to 32
 DEPTHS = (1, 3, 3)  # convolutions at strides 8 to 32, after the one that shrinks
-WIDTH_UP = 32  # channels on the way up and of the answer's head; choice: 3.6 ms of processor time an answer in all
+WIDTH_UP = 32  # channels on the way up and of the answer's head; choice: 3.2 ms of processor time an answer in all
 RATE, BATCH = 4e-3, 32  # choice: usual for AdamW on a small network; not tuned
 CHECK_EVERY = 6000  # steps; choice: a check takes as long as some 300 of them
 AHEAD = 3  # batches
@@ -42,7 +42,7 @@ Weights = dict[str, tuple[torch.Tensor, ...]]  # of each convolution, by its nam
 class Network(nn.Module):
     """From inputs (n, 13, h / 2, w / 2) of `network_input` to maps (n, 7, h / 8, w / 8) as in `decode`.
 
-    Down to stride 32, where a cell sees 370 px, and up to stride 8 again, each level added to its like:
+    Down to stride 32, where a cell sees some 370 px, and up to stride 8 again, each level added to its like:
     a pyramid of features (Lin et al. 2017). Finer cells had half as much of the processor's time for what they mean.
     """
 
@@ -126,12 +126,12 @@ def loss(maps: torch.Tensor, wanted: torch.Tensor) -> torch.Tensor:
 
 
 def to_onnx(network: Network) -> bytes:
-    """The network as an ONNX file: `input` (1, 13, 120, 216) in, `maps` (1, 7, 30, 54) out."""
+    """The network as an ONNX file: `INPUT` (1, 13, 120, 216) in, `maps` (1, 7, 30, 54) out."""
     file, example = io.BytesIO(), (torch.zeros(1, 13, HEIGHT // 2, WIDTH // 2),)
     network.eval()
     with warnings.catch_warnings(action="ignore", category=DeprecationWarning):  # the newer way needs onnxscript, too
         torch.onnx.export(
-            network, example, file, dynamo=False, input_names=["input"], output_names=["maps"], opset_version=OPSET
+            network, example, file, dynamo=False, input_names=[INPUT], output_names=["maps"], opset_version=OPSET
         )
     network.train()
     return file.getvalue()
@@ -144,10 +144,11 @@ def read_weights(model: bytes) -> Weights:
     except Exception as error:  # protobuf's own, which differ by its version
         raise ValueError("is no ONNX file") from error
     values = {t.name: torch.from_numpy(onnx.numpy_helper.to_array(t).copy()) for t in graph.initializer}
-    convolutions = {n.name: n.input[1:] for n in graph.node if n.op_type == "Conv"}
-    found = {name.split("/")[-2]: tuple(values[i] for i in inputs) for name, inputs in convolutions.items()}
-    expected = {name: layer.weight.shape for name, layer in _layers(Network()).items()}
-    if {name: parts[0].shape for name, parts in found.items()} != expected:
+    convolutions = {n.name.split("/")[-2:][0]: n.input[1:] for n in graph.node if n.op_type == "Conv"}
+    found = {name: tuple(values[i] for i in inputs if i in values) for name, inputs in convolutions.items()}
+    layers = _layers(Network()).items()
+    expected = {name: [layer.weight.shape, layer.weight.shape[:1]] for name, layer in layers}  # weight, bias
+    if {name: [part.shape for part in parts] for name, parts in found.items()} != expected:
         raise ValueError("has other layers than the network that is trained")
     return found
 

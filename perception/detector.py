@@ -24,9 +24,10 @@ from perception.segmentation import NoSegment, NotSeen, SegmentationParameters, 
 FloatArray = NDArray[np.float64]
 Box = tuple[float, float, float, float]
 
-WIDTH, HEIGHT = 432, 240  # px of the network's input: half a camera's image, and whole numbers of its cells
-LEAST_SIZE = 6e-4  # m; of what two pixels of the picture show; choice: finer than any camera here has
-STRIDE = 8  # px of the input that a cell of the output covers
+WIDTH, HEIGHT = 432, 240  # px of the network's picture: half a camera's image, and whole numbers of its cells
+INPUT = "four_pixels_one_size"  # in its file; OpenCV refuses a file with another name, but not with another shape
+LEAST_SIZE = 6e-4  # m; of what two pixels of the picture show; choice: nearer than 0.1 m is as without a reading
+STRIDE = 8  # px of the picture that a cell of the output covers
 MIN_SCORE = 0.5  # choice: about as many missed as false ones on pictures drawn as the held-out ones are
 MIN_COLORED = 0.05  # of a box's pixels; choice: of true ones up to 70 % hidden, all but one in 500 have 0.12
 MOST = 10  # boxes looked at in an image; choice: more than a cell holds
@@ -143,7 +144,7 @@ class Detector:
     def _answer(self, frame: RgbdFrame) -> tuple[NDArray[np.float32], float]:
         """The network's output (7, 30, 54), and how much smaller than `frame` it saw the image."""
         image, scale = fitted(frame.rgb)
-        self._net.setInput(network_input(image, pixel_sizes(frame.depth, frame.intrinsics))[None])
+        self._net.setInput(network_input(image, pixel_sizes(frame.depth, frame.intrinsics))[None], INPUT)
         maps = self._net.forward()
         if maps.shape != (1, 7, HEIGHT // STRIDE, WIDTH // STRIDE):
             raise ValueError(f"a network that answers with maps of shape {maps.shape} is none of ours")

@@ -6,6 +6,7 @@ import pytest
 from typer.testing import CliRunner
 
 from app.cli import app
+from perception.detector import INPUT, shipped_network
 
 
 def invoke(*args: str) -> Any:
@@ -38,6 +39,15 @@ def test_a_file_without_a_network_is_one_line(tmp_path: Path, data: bytes | None
     assert result.exit_code == 2
     assert result.output.count("\n") == 1
     assert "bad.onnx" in result.output
+
+
+def test_a_network_with_another_input_is_one_line(tmp_path: Path) -> None:
+    """OpenCV alone would compute something of it."""
+    (tmp_path / "older.onnx").write_bytes(shipped_network().replace(INPUT.encode(), INPUT.upper().encode()))
+    result = invoke("evaluate-detector", str(tmp_path / "older.onnx"))
+    assert result.exit_code == 2
+    assert result.output.count("\n") == 1
+    assert "older.onnx" in result.output
 
 
 def test_a_folder_for_the_figures_is_refused_at_once(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from app.cli import app
 from perception.detector import shipped_network
 
 torch = pytest.importorskip("torch", reason="the extra train is missing")
-pytest.importorskip("onnx", reason="the extra train is missing")
+onnx = pytest.importorskip("onnx", reason="the extra train is missing")
 
 SIZES = ("--pictures", "24", "--steps", "2", "--held-out", "1")
 
@@ -51,7 +51,21 @@ def test_another_training_goes_on_from_a_network(tmp_path: Path) -> None:
     assert (tmp_path / "better" / "detector.onnx").exists()
 
 
-@pytest.mark.parametrize("content", [b"", b"no network", b"\x08\x08"])
+def another_network(name: str) -> bytes:
+    """An ONNX file of one convolution; its weights are no initializer, but a constant's output."""
+    weights = onnx.numpy_helper.from_array(np.zeros((8, 13, 1, 1), np.float32))
+    constant = onnx.helper.make_node("Constant", [], ["w"], value=weights)
+    convolution = onnx.helper.make_node("Conv", ["x", "w"], ["y"], name=name)
+    sizes = {"x": (1, 13, 4, 4), "y": (1, 8, 4, 4)}
+    x, y = (onnx.helper.make_tensor_value_info(n, onnx.TensorProto.FLOAT, size) for n, size in sizes.items())
+    graph = onnx.helper.make_graph([constant, convolution], "other", [x], [y])
+    return bytes(onnx.helper.make_model(graph).SerializeToString())
+
+
+NAMED, UNNAMED = another_network("/stem/stem.0/stem.0.0/Conv"), another_network("")
+
+
+@pytest.mark.parametrize("content", [b"", b"no network", b"\x08\x08", NAMED, UNNAMED])
 def test_what_is_no_network_of_ours_is_no_start(tmp_path: Path, content: bytes) -> None:
     (tmp_path / "other.onnx").write_bytes(content)
     result = train(tmp_path / "out", "--start", str(tmp_path / "other.onnx"))
