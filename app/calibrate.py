@@ -51,11 +51,11 @@ def rendered_pictures(camera: CameraSpec, board: Board, count: int, seed: int) -
 def pictures_in(folder: Path) -> list[Picture]:
     """The image files of a folder in the order of their names. Raises `Findings`."""
     if not folder.is_dir():
-        raise Findings([Finding(shown(folder), 1, "is no folder; name one that holds pictures of a checkerboard")])
+        raise Findings([Finding(shown(folder), 0, "is no folder; name one that holds pictures of a checkerboard")])
     files = sorted(path for path in folder.iterdir() if path.suffix.lower() in IMAGE_SUFFIXES)
     if len(files) < MIN_VIEWS:
         message = f"holds {len(files)} images ({', '.join(IMAGE_SUFFIXES)}); take {MIN_VIEWS} or more of the board"
-        raise Findings([Finding(shown(folder), 1, message)])
+        raise Findings([Finding(shown(folder), 0, message)])
     return [(path.name, partial(_read, path)) for path in files]
 
 
@@ -63,7 +63,7 @@ def _read(path: Path) -> NDArray[np.uint8]:
     image = read_rgb(path)
     if min(image.shape[:2]) < MIN_SIDE:
         message = f"is {image.shape[1]}x{image.shape[0]} pixels; give pictures of at least {MIN_SIDE} each way"
-        raise Findings([Finding(shown(path), 1, message)])
+        raise Findings([Finding(shown(path), 0, message)])
     return image
 
 
@@ -78,15 +78,15 @@ def run(
             f"a board of {board.columns} x {board.rows} inner corners is seen in {len(seen)} of {len(views)} pictures; "
             f"take {MIN_VIEWS} or more that show all of it, and check --columns and --rows"
         )
-        raise Findings([Finding(source, 1, message)])
+        raise Findings([Finding(source, 0, message)])
     if (different := _different(list(seen.values()), ALIKE * size[0])) < MIN_VIEWS:
         message = f"only {different} of {len(seen)} views differ; hold the board in {MIN_VIEWS} or more ways"
-        raise Findings([Finding(source, 1, message)])
+        raise Findings([Finding(source, 0, message)])
     found = calibrate(list(seen.values()), *size, board.columns, board.rows, board.square)
     doubt = max(found.deviations[0] / found.intrinsics.fx, found.deviations[1] / found.intrinsics.fy)
     if not doubt < MOST_DOUBT:  # nan too
         message = f"the views leave the focal length open by {100 * doubt:.1f} %; tilt the board more, and come nearer"
-        raise Findings([Finding(source, 1, message)])
+        raise Findings([Finding(source, 0, message)])
     residuals = dict(zip(seen, found.residuals, strict=True))
     _report(views, residuals, found, true)
     _write(out, found)
@@ -121,7 +121,7 @@ def _find_boards(
             views[name] = find_board(rgb, board.columns, board.rows)
     if len(sizes) > 1:
         told = ", ".join(f"{name} is {width}x{height}" for (width, height), name in sizes.items())
-        wrong.append(Finding(source, 1, f"pictures of several sizes: {told}; give those of one camera in one mode"))
+        wrong.append(Finding(source, 0, f"pictures of several sizes: {told}; give those of one camera in one mode"))
     if wrong:
         raise Findings(wrong)
     return views, next(iter(sizes))

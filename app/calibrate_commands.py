@@ -50,11 +50,11 @@ def calibrate(
     """
     wrong = output.unwritable(out.parent) + (output.unwritable(draw) if draw else [])
     if out.is_dir():
-        wrong.append(Finding(shown(out), 1, "is a folder; name a file"))
+        wrong.append(Finding(shown(out), 0, "is a folder; name a file"))
     if out.suffix.lower() in IMAGE_SUFFIXES:
-        wrong.append(Finding(shown(out), 1, "is a picture's name, and a calibration is YAML; end it in .yaml"))
+        wrong.append(Finding(shown(out), 0, "is a picture's name, and a calibration is YAML; end it in .yaml"))
     if draw is not None and images is not None and draw.resolve() == images.resolve():
-        wrong.append(Finding("--draw", 1, "is the folder of your pictures, which it would overwrite; name another"))
+        wrong.append(Finding("--draw", 0, "is the folder of your pictures, which it would overwrite; name another"))
     if wrong:
         raise Findings(wrong)
     with late_imports():
@@ -68,5 +68,5 @@ def calibrate(
     spec = next((c for c in cameras if c.name == camera), None)
     if spec is None:
         message = f"no camera {quoted(camera)}; {nearest(camera, [c.name for c in cameras])}"
-        raise Findings([Finding("--camera", 1, message)])
+        raise Findings([Finding("--camera", 0, message)])
     steps.run(steps.rendered_pictures(spec, board, views, seed), board, "--views", out, draw, spec.intrinsics)

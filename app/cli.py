@@ -155,11 +155,11 @@ def run(
 
 def _given(message: str, **options: object) -> list[Finding]:
     """A finding for each of these options that is given."""
-    return [Finding(f"--{name}", 1, message) for name, value in options.items() if value]
+    return [Finding(f"--{name}", 0, message) for name, value in options.items() if value]
 
 
 _NO_DISPLAY = Finding(
-    "--gui", 1, "there is no display here (DISPLAY is not set); run without it, and film with --video"
+    "--gui", 0, "there is no display here (DISPLAY is not set); run without it, and film with --video"
 )
 
 

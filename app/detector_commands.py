@@ -52,14 +52,14 @@ def train_detector(
     """
     wrong = output.unwritable(out)
     if (out / "detector.onnx").exists():
-        wrong.append(Finding(shown(out), 1, "already holds detector.onnx; name another folder"))
+        wrong.append(Finding(shown(out), 0, "already holds detector.onnx; name another folder"))
     try:
         import onnx  # noqa: F401 - torch exports through it
         import torch  # noqa: F401
     except ImportError as error:
-        wrong.append(Finding("train-detector", 1, f"{error.name} is not installed; pip install 'regrasp[train]'"))
+        wrong.append(Finding("train-detector", 0, f"{error.name} is not installed; pip install 'regrasp[train]'"))
     if start is not None and not start.is_file():
-        wrong.append(Finding(shown(start), 1, "is no file; name an ONNX file that `regrasp train-detector` made"))
+        wrong.append(Finding(shown(start), 0, "is no file; name an ONNX file that `regrasp train-detector` made"))
     if wrong:
         raise Findings(wrong)
     loaded = _load(cell)
@@ -71,7 +71,7 @@ def train_detector(
         try:
             weights = read_weights(start.read_bytes())
         except ValueError as error:
-            raise Findings([Finding(shown(start), 1, f"{error}; name one that `train-detector` made")]) from None
+            raise Findings([Finding(shown(start), 0, f"{error}; name one that `train-detector` made")]) from None
     out.mkdir(parents=True, exist_ok=True)
     with _progress("drawing pictures", pictures) as tell:
         drawn = make_pictures(loaded, seed, pictures, tell)
@@ -98,11 +98,11 @@ def evaluate_detector(
     """
     wrong = output.unwritable(out.parent) if out else []
     if out is not None and out.is_dir():
-        wrong.append(Finding(shown(out), 1, "is a folder; name a file"))
+        wrong.append(Finding(shown(out), 0, "is a folder; name a file"))
     if out is not None and out.suffix.lower() == ".onnx":
-        wrong.append(Finding(shown(out), 1, "is a network's name, and the figures are JSON; end it in .json"))
+        wrong.append(Finding(shown(out), 0, "is a network's name, and the figures are JSON; end it in .json"))
     if model is not None and not model.is_file():
-        wrong.append(Finding(shown(model), 1, "is no file; name an ONNX file that `regrasp train-detector` made"))
+        wrong.append(Finding(shown(model), 0, "is no file; name an ONNX file that `regrasp train-detector` made"))
     if wrong:
         raise Findings(wrong)
     loaded = _load(cell)
@@ -141,7 +141,7 @@ def _detector(cell: "Cell", model: Path | None) -> Any:
         return detector
     except (cv2.error, ValueError):
         message = "holds no such network; name an ONNX file that `regrasp train-detector` made"
-        raise Findings([Finding(shown(model) if model else "detector.onnx", 1, message)]) from None
+        raise Findings([Finding(shown(model) if model else "detector.onnx", 0, message)]) from None
 
 
 def _print(figures: dict[str, Any]) -> None:

@@ -12,14 +12,19 @@ MOST_LISTED = 50  # known names after an unknown one
 
 @dataclass(frozen=True, order=True)
 class Finding:
-    """One thing that is wrong: where (a file or an option; lines count from 1), what, and what would be right."""
+    """One thing that is wrong: where, what, and what would be right.
+
+    `source` is a file, a folder or an option. `line` counts from 1; 0 means that the source has no lines, or that all
+    of it is wrong.
+    """
 
     source: str
     line: int
     message: str
 
     def __str__(self) -> str:
-        return printable(f"{self.source}:{self.line}: {self.message}")
+        where = f"{self.source}:{self.line}" if self.line else self.source
+        return printable(f"{where}: {self.message}")
 
 
 class Findings(Exception):  # noqa: N818 - it is the list of findings that travels

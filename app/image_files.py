@@ -67,8 +67,8 @@ def _array(path: Path) -> NDArray[np.generic] | None:
 def _check_file(path: Path) -> None:
     if not os.path.isfile(path):  # also in a folder that may not be looked into
         wrong = "is no file" if os.path.exists(path) else "does not exist"
-        raise Findings([Finding(shown(path), 1, f"{quoted(shown(path))} {wrong}; name an image file")])
+        raise Findings([Finding(shown(path), 0, f"{quoted(shown(path))} {wrong}; name an image file")])
 
 
 def _wrong(path: Path, message: str) -> Findings:
-    return Findings([Finding(shown(path), 1, message)])
+    return Findings([Finding(shown(path), 0, message)])

@@ -25,8 +25,8 @@ def parse_seeds(text: str) -> range:
     first, after = map(int, text.split(":")) if re.fullmatch(r"\d{1,10}:\d{1,10}", text) else (0, 0)
     if not first < after <= MOST_SEED:
         right = f"write A:B with A below B and B at most {MOST_SEED}, such as 0:20"
-        raise Findings([Finding("--seeds", 1, f"{quoted(text)} is no range of seeds; {right}")])
+        raise Findings([Finding("--seeds", 0, f"{quoted(text)} is no range of seeds; {right}")])
     seeds = range(first, after)
     if len(seeds) > MOST_SEEDS:
-        raise Findings([Finding("--seeds", 1, f"{len(seeds)} seeds; ask for at most {MOST_SEEDS} in one study")])
+        raise Findings([Finding("--seeds", 0, f"{len(seeds)} seeds; ask for at most {MOST_SEEDS} in one study")])
     return seeds

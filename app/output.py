@@ -32,9 +32,9 @@ def taken(out: Path) -> list[str]:
 def findings(out: Path) -> list[Finding]:
     """Why no run can be written to `out`; nothing is left behind by the look."""
     if there := taken(out):
-        return [Finding(shown(out), 1, f"already holds {', '.join(there)}; name another folder for the run")]
+        return [Finding(shown(out), 0, f"already holds {', '.join(there)}; name another folder for the run")]
     if out == Path():
-        return [Finding("--out", 1, "names this very folder; name one of its own for the run")]
+        return [Finding("--out", 0, "names this very folder; name one of its own for the run")]
     return unwritable(out)
 
 
@@ -44,9 +44,9 @@ def unwritable(out: Path) -> list[Finding]:
     while not os.path.lexists(spot) and spot != spot.parent:
         spot = spot.parent
     if not os.path.isdir(spot):
-        return [Finding(shown(out), 1, f"{quoted(shown(spot))} is no folder; name another place")]
+        return [Finding(shown(out), 0, f"{quoted(shown(spot))} is no folder; name another place")]
     try:
         with tempfile.TemporaryFile(dir=spot):
             return []
     except OSError as error:
-        return [Finding(shown(out), 1, f"cannot write in {quoted(shown(spot))} ({error.strerror}); name another place")]
+        return [Finding(shown(out), 0, f"cannot write in {quoted(shown(spot))} ({error.strerror}); name another place")]

@@ -8,22 +8,27 @@ from app.findings import Finding, Findings
 from app.yaml_lines import Document, Path, Place, Value, parse
 from interfaces.quote import cut, quoted
 
-SOURCE = "--set"  # the file name of a finding in an override; its line is the override's number, from 1
+OPTION = "--set"
 
 
 @dataclass(frozen=True)
 class Assignment:
-    """A value for a key of a file; `told` is how a finding names it, `place` where it was written."""
+    """A value for a key of a file; `place` is where it was written, `told` what a finding there says before all else."""
 
     key: str  # dotted; list items go by index
     new: Document
-    told: str
     place: Place
+    told: str = ""
 
     @property
     def path(self) -> Path:
         """Where in the file the value goes."""
         return path_of(self.key)
+
+
+def was_typed(place: Place) -> bool:
+    """Whether a value with this place stands on the command line and not in a file."""
+    return place[0].startswith(f"{OPTION} ") and place[1] == 0
 
 
 def path_of(key: str) -> Path:
@@ -38,20 +43,21 @@ def _is_index(step: str) -> bool:
 def read(overrides: Sequence[str]) -> tuple[list[Assignment], list[Finding]]:
     """The assignments of "key.path=value" texts, values in YAML, and the findings of those that are none."""
     assignments, findings = [], []
-    for number, text in enumerate(overrides, 1):
+    for text in overrides:
+        source = f"{OPTION} {cut(text)}"
         key, equals, value = text.partition("=")
         if not equals or not all(key.strip().split(".")):
-            message = f"{quoted(text)}: no key with a value; write key.path=value, such as gravity=earth"
-            findings.append(Finding(SOURCE, number, message))
+            message = "no key with a value; write key.path=value, such as gravity=earth"
+            findings.append(Finding(source, 0, message))
             continue
         try:
-            new = parse(value, SOURCE, number)
+            new = parse(value, source, 0)
         except Findings as error:
             findings += error.items
             continue
         findings += new.findings
         if not new.findings:
-            assignments.append(Assignment(key.strip(), new, quoted(text), (SOURCE, number)))
+            assignments.append(Assignment(key.strip(), new, (source, 0)))
     return assignments, findings
 
 
@@ -65,7 +71,7 @@ def apply(document: Document, assignments: Sequence[Assignment]) -> None:
         try:
             _apply_one(document, assignment)
         except LookupError as error:
-            findings.append(Finding(*assignment.place, f"{assignment.told}: {error.args[0]}"))
+            findings.append(Finding(*assignment.place, f"{assignment.told}{error.args[0]}"))
     if findings:
         raise Findings(findings)
 
@@ -79,7 +85,7 @@ def lay_over(document: Document, top: Document) -> None:
     for path, value in _leaves(top.value):
         places = {p[len(path) :]: place for p, place in top.places.items() if p[: len(path)] == path}
         key = _dotted(path)
-        parts.append(Assignment(key, Document(value, places), key, top.place(path)))
+        parts.append(Assignment(key, Document(value, places), top.place(path), f"{key}: "))
     apply(document, parts)
     document.findings += top.findings
     document.unread |= top.unread

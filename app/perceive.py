@@ -68,7 +68,7 @@ def run(technique: str, files: Sequence[Files], known: KnownCell, unit: float, d
     try:
         finder = make_technique(name, told)
     except ValueError as error:
-        raise Findings([Finding("--cell", 1, str(error))]) from None
+        raise Findings([Finding("--cell", 0, str(error))]) from None
     looks = [Look(f, frame, pose, finder.estimate(frame, pose)) for f, (frame, pose) in zip(files, frames, strict=True)]
     seen = [look.result for look in looks if isinstance(look.result, Estimate)]
     result = fuse(seen) if seen else _commonest([look.result for look in looks if isinstance(look.result, NoEstimate)])
@@ -91,7 +91,7 @@ def _technique(name: str) -> TechniqueName:
     for known in TECHNIQUES:
         if name == known:
             return known
-    raise Findings([Finding("--technique", 1, f"no technique {quoted(name)}; {nearest(name, TECHNIQUES)}")])
+    raise Findings([Finding("--technique", 0, f"no technique {quoted(name)}; {nearest(name, TECHNIQUES)}")])
 
 
 def _in_world(files: Sequence[Files]) -> bool:
@@ -99,7 +99,7 @@ def _in_world(files: Sequence[Files]) -> bool:
     placed = [f.camera is not None or f.pose is not None for f in files]
     if not all(placed) and (any(placed) or len({f.intrinsics.resolve() for f in files}) > 1):
         message = "frames of several cameras meet in the world; give --camera or --camera-pose for each, too"
-        raise Findings([Finding("--intrinsics", 1, message)])
+        raise Findings([Finding("--intrinsics", 0, message)])
     return all(placed)
 
 
@@ -113,7 +113,7 @@ def _frames(
         try:
             if f.depth is None and technique not in NEEDS_NO_DEPTH:
                 message = f"the technique {technique} needs depth; give --depth FILE for each --rgb"
-                raise Findings([Finding("--depth", 1, message)])
+                raise Findings([Finding("--depth", 0, message)])
             lens = load_calibration(f.intrinsics)
             rgb, depth = _images(f, lens, unit)
             camera = f.camera or ("camera" if len(number_of) == 1 else f"camera {number_of[f.intrinsics]}")
@@ -131,17 +131,17 @@ def _images(files: Files, camera: CalibrationFile, unit: float) -> tuple[NDArray
     k, source = camera.intrinsics, shown(files.intrinsics)
     if not all(FOCAL[0] <= f / k.width <= FOCAL[1] for f in (k.fx, k.fy)):
         right = f"expected {FOCAL[0] * k.width:.0f} to {FOCAL[1] * k.width:.0f} for pictures {k.width} wide"
-        raise Findings([Finding(source, 1, f"fx, fy are {k.fx:g}, {k.fy:g} pixels; {right}")])
+        raise Findings([Finding(source, 0, f"fx, fy are {k.fx:g}, {k.fy:g} pixels; {right}")])
     if not (abs(k.cx - k.width / 2) < k.width and abs(k.cy - k.height / 2) < k.height):
         right = f"expected a point near the middle of {k.width}x{k.height} pixels"
-        raise Findings([Finding(source, 1, f"cx, cy are {k.cx:g}, {k.cy:g}; {right}")])
+        raise Findings([Finding(source, 0, f"cx, cy are {k.cx:g}, {k.cy:g}; {right}")])
     if _folds(camera):
         right = "write OpenCV's k1, k2, p1, p2, k3, or none"
-        raise Findings([Finding(source, 1, f"distortion bends the picture beyond use; {right}")])
+        raise Findings([Finding(source, 0, f"distortion bends the picture beyond use; {right}")])
     rgb = read_rgb(files.rgb)
     depth = np.zeros((k.height, k.width), np.float32) if files.depth is None else read_depth(files.depth, unit)
     wrong = [
-        Finding(shown(path), 1, f"is {image.shape[1]}x{image.shape[0]} pixels, {source} is for {k.width}x{k.height}; "
+        Finding(shown(path), 0, f"is {image.shape[1]}x{image.shape[0]} pixels, {source} is for {k.width}x{k.height}; "
                 "give the pictures and the intrinsics of one camera in one mode, depth aligned to colour")
         for path, image in ((files.rgb, rgb), (files.depth, depth))
         if path is not None and image.shape[:2] != (k.height, k.width)
@@ -170,14 +170,14 @@ def _place(files: Files, known: KnownCell) -> RigidTransform:
     spec = next((c for c in known.cameras if c.name == files.camera), None)
     if files.camera is not None and spec is None:
         message = f"no camera {quoted(files.camera)}; {nearest(files.camera, [c.name for c in known.cameras])}"
-        raise Findings([Finding("--camera", 1, message)])
+        raise Findings([Finding("--camera", 0, message)])
     if files.pose is not None:
         return load_camera_pose(files.pose)
     if spec is None:
         return RigidTransform.identity()
     if not isinstance(spec.mount, FixedMount):
         message = f"the {spec.name} camera moves with an arm; say where it stood with --camera-pose FILE, too"
-        raise Findings([Finding("--camera", 1, message)])
+        raise Findings([Finding("--camera", 0, message)])
     return spec.mount.world_from_camera
 
 

@@ -108,7 +108,7 @@ def perceive(
         message = (
             f"a connector {connector.length:g} m long and {2 * connector.radius:g} thick; one is longer than thick"
         )
-        raise Findings([Finding("--radius", 1, message)])
+        raise Findings([Finding("--radius", 0, message)])
     known = known.model_copy(update={"connector": connector})
     with late_imports():
         from app import perceive as steps  # brings OpenCV and the compiler
@@ -123,22 +123,22 @@ def _each(option: str, given: Sequence[T], count: int, wrong: list[Finding], onc
         return [given[0]] * count
     if len(given) != count:
         right = f"give {'one for all, or ' if once else ''}one for each"
-        wrong.append(Finding(option, 1, f"given {len(given)} times for {count} pictures; {right}"))
+        wrong.append(Finding(option, 0, f"given {len(given)} times for {count} pictures; {right}"))
     return list(given)
 
 
 def _bad_drawing(draw: Path, inputs: Sequence[Path]) -> list[Finding]:
     """Why nothing can be drawn there."""
     if draw.suffix.lower() not in SUFFIXES:
-        return [Finding("--draw", 1, f"{quoted(draw.name)} is no name of a picture; end it in {' or '.join(SUFFIXES)}")]
+        return [Finding("--draw", 0, f"{quoted(draw.name)} is no name of a picture; end it in {' or '.join(SUFFIXES)}")]
     if draw.is_dir():
-        return [Finding("--draw", 1, f"{quoted(shown(draw))} is a folder; name a file")]
+        return [Finding("--draw", 0, f"{quoted(shown(draw))} is a folder; name a file")]
     if any(
         draw.resolve() == path.resolve() or (draw.exists() and path.exists() and draw.samefile(path)) for path in inputs
     ):
         return [
             Finding(
-                "--draw", 1, f"{quoted(shown(draw))} is one of your own files, which it would overwrite; name another"
+                "--draw", 0, f"{quoted(shown(draw))} is one of your own files, which it would overwrite; name another"
             )
         ]
     return output.unwritable(draw.parent)
@@ -149,13 +149,13 @@ def _color(text: str, wrong: list[Finding]) -> Color | None:
     parts = text.split(",")
     right = "write three numbers of 0 to 255, such as 191,13,15"
     if len(parts) != 3 or not all(re.fullmatch(r"\s*\d{1,3}\s*", part) and int(part) <= 255 for part in parts):
-        wrong.append(Finding("--color", 1, f"{quoted(text)} is no colour; {right}"))
+        wrong.append(Finding("--color", 0, f"{quoted(text)} is no colour; {right}"))
         return None
     red, green, blue = (int(part) / 255 for part in parts)
     if max(red, green, blue) - min(red, green, blue) < LEAST_SATURATION * max(red, green, blue, 1e-9):
         wrong.append(
             Finding(
-                "--color", 1, f"{quoted(text)} is grey, and nothing else tells it from its surroundings; name a hue"
+                "--color", 0, f"{quoted(text)} is grey, and nothing else tells it from its surroundings; name a hue"
             )
         )
         return None
@@ -184,11 +184,11 @@ def snapshot(
     """
     wrong = output.unwritable(out)
     if there := [name for name in SNAPSHOT if (out / name).exists()]:
-        wrong.append(Finding(shown(out), 1, f"already holds {', '.join(there)}; name another folder"))
+        wrong.append(Finding(shown(out), 0, f"already holds {', '.join(there)}; name another folder"))
     loaded = load_scenario(scenario, [*(sets or []), *([] if seed is None else [f"seed={seed}"])], None)
     names = [c.name for c in loaded.cell.known.cameras]
     if camera not in names:
-        wrong.append(Finding("--camera", 1, f"no camera {quoted(camera)}; {nearest(camera, names)}"))
+        wrong.append(Finding("--camera", 0, f"no camera {quoted(camera)}; {nearest(camera, names)}"))
     if wrong:
         raise Findings(wrong)
     with late_imports():

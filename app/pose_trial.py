@@ -96,7 +96,7 @@ def setups_of(
             try:
                 setup.technique(name)
             except ValueError as error:
-                raise Findings([Finding("--cell", 1, f"{name} cannot work in it: {error}")]) from None
+                raise Findings([Finding("--cell", 0, f"{name} cannot work in it: {error}")]) from None
     return setups
 
 

@@ -76,9 +76,9 @@ def read_record(folder: Path) -> RunRecord:
     """
     if not os.path.isdir(folder):
         wrong = "is no folder" if os.path.lexists(folder) else "does not exist"
-        raise Findings([Finding(shown(folder), 1, f"{wrong}; name a folder that regrasp run made")])
+        raise Findings([Finding(shown(folder), 0, f"{wrong}; name a folder that regrasp run made")])
     if not any(os.path.lexists(folder / name) for name in output.FILES[:3]):
-        raise Findings([Finding(shown(folder), 1, "holds no run; name a folder that regrasp run made")])
+        raise Findings([Finding(shown(folder), 0, "holds no run; name a folder that regrasp run made")])
     found: list[Finding] = []
     remarks: list[str] = []
     events = _lines(folder / "events.jsonl", _event, found, remarks)
@@ -166,16 +166,16 @@ def _bytes(path: Path, most: int, found: list[Finding]) -> bytes | None:
     """The file's bytes; None, and a finding, where it cannot be read or is no file of a run."""
     if not os.path.isfile(path):  # a pipe or a device would not end
         wrong = "is no file" if os.path.lexists(path) else "is missing"
-        found.append(Finding(shown(path), 1, f"{wrong}; a run leaves one"))
+        found.append(Finding(shown(path), 0, f"{wrong}; a run leaves one"))
         return None
     try:
         with path.open("rb") as stream:
             data = stream.read(most + 1)
     except OSError as error:
-        found.append(Finding(shown(path), 1, f"cannot be read: {error.strerror}"))
+        found.append(Finding(shown(path), 0, f"cannot be read: {error.strerror}"))
         return None
     if len(data) > most:
-        found.append(Finding(shown(path), 1, f"longer than {most >> 20} MiB; no run leaves that much"))
+        found.append(Finding(shown(path), 0, f"longer than {most >> 20} MiB; no run leaves that much"))
         return None
     return data
 

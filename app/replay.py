@@ -54,7 +54,7 @@ class Replay:
             frames.setdefault(event.t, Frame(event.t)).events.append(event)
         if not frames:
             raise Findings(
-                [Finding(shown(record.folder), 1, "nothing happened in this run; there is nothing to replay")]
+                [Finding(shown(record.folder), 0, "nothing happened in this run; there is nothing to replay")]
             )
         self.frames = [frames[t] for t in sorted(changed) if t <= max(end, min(changed)) + SLACK]
         self.rows = _rows(record)
@@ -85,10 +85,10 @@ class Replay:
         found = []
         if begin > self._times[-1] + SLACK:
             wrong = f"{begin:g} s is after the last change, at {self._times[-1]:.2f} s; name an earlier second"
-            found.append(Finding("--from", 1, wrong))
+            found.append(Finding("--from", 0, wrong))
         if not self.known(part):
             names = {path.rsplit("/", 1)[-1] for path in self._paths()}
-            found.append(Finding("--filter", 1, f"no node has {quoted(part)} in its path; {nearest(part, names)}"))
+            found.append(Finding("--filter", 0, f"no node has {quoted(part)} in its path; {nearest(part, names)}"))
         if found:
             raise Findings(found)
 
@@ -119,12 +119,12 @@ class Replay:
 def check_span(begin: float | None, end: float | None) -> None:
     """Raises `Findings` for seconds that are none, and for an end before the beginning."""
     found = [
-        Finding(option, 1, f"{seconds:g} is no second of a run; write a number such as 8.5")
+        Finding(option, 0, f"{seconds:g} is no second of a run; write a number such as 8.5")
         for option, seconds in (("--from", begin), ("--to", end))
         if seconds is not None and not 0 <= seconds < math.inf
     ]
     if not found and begin is not None and end is not None and begin > end:
-        found.append(Finding("--to", 1, f"{end:g} s is before --from, {begin:g} s; name a later second"))
+        found.append(Finding("--to", 0, f"{end:g} s is before --from, {begin:g} s; name a later second"))
     if found:
         raise Findings(found)
 
@@ -140,7 +140,7 @@ def _rows(record: RunRecord) -> list[Row]:
         except TreeSyntaxError as error:
             raise Findings([Finding(shown(file), error.line, str(error))]) from None
         except (OSError, ValueError) as error:
-            raise Findings([Finding(shown(file), 1, str(error))]) from None
+            raise Findings([Finding(shown(file), 0, str(error))]) from None
     known = {row.path for row in rows}
     others = dict.fromkeys(tick.path for tick in record.ticks if tick.path not in known)
     return rows + [Row(path, "", path.count("/")) for path in others]

@@ -39,12 +39,12 @@ def resolve(kind: Kind, name: str, beside: Path, where: tuple[str, int] | None =
     what = "a folder" if os.path.isdir(path) else f"no {_SUFFIX[kind]} file" if os.path.exists(path) else ""
     wrong = f"{quoted(name)} is {what}" if name and what else f"no {kind} named {quoted(name)}"
     hint = nearest(name, known, "the shipped ones are")
-    raise Findings([Finding(*(where or (name, 1)), f"{wrong}; {hint} (a path ends in {_SUFFIX[kind]})")])
+    raise Findings([Finding(*(where or (name or kind, 0)), f"{wrong}; {hint} (a path ends in {_SUFFIX[kind]})")])
 
 
 def read_text(path: Path, where: tuple[str, int] | None = None) -> str:
     """The text of a file that a person wrote. Raises `Findings` when there is no such file or it is no text."""
-    source, line = where or (shown(path), 1)
+    source, line = where or (shown(path), 0)
     if not os.path.isfile(path):
         wrong = "is a folder" if os.path.isdir(path) else "does not exist" if not os.path.exists(path) else "is no file"
         raise Findings([Finding(source, line, f"{quoted(shown(path))} {wrong}; name a file")])
@@ -54,7 +54,7 @@ def read_text(path: Path, where: tuple[str, int] | None = None) -> str:
     except OSError as error:
         raise Findings([Finding(source, line, f"cannot read {quoted(shown(path))}: {error.strerror}")]) from None
     if len(data) > MAX_BYTES:
-        raise Findings([Finding(shown(path), 1, f"longer than {MAX_BYTES} bytes; name a file written by hand")])
+        raise Findings([Finding(shown(path), 0, f"longer than {MAX_BYTES} bytes; name a file written by hand")])
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:

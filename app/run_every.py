@@ -52,7 +52,7 @@ def run_every(
 
 def _unwritable(junit: Path) -> list[Finding]:
     if os.path.isdir(junit):
-        return [Finding(shown(junit), 1, "is a folder; name a file for --junit")]
+        return [Finding(shown(junit), 0, "is a folder; name a file for --junit")]
     return output.unwritable(junit.parent)
 
 

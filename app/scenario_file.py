@@ -8,7 +8,7 @@ from typing import Any, Literal, ParamSpec, TypeVar
 
 from app import vary
 from app.findings import Finding, Findings, nearest, shown
-from app.overrides import Assignment, apply, lay_over, path_of, read
+from app.overrides import Assignment, apply, lay_over, path_of, read, was_typed
 from app.placement import misplaced
 from app.resources import read_text, resolve
 from app.scenario_parts import check_inputs, check_names, names_of, tree_text
@@ -71,7 +71,7 @@ def load_scenario(name_or_path: str, overrides: Sequence[str] = (), case: str | 
     source = _Source(name_or_path, overrides)
     names = [name for name, _ in source.cases]
     if case is not None and case not in names and not source.found:
-        source.note([Finding("--case", 1, f"no case {quoted(case)}; {nearest(case, names)}")])
+        source.note([Finding("--case", 0, f"no case {quoted(case)}; {nearest(case, names)}")])
     wanted = names.index(case) if case in names else 0
     return source.checked(source.cases[wanted : wanted + 1])[0]
 
@@ -227,9 +227,14 @@ def _of_cases(finding: Finding, cases: Sequence[str], of: int) -> Finding:
 
 
 def _named(document: Document, key: Literal["cell", "tree"], folder: Path) -> Path | None:
-    """The file that the scenario names under `key`; None when the check of the scenario has found no name there."""
-    name = at(document.value, (key,))
-    return resolve(key, name, folder, document.place((key,))) if isinstance(name, str) else None
+    """The file that the scenario names under `key`; None when the check of the scenario has found no name there.
+
+    A path is taken from `folder`, the scenario's, but one of the command line from the current folder.
+    """
+    name, place = at(document.value, (key,)), document.place((key,))
+    if not isinstance(name, str):
+        return None
+    return resolve(key, name, Path() if was_typed(place) else folder, place)
 
 
 def _cell(document: Document, folder: Path, assignments: Sequence[Assignment]) -> Cell | None:

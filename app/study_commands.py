@@ -119,7 +119,7 @@ def _unfit(out: Path | None, file: str) -> list[Finding]:
     """Why a study's `file` cannot be written to `out`."""
     if out is None:
         return []
-    taken = [Finding(shown(out), 1, "already holds a study; name another folder")] if (out / file).exists() else []
+    taken = [Finding(shown(out), 0, "already holds a study; name another folder")] if (out / file).exists() else []
     return output.findings(out) + taken
 
 
@@ -133,5 +133,5 @@ def _techniques(text: str | None, wrong: list[Finding]) -> list[str]:
 def _listed(option: str, text: str | None, known: Sequence[str], wrong: list[Finding]) -> list[str]:
     """The names of "A,B", each once, all that are known without a text; those that are not go to `wrong`."""
     names = list(known) if text is None else list(dict.fromkeys(name.strip() for name in text.split(",")))
-    wrong += [Finding(option, 1, f"no {quoted(name)}; {nearest(name, known)}") for name in names if name not in known]
+    wrong += [Finding(option, 0, f"no {quoted(name)}; {nearest(name, known)}") for name in names if name not in known]
     return names

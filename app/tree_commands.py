@@ -120,7 +120,7 @@ def leaves(name: Annotated[str | None, typer.Argument(help="One element, in full
 
     known = words(LEAVES)
     if name is not None and name not in known:
-        raise Findings([Finding(name, 1, f"no element {quoted(name)}; {nearest(name, known)}")])
+        raise Findings([Finding(name, 0, f"no element {quoted(name)}; {nearest(name, known)}")])
     for tag, kind in known.items():
         if name in (None, tag):
             typer.echo("\n".join(describe(tag, kind, full=name is not None)))

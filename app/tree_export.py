@@ -52,15 +52,15 @@ def _form(request: Request) -> str:
     found = [*_wrong_form(request.form, out)] if request.form else []
     found += [*_wrong_out(out, form)] if out else []
     if request.theme not in THEMES:
-        found.append(Finding("--theme", 1, f"no theme {quoted(request.theme)}; {nearest(request.theme, THEMES)}"))
+        found.append(Finding("--theme", 0, f"no theme {quoted(request.theme)}; {nearest(request.theme, THEMES)}"))
     if form == "groot" and request.depth is not None:
         found.append(
-            Finding("--depth", 1, "Groot2 opens whole trees only; leave --depth out, or take another --format")
+            Finding("--depth", 0, "Groot2 opens whole trees only; leave --depth out, or take another --format")
         )
     if form == "png" and out is None and sys.stdout.isatty():
-        found.append(Finding("--format", 1, "a terminal shows no png; name a file with -o"))
+        found.append(Finding("--format", 0, "a terminal shows no png; name a file with -o"))
     if request.tree is None and request.run is None:
-        found.append(Finding("TREE", 1, "is missing; name a tree (`regrasp trees list`), or a run with --run"))
+        found.append(Finding("TREE", 0, "is missing; name a tree (`regrasp trees list`), or a run with --run"))
     if found:
         raise Findings(found)
     return form
@@ -73,19 +73,19 @@ def _named(out: Path) -> str:
 
 def _wrong_form(form: str, out: Path | None) -> Iterator[Finding]:
     if form not in FORMATS:
-        yield Finding("--format", 1, f"no format {quoted(form)}; {nearest(form, FORMATS)}")
+        yield Finding("--format", 0, f"no format {quoted(form)}; {nearest(form, FORMATS)}")
     elif out and _named(out) not in ("", form):
         other = out.with_suffix(next(suffix for suffix, name in SUFFIXES.items() if name == form))
         wrong = f"is a name of {_named(out)}, not of {form}; write {shown(other)}, or leave --format out"
-        yield Finding(shown(out), 1, wrong)
+        yield Finding(shown(out), 0, wrong)
 
 
 def _wrong_out(out: Path, form: str) -> Iterator[Finding]:
     if not form:
-        yield Finding(shown(out), 1, f"the name ends in none of {', '.join(SUFFIXES)}; rename it, or name a --format")
+        yield Finding(shown(out), 0, f"the name ends in none of {', '.join(SUFFIXES)}; rename it, or name a --format")
     if out.is_dir() or not out.absolute().parent.is_dir():
         wrong = "is a folder" if out.is_dir() else f"there is no folder {quoted(shown(out.absolute().parent))}"
-        yield Finding(shown(out), 1, f"{wrong}; name a file in a folder that exists")
+        yield Finding(shown(out), 0, f"{wrong}; name a file in a folder that exists")
 
 
 def _tree_file(request: Request, record: RunRecord | None) -> Path:
@@ -97,7 +97,7 @@ def _tree_file(request: Request, record: RunRecord | None) -> Path:
     if not copy.is_file():
         wrong = "is no file" if copy.exists() else "is missing"
         raise Findings(
-            [Finding(shown(copy), 1, f"{wrong}; name the tree that ran: regrasp trees export TREE --run DIR")]
+            [Finding(shown(copy), 0, f"{wrong}; name the tree that ran: regrasp trees export TREE --run DIR")]
         )
     return copy
 
@@ -119,7 +119,7 @@ def _with_run(path: Path, record: RunRecord) -> Node:
     except TreeSyntaxError as error:
         raise Findings([Finding(shown(path), error.line, str(error))]) from None
     except (OSError, ValueError) as error:
-        raise Findings([Finding(shown(path), 1, str(error))]) from None
+        raise Findings([Finding(shown(path), 0, str(error))]) from None
     stats = run_stats((tick.t, tick.path, tick.status) for tick in record.ticks)
     _check_paths(path, record, {n.path for n in node.walk() if n.kind != "subtree"})
     chain = (record.result.chain if record.result else None) or ()
@@ -140,10 +140,10 @@ def _check_paths(path: Path, record: RunRecord, known: Collection[str]) -> None:
 
 def _write(out: Path, content: bytes, tree: Path) -> None:
     if out.exists() and out.samefile(tree):
-        raise Findings([Finding(shown(out), 1, "is the tree itself; name another file")])
+        raise Findings([Finding(shown(out), 0, "is the tree itself; name another file")])
     if out.is_file() and out.name in FILES and (out.parent / "events.jsonl").exists():
-        raise Findings([Finding(shown(out), 1, "belongs to a run's record; name another file")])
+        raise Findings([Finding(shown(out), 0, "belongs to a run's record; name another file")])
     try:
         write_whole(out, content)
     except OSError as error:
-        raise Findings([Finding(shown(out), 1, f"cannot be written ({error.strerror}); name another file")]) from None
+        raise Findings([Finding(shown(out), 0, f"cannot be written ({error.strerror}); name another file")]) from None

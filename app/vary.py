@@ -35,7 +35,7 @@ class Axis:
 
     def assignment(self, value: Document) -> Assignment:
         """One of the values for the key."""
-        return Assignment(self.key, value, f"vary: {cut(self.key)}", value.place(()))
+        return Assignment(self.key, value, value.place(()), f"vary: {cut(self.key)}: ")
 
 
 def axes(document: Document, overrides: Sequence[Assignment]) -> tuple[list[Axis], list[Finding]]:

@@ -92,15 +92,15 @@ def parse(text: str, source: str, line: int | None = None) -> Document:
         node = yaml.compose(text, Loader=yaml.SafeLoader)
     except yaml.MarkedYAMLError as error:
         at = error.problem_mark.line + 1 if error.problem_mark else 1
-        raise _not_yaml(source, line or at, error.problem or str(error.context)) from None
+        raise _not_yaml(source, at if line is None else line, error.problem or str(error.context)) from None
     except yaml.reader.ReaderError as error:
         at = text.count("\n", 0, error.position) + 1
         message = f"not YAML: {chr(error.character)!r} is not text; remove it"
-        raise Findings([Finding(source, line or at, message)]) from None
+        raise Findings([Finding(source, at if line is None else line, message)]) from None
     except (yaml.YAMLError, ValueError, OverflowError) as error:  # an escape beyond Unicode is a bare ValueError
-        raise _not_yaml(source, line or 1, str(error)) from None
+        raise _not_yaml(source, 1 if line is None else line, str(error)) from None
     value = None if node is None else builder.build(node, (), 0)
-    builder.places.setdefault((), (source, line or 1))
+    builder.places.setdefault((), (source, 1 if line is None else line))
     return Document(value, builder.places, builder.findings, builder.unread)
 
 
@@ -117,7 +117,7 @@ def _limit_nesting(text: str, source: str, line: int | None) -> None:
         if depth > MAX_DEPTH:
             at = event.start_mark.line + 1 if event.start_mark else 1
             message = f"nests deeper than {MAX_DEPTH} levels; a file of ours needs fewer than 10"
-            raise Findings([Finding(source, line or at, message)])
+            raise Findings([Finding(source, at if line is None else line, message)])
 
 
 @dataclass
@@ -129,9 +129,12 @@ class _Builder:
     unread: set[Path] = field(default_factory=set)
     count: int = 0
 
+    def _line(self, node: yaml.Node) -> int:
+        return int(node.start_mark.line) + 1 if self.line is None else self.line
+
     def wrong(self, node: yaml.Node, message: str, path: Path | None = None) -> None:
         """Note a finding; `path` is that of the value that cannot be read for it."""
-        self.findings.append(Finding(self.source, self.line or node.start_mark.line + 1, message))
+        self.findings.append(Finding(self.source, self._line(node), message))
         if path is not None:
             self.unread.add(path)
 
@@ -147,7 +150,7 @@ class _Builder:
     def build(self, node: yaml.Node, path: Path, depth: int, at: yaml.Node | None = None) -> Value:
         """The plain value of `node`, which stands where `at` (its key) stands."""
         self.charge(node, 1, depth)
-        self.places[path] = (self.source, self.line or (at or node).start_mark.line + 1)
+        self.places[path] = (self.source, self._line(at or node))
         if isinstance(node, yaml.MappingNode) and node.tag == _TAG + "map":
             pairs = self.pairs(node, depth)
             return {name: self.build(child, (*path, name), depth + 1, key) for name, (key, child) in pairs.items()}

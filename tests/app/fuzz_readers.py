@@ -28,7 +28,7 @@ FORMATS = ("ascii", "dot", "groot", "json", "mermaid", "svg")
 SECONDS = 5.0  # of computing: a busy machine makes no reader slow
 PATIENCE = 60.0  # s: a reader that waits for something computes nothing
 MEMORY = 2**30  # bytes more than the idle worker has
-FINDING = re.compile(r"[^\n]*:\d+: [^\n]*; [^\n]+")
+FINDING = re.compile(r"[^\n]+: [^\n]*; [^\n]+")
 
 
 def read(case: Case, folder: Path) -> str:

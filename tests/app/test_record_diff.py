@@ -92,4 +92,4 @@ def test_the_exit_code_says_whether_they_went_the_same_way(
     ran = CliRunner().invoke(app, ["diff", "a", other])
     assert ran.exit_code == code
     assert ran.stdout.startswith(told)
-    assert ran.stderr.startswith("nowhere:1: does not exist" if code == 2 else "")
+    assert ran.stderr.startswith("nowhere: does not exist" if code == 2 else "")

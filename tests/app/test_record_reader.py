@@ -56,7 +56,7 @@ def test_what_holds_no_run_is_one_finding(folder: Path, name: str) -> None:
     Path("file").write_text("")
     Path("empty").mkdir()
     [told] = findings(Path(name))
-    assert told.startswith(f"{name}:1: ")
+    assert told.startswith(f"{name}: ")
     assert told.endswith("name a folder that regrasp run made")
 
 
@@ -94,19 +94,19 @@ def test_all_that_is_wrong_is_told_at_once(folder: Path) -> None:
     (folder / "result.json").write_text("{}")
     told = findings(folder)
     assert len(told) == 12  # ten of the fifty, and one for each of the others
-    assert "run/ticks.jsonl:1: is missing; a run leaves one" in told
+    assert "run/ticks.jsonl: is missing; a run leaves one" in told
 
 
 def test_a_pipe_in_place_of_a_file_is_not_waited_for(folder: Path) -> None:
     (folder / "ticks.jsonl").unlink()
     os.mkfifo(folder / "ticks.jsonl")
-    assert findings(folder) == ["run/ticks.jsonl:1: is no file; a run leaves one"]
+    assert findings(folder) == ["run/ticks.jsonl: is no file; a run leaves one"]
 
 
 def test_a_huge_file_is_refused_unread(folder: Path) -> None:
     with (folder / "events.jsonl").open("wb") as stream:
         stream.truncate(1 << 40)  # sparse
-    assert findings(folder) == ["run/events.jsonl:1: longer than 64 MiB; no run leaves that much"]
+    assert findings(folder) == ["run/events.jsonl: longer than 64 MiB; no run leaves that much"]
 
 
 def test_a_long_hostile_record_is_explained_in_seconds(folder: Path) -> None:

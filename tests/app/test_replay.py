@@ -79,12 +79,12 @@ def test_the_screen_ends_where_it_is_told(folder: Path) -> None:
 
 
 WRONG = {
-    "no number": (["--from", "nan"], "--from:1: nan is no second of a run; write a number such as 8.5"),
-    "no end": (["--to", "inf"], "--to:1: inf is no second of a run; write a number such as 8.5"),
-    "before the beginning": (["--from=-1"], "--from:1: -1 is no second of a run; write a number such as 8.5"),
-    "end first": (["--from", "30", "--to", "20"], "--to:1: 20 s is before --from, 30 s; name a later second"),
-    "too late": (["--from", "99"], "--from:1: 99 s is after the last change, at 1.50 s; name an earlier second"),
-    "no such node": (["--filter", "grsp"], "--filter:1: no node has 'grsp' in its path; did you mean 'grasp'?"),
+    "no number": (["--from", "nan"], "--from: nan is no second of a run; write a number such as 8.5"),
+    "no end": (["--to", "inf"], "--to: inf is no second of a run; write a number such as 8.5"),
+    "before the beginning": (["--from=-1"], "--from: -1 is no second of a run; write a number such as 8.5"),
+    "end first": (["--from", "30", "--to", "20"], "--to: 20 s is before --from, 30 s; name a later second"),
+    "too late": (["--from", "99"], "--from: 99 s is after the last change, at 1.50 s; name an earlier second"),
+    "no such node": (["--filter", "grsp"], "--filter: no node has 'grsp' in its path; did you mean 'grasp'?"),
 }
 
 

@@ -117,8 +117,8 @@ def test_all_that_is_wrong_is_told_before_anything_runs(tmp_path: Path) -> None:
     with pytest.raises(Findings) as raised:
         run_every("mine.yaml", [], 1, Path("out"), Path("out"), episode=good)
     assert str(raised.value).splitlines() == [
-        "out:1: is a folder; name a file for --junit",
-        "out/seed=1:1: already holds result.json; name another folder for the run",
+        "out: is a folder; name a file for --junit",
+        "out/seed=1: already holds result.json; name another folder for the run",
     ]
 
 

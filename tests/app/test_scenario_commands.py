@@ -37,7 +37,7 @@ def test_check_tells_the_findings_of_all_files_and_all_cases(scenario: Path) -> 
     ran = invoke("check", "gone.yaml", "mine.yaml")
     assert (ran.exit_code, ran.stdout) == (2, "")
     assert [line.split(" ")[0] for line in ran.stderr.splitlines()] == [
-        "gone.yaml:1:",
+        "gone.yaml:",
         "mine.yaml:18:",
         "mine.yaml:21:",
     ]
