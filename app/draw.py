@@ -7,6 +7,7 @@ from interfaces.cell import Box
 from interfaces.fault import AnyFault
 from interfaces.scene import Obstacle
 
+LEAST_STAND = 1e-3  # m: a piece that is lower stands on the floor
 STAND = 0.02  # m: the edge of the post that holds a foam piece off the floor
 STAND_COLOR = (0.35, 0.35, 0.38)
 
@@ -15,13 +16,11 @@ def draw_obstacles(file: ScenarioFile, rng: np.random.Generator) -> tuple[Obstac
     """The foam pieces where this seed puts them, each with a stand if it does not stand on the floor."""
     drawn = []
     for piece in file.obstacles:
-        x, y, bottom = (
-            np.asarray(getattr(piece.position, file.gravity)) + rng.uniform(-1.0, 1.0, 3) * piece.jitter
-        ).tolist()
+        x, y, bottom = (np.asarray(piece.position_in(file.gravity)) + rng.uniform(-1.0, 1.0, 3) * piece.jitter).tolist()
         center = (x, y, bottom + piece.size[2] / 2)
         box = Box(name=piece.name, center=center, size=piece.size, color=piece.color)
         stand = None
-        if bottom > 1e-3:
+        if bottom > LEAST_STAND:
             post = (STAND, STAND, bottom)
             stand = Box(name=f"{piece.name} stand", center=(x, y, bottom / 2), size=post, color=STAND_COLOR)
         drawn.append(Obstacle(box, float(np.deg2rad(piece.yaw_deg)), stand))

@@ -8,6 +8,7 @@ import json
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from copy import deepcopy
+from functools import partial
 from typing import NamedTuple
 
 from pydantic import BaseModel, ValidationError
@@ -122,7 +123,8 @@ def _best_branches(value: Value, errors: Sequence[ErrorDetails]) -> list[ModelEr
             unions[spot][beside[0]].append(error)
         else:
             kept.append(error)
-    return kept + [e for branches in unions.values() for e in min(branches.values(), key=_badness)]
+    best = (min(branches.values(), key=partial(_badness, spot)) for spot, branches in unions.items())
+    return kept + [error for errors in best for error in errors]
 
 
 def _located(value: Value, details: ErrorDetails) -> tuple[ModelError, Path]:
@@ -139,7 +141,12 @@ def _located(value: Value, details: ErrorDetails) -> tuple[ModelError, Path]:
     return ModelError(path, details), beside
 
 
-def _badness(errors: Sequence[ModelError]) -> tuple[int, int, bool]:
-    """Lower for the branch that was meant; an error of our own validators comes only after the type was right."""
+def _badness(spot: tuple[str | int, ...], errors: Sequence[ModelError]) -> tuple[bool, int, int, bool]:
+    """Lower for the branch, of the union at pydantic's location `spot`, that was meant.
+
+    One that takes no value of this type comes last. An error of our own validators comes only after the type was right.
+    """
     kinds = {error.details["type"] for error in errors}
-    return len(errors), -max(len(error.details["loc"]) for error in errors), "value_error" not in kinds
+    wants = {error.details["type"] for error in errors if len(error.details["loc"]) == len(spot) + 1}
+    other_type = bool(wants & {"tuple_type", "model_type", "dict_type", "list_type", "model_attributes_type"})
+    return other_type, len(errors), -max(len(error.details["loc"]) for error in errors), "value_error" not in kinds

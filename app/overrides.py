@@ -13,7 +13,7 @@ OPTION = "--set"
 
 @dataclass(frozen=True)
 class Assignment:
-    """A value for a key of a file; `place` is where it was written, `told` what a finding there says before all else."""
+    """A value for a key of a file. `place` is where it was written; `told` is what a finding about it says first."""
 
     key: str  # dotted; list items go by index
     new: Document

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, Literal, ParamSpec, TypeVar
 
 from app import vary
+from app.cell_layout import impossible
 from app.findings import Finding, Findings, nearest, shown
 from app.overrides import Assignment, apply, lay_over, path_of, read, was_typed
 from app.placement import misplaced
@@ -161,7 +162,8 @@ class _Source:
         inputs, obstacles, faults = (repr(at(document.value, (key,))) for key in ("inputs", "obstacles", "faults"))
         self._once(case, check_inputs, (tree, inputs, id(cell)), document, tree, cell)
         self._once(case, check_names, (tree, obstacles, faults), document, tree)
-        self._once(case, misplaced, (obstacles, id(cell)), document, cell.known if cell else None)
+        gravity = repr(at(document.value, ("gravity",)))
+        self._once(case, misplaced, (obstacles, gravity, id(cell)), document, cell)
         if not (file and cell and tree):
             return None
         name = self.path.name.removesuffix(".yaml").removesuffix(".scenario")
@@ -256,7 +258,7 @@ def load_cell(path: Path, assignments: Sequence[Assignment] = (), where: Place |
     cell, wrong = _attempt(validated, document, Cell)
     found += wrong
     if cell:
-        found += _inconsistent(document, cell)
+        found += [*_misnamed(document, cell)] or impossible(document, cell)
     if found or not cell:
         raise Findings(found)
     return cell
@@ -277,8 +279,8 @@ def _on_base(top: Document, folder: Path) -> Document:
     return document
 
 
-def _inconsistent(document: Document, cell: Cell) -> Iterator[Finding]:
-    """What no single value of a cell shows."""
+def _misnamed(document: Document, cell: Cell) -> Iterator[Finding]:
+    """Names in a cell that do not go together."""
     known = cell.known
     sockets = [s.name for s in known.sockets]
     if known.plugged_into not in sockets:

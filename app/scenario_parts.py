@@ -11,7 +11,7 @@ from app.scenario_schema import TreeInput
 from app.schema import part
 from app.schema_nodes import at
 from app.yaml_lines import Document
-from interfaces.cell import Cell
+from interfaces.cell import PLUGGED_INTO, Cell
 from interfaces.quote import cut, quoted
 
 _INPUT = TypeAdapter[TreeInput](TreeInput)
@@ -22,14 +22,22 @@ def tree_text(value: TreeInput) -> str:
     return str(value).lower() if isinstance(value, bool) else str(value)
 
 
-def names_of(cell: Cell | None) -> dict[str, list[str]]:
-    """What a tree may name of the cell, by kind; without a cell, what it may name in any."""
+def names_of(cell: Cell | None) -> dict[str, dict[str, str]]:
+    """What a tree may name of the cell, by kind, each with why it cannot work there, "" if it can (`trees.check_tree`).
+
+    Without a cell, what it may name in any.
+    """
     from perception.technique import TECHNIQUES  # late: it brings the compiler with it
 
+    techniques: dict[str, str] = dict.fromkeys(TECHNIQUES, "")
     if cell is None:
-        return {"technique": list(TECHNIQUES)}
-    techniques: list[str] = [name for name in TECHNIQUES if name != "fiducial" or cell.known.connector.tag is not None]
-    return {"socket": [socket.name for socket in cell.known.sockets], "technique": techniques}
+        return {"technique": techniques}
+    if cell.known.connector.tag is None:
+        techniques["fiducial"] = "needs a tag on the connector, and this cell's has none; take the cell thesis_tags"
+    plugged = cell.known.plugged_into
+    empty = f"is empty at the start: the cell's plugged_into is {quoted(plugged)}; write {PLUGGED_INTO}"
+    sockets = {socket.name: "" if socket.name == plugged else empty for socket in cell.known.sockets}
+    return {"socket": {PLUGGED_INTO: ""} | sockets, "technique": techniques}
 
 
 def check_inputs(document: Document, tree: Path | None, cell: Cell | None) -> None:

@@ -59,10 +59,11 @@ class ObstacleSpec(Model):
         0.6,
     )
     position: Annotated[
-        ByGravity,
+        Vector | ByGravity,
         Field(
-            description="Its centre in x and y and its bottom in z, metres in the world's frame.",
-            examples=[{"zero": [0.22, 0.12, 0.1], "earth": [0.22, 0.11, 0.0]}],
+            description="Its centre in x and y and its bottom in z, metres in the world's frame; one for each gravity "
+            "where they differ.",
+            examples=[[0.22, 0.12, 0.1], {"zero": [0.22, 0.12, 0.1], "earth": [0.22, 0.11, 0.0]}],
         ),
     ]
     yaw_deg: Annotated[Yaw, Field(description="Turned left by so many degrees.", examples=[30])] = 0.0
@@ -73,6 +74,12 @@ class ObstacleSpec(Model):
             examples=[[0.004, 0.006, 0.0]],
         ),
     ] = (0.0, 0.0, 0.0)
+
+    def position_in(self, gravity: Gravity) -> Vector:
+        """Its position without jitter (m) in this gravity."""
+        if not isinstance(self.position, ByGravity):
+            return self.position
+        return self.position.zero if gravity == "zero" else self.position.earth
 
 
 class LightSpec(Model):
@@ -167,10 +174,18 @@ class ScenarioFile(Model):
 
     description: Annotated[str, Field(description="A sentence for the list.", examples=["The end is lost in sight."])]
     cell: Annotated[
-        str, Field(description="A shipped cell's name, or a path from this file's folder.", examples=["thesis"])
+        str,
+        Field(
+            description="A shipped cell's name, or a path from this file's folder (with --set, from the current one).",
+            examples=["thesis"],
+        ),
     ]
     tree: Annotated[
-        str, Field(description="A shipped tree's name, or a path from this file's folder.", examples=["recovery"])
+        str,
+        Field(
+            description="A shipped tree's name, or a path from this file's folder (with --set, from the current one).",
+            examples=["recovery"],
+        ),
     ]
     inputs: Annotated[
         dict[str, TreeInput],
@@ -187,7 +202,7 @@ class ScenarioFile(Model):
         tuple[ObstacleSpec, ...],
         Field(
             description="Foam blocks that the robot is not told about.",
-            examples=[[{"name": "a", "size": [0.1, 0.1, 0.2], "position": {"zero": [0, 0, 0], "earth": [0, 0, 0]}}]],
+            examples=[[{"name": "a", "size": [0.1, 0.1, 0.2], "position": [0, 0, 0]}]],
         ),
     ] = ()
     light: Annotated[

@@ -18,7 +18,11 @@ class Unplug(HandLeaf):
     """Grips the connector in the `socket` of that name, draws it out along its axis, and away from the panel."""
 
     INPUT_PORTS: ClassVar[dict[str, Any]] = {
-        "socket": Port(data_type=str, names="socket", description="a socket of the cell")
+        "socket": Port(
+            data_type=str,
+            names="socket",
+            description="a socket of the cell; plugged_into: the one that holds the connector at the start",
+        )
     }
 
     def steps(self) -> Steps:

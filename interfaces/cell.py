@@ -13,12 +13,21 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from interfaces.frame import Intrinsics
 
+# Numbers beyond these bounds are slips of the pen, and arithmetic overflows on some of them.
 Number = Annotated[float, Field(allow_inf_nan=False, strict=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Length = Annotated[float, Field(ge=1e-4, le=10)]  # metres
+Force = Annotated[float, Field(ge=1e-3, le=1e4)]  # newtons
+Mass = Annotated[float, Field(ge=1e-5, le=100)]  # kilograms, or kilograms a metre
+Friction = Annotated[float, Field(ge=1e-3, le=10)]
+Seconds = Annotated[float, Field(ge=0, le=10)]
+Deviation = Annotated[float, Field(ge=0, le=1)]  # metres
+Degrees = Annotated[float, Field(ge=-360, le=360)]
+Angle = Annotated[float, Field(ge=0, le=180)]  # degrees
 Coordinate = Annotated[float, Field(ge=-5, le=5, allow_inf_nan=False)]
 Vector = tuple[Coordinate, Coordinate, Coordinate]
-Size = tuple[Positive, Positive, Positive]
+Size = tuple[Length, Length, Length]
 Fraction = Annotated[float, Field(ge=0, le=1)]
 Color = tuple[Fraction, Fraction, Fraction]
 
@@ -63,8 +72,8 @@ class Socket(Model):
     center: Vector
     size: Size  # metres, (across, along the plug axis, high)
     axis: Direction
-    depth: Positive  # how far the plug sits in
-    pull_out_force: Positive  # newtons
+    depth: Length  # how far the plug sits in
+    pull_out_force: Force  # newtons
     color: Color = (0.1, 0.3, 0.8)
 
     def world_from_plug(self, connector_length: float) -> RigidTransform:
@@ -81,6 +90,8 @@ class Socket(Model):
         return Box(name=self.name, center=self.center, size=size, color=self.color)
 
 
+PLUGGED_INTO = "plugged_into"  # in place of a socket's name: the one that the cell names under this key
+
 TAG_DICTIONARY = "DICT_4X4_50"  # of cv2.aruco; choice: the fewest cells, so the largest ones on a small plate
 
 
@@ -92,8 +103,8 @@ class Tag(Model):
     """
 
     number: Annotated[int, Field(ge=0, le=49)]
-    size: Positive  # edge of the black square
-    plate: Positive  # edge of the plate, with the white border that the tag needs
+    size: Length  # edge of the black square
+    plate: Length  # edge of the plate, with the white border that the tag needs
     center: Vector  # of its face, in the body's frame
 
     @property
@@ -107,9 +118,9 @@ class Clip(Model):
 
     seat: Vector  # the connector's centre when stowed
     axis: Direction  # the connector's x axis when stowed
-    capture_distance: Positive
-    capture_angle_deg: Positive
-    hold_force: Positive
+    capture_distance: Length
+    capture_angle_deg: Angle
+    hold_force: Force
     bracket: tuple[Box, ...]
     tag: Tag | None = None  # in the seat's frame
 
@@ -122,8 +133,8 @@ class Clip(Model):
 class Connector(Model):
     """The cable's loose end: a cylinder; its frame is at its centre, x from cable to tip."""
 
-    length: Positive
-    radius: Positive
+    length: Length
+    radius: Length
     color: Color
     tag: Tag | None = None
 
@@ -140,8 +151,8 @@ class FixedMount(Model):
     """A camera that stands still: it looks along +x, turned left by `yaw_deg` and down by `pitch_down_deg`."""
 
     position: Vector
-    pitch_down_deg: Number
-    yaw_deg: Number = 0.0
+    pitch_down_deg: Degrees
+    yaw_deg: Degrees = 0.0
 
     @property
     def world_from_camera(self) -> RigidTransform:
@@ -175,7 +186,7 @@ class CameraSpec(Model):
     rate: Annotated[int, Field(ge=1, le=120)]  # frames a second
     horizontal_fov_deg: Annotated[float, Field(gt=1, lt=170)]  # of the colour image, to which depth is aligned
     depth_fov_deg: Annotated[float, Field(gt=1, lt=170)]  # of the depth imager, which sets its noise
-    baseline: Positive
+    baseline: Length
     mount: FixedMount | WristMount
 
     @property
@@ -187,8 +198,8 @@ class CameraSpec(Model):
 class Latencies(Model):
     """Seconds charged on the simulated clock."""
 
-    image: NotNegative  # exposure to estimate
-    plan: NotNegative
+    image: Seconds  # exposure to estimate
+    plan: Seconds
 
 
 class KnownCell(Model):
@@ -199,7 +210,7 @@ class KnownCell(Model):
     plugged_into: str  # the socket that holds the connector at the start
     clip: Clip
     connector: Connector
-    cable_length: Positive  # metres of the flexible part
+    cable_length: Length  # metres of the flexible part
     arms: tuple[ArmSpec, ...]
     cameras: tuple[CameraSpec, ...]
     latencies: Latencies
@@ -216,7 +227,12 @@ class KnownCell(Model):
         return np.asarray(socket.center) - 0.5 * socket.size[1] * axis, -axis
 
     def socket(self, name: str) -> Socket:
-        """The socket of that name; KeyError lists those that exist."""
+        """The socket of that name; `PLUGGED_INTO` is the one that holds the connector at the start.
+
+        Raises:
+            KeyError: there is none; the message lists those that exist.
+        """
+        name = self.plugged_into if name == PLUGGED_INTO else name
         for socket in self.sockets:
             if socket.name == name:
                 return socket
@@ -234,19 +250,19 @@ class KnownCell(Model):
 class Stiffness(Model):
     """Bending stiffness EI in N m2 for each gravity: the cable is stiffened for tests on Earth, as in the thesis."""
 
-    zero: Positive
-    earth: Positive
+    zero: Annotated[float, Field(ge=1e-4, le=10)]
+    earth: Annotated[float, Field(ge=1e-4, le=10)]
 
 
 class Cable(Model):
     """The flexible part of the cable, clamped at `anchor`, at rest straight along `anchor_axis`."""
 
-    length: Positive
-    radius: Positive
-    mass_per_length: Positive  # kg/m
+    length: Length
+    radius: Length
+    mass_per_length: Mass  # kg/m
     links: Annotated[int, Field(ge=4, le=30)]  # PyBullet reads at most 31 spherical joints
     stiffness: Stiffness
-    damping_ratio: NotNegative
+    damping_ratio: Annotated[float, Field(ge=0, le=10)]
     anchor: Vector
     anchor_axis: Direction
     color: Color
@@ -255,15 +271,15 @@ class Cable(Model):
 class Errors(Model):
     """How wrong the cell is; one draw a seed unless said otherwise."""
 
-    camera_position: NotNegative  # standard deviation, each axis
-    camera_angle_deg: NotNegative
-    depth_scale: NotNegative
-    arm_tool: NotNegative  # size of the tool's position error that the joint offsets make
-    finger_noise: NotNegative  # standard deviation of every reading
-    finger_backlash: NotNegative
-    finger_resolution: Positive
+    camera_position: Deviation  # standard deviation, each axis
+    camera_angle_deg: Angle
+    depth_scale: Annotated[float, Field(ge=0, le=0.5)]
+    arm_tool: Deviation  # size of the tool's position error that the joint offsets make
+    finger_noise: Deviation  # standard deviation of every reading
+    finger_backlash: Deviation
+    finger_resolution: Annotated[float, Field(ge=1e-9, le=0.1)]  # metres
     finger_rate: Annotated[int, Field(ge=1, le=480)]
-    depth_subpixel: NotNegative  # disparity noise in pixels
+    depth_subpixel: Annotated[float, Field(ge=0, le=10)]  # disparity noise in pixels
     depth_fixed_share: Fraction  # share of the depth noise's variance that stays while the scene is still
 
 
@@ -273,17 +289,17 @@ class Light(Model):
     direction: Direction  # from the scene to the light
     ambient: Fraction
     diffuse: Fraction
-    direction_jitter_deg: NotNegative
+    direction_jitter_deg: Angle
     brightness_jitter: Fraction  # standard deviation of the factor on ambient and diffuse, one draw a seed
 
 
 class GripperSpec(Model):
     """The jaw: pads on the fingers, and how hard it presses."""
 
-    pad_thickness: Positive
-    max_force: Positive  # newtons a finger
-    speed: Positive  # m/s a finger
-    friction: Positive
+    pad_thickness: Length
+    max_force: Force  # newtons a finger
+    speed: Annotated[float, Field(ge=1e-3, le=10)]  # m/s a finger
+    friction: Friction
 
 
 class HiddenWorld(Model):
@@ -292,8 +308,8 @@ class HiddenWorld(Model):
     step_rate: Annotated[int, Field(ge=240, le=4800, multiple_of=240)]  # physics steps a second
     solver_iterations: Annotated[int, Field(ge=10, le=500)]
     cable: Cable
-    connector_mass: Positive
-    connector_friction: Positive
+    connector_mass: Mass
+    connector_friction: Friction
     gripper: GripperSpec
     errors: Errors
     light: Light

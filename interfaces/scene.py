@@ -1,11 +1,12 @@
 """What a scenario puts into the cell, already drawn from the seed where it varies."""
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 from interfaces.cell import Box, Color
 
 Gravity = Literal["zero", "earth"]
+GRAVITIES: tuple[Gravity, ...] = get_args(Gravity)
 EARTH_GRAVITY = 9.81  # m/s2
 
 

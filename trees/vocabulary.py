@@ -19,7 +19,9 @@ from py_trees.ports_utils import convert_str_to_type, is_instance_of_type
 from interfaces.quote import MOST, cut
 
 Accepts = Any  # a type, or the words that may stand there as a tuple of strings
-Names = Mapping[str, Collection[str]]  # the names that a kind of thing has: {"socket": ["back_1", "back_2"]}
+# The names that a kind of thing has: {"socket": ["back_1", "back_2"]}. In place of a list a mapping says of each name
+# why it cannot be used here; "" means that it can.
+Names = Mapping[str, Collection[str]]
 ANY_STATUS = frozenset({Status.SUCCESS, Status.FAILURE, Status.RUNNING})
 MOST_LISTED = 50  # known words among which the nearest is looked for, and which are listed when none is near
 _EXAMPLES = {int: "a whole number such as 3", float: "a number such as 0.5", bool: "true or false"}
@@ -37,6 +39,7 @@ class Attribute:
     above: float | None = None
     default: Any = None
     about: str = ""
+    refused: Mapping[str, str] = field(default_factory=dict)  # of the words that it accepts: why one does not do here
 
     @property
     def takes(self) -> str:
@@ -49,7 +52,9 @@ class Attribute:
     def problem(self, value: str) -> str | None:
         """Why this literal does not do, and what would; None if it does."""
         if isinstance(self.accepts, tuple):
-            return None if value in self.accepts else f"is unknown; {nearest(value, self.accepts)}"
+            if value in self.accepts:
+                return self.refused.get(value)
+            return f"is unknown; {nearest(value, [word for word in self.accepts if word not in self.refused])}"
         right = f"write {_EXAMPLES.get(self.accepts, self.takes)}"
         try:
             converted, result = convert_str_to_type(value, self.accepts)
@@ -174,4 +179,5 @@ def _port(port: Any, is_output: bool, names: Names) -> Attribute:
         above=getattr(port, "above", None),
         default=port.default_value,
         about=port.description,
+        refused={name: why for name, why in known.items() if why} if isinstance(known, Mapping) else {},
     )

@@ -53,12 +53,13 @@ def test_what_is_wrong_is_told_where_it_stands(tmp_path: Path) -> None:
     line = 1 + next(i for i, text in enumerate(source.splitlines()) if "cable_length" in text)
     text = "base: below.yaml\nknown:\n  connector: {radius: -1, tag: {number: 50, size: 1e3}}\n  clip: 3\n"
     assert findings(cell(tmp_path, text)) == [
-        f"below.yaml:{line}: known.cable_length is 'long'; expected a number (above 0)",
+        f"below.yaml:{line}: known.cable_length is 'long'; expected a number (at least 0.0001, at most 10)",
         "mine.yaml:3: '1e3' is text to YAML, not a number; write 1.0e+3",
         "mine.yaml:3: key 'center' is missing in known.connector.tag; "
         "expected 3 values, each a number in metres, such as 0.3 (at least -5, at most 5)",
-        "mine.yaml:3: key 'plate' is missing in known.connector.tag; expected a number (above 0)",
-        "mine.yaml:3: known.connector.radius is -1; expected a number in metres, such as 0.3 (above 0)",
+        "mine.yaml:3: key 'plate' is missing in known.connector.tag; expected a number (at least 0.0001, at most 10)",
+        "mine.yaml:3: known.connector.radius is -1; "
+        "expected a number in metres, such as 0.3 (at least 0.0001, at most 10)",
         "mine.yaml:3: known.connector.tag.number is 50; expected a whole number (at least 0, at most 49)",
         "mine.yaml:4: known.clip is 3; "
         "expected a mapping of seat, axis, capture_distance, capture_angle_deg, hold_force, bracket, tag",

@@ -185,28 +185,48 @@ def test_a_name_without_a_file_is_a_finding(scenario: Path, name: str, expected:
 @pytest.mark.parametrize(
     ("override", "expected"),
     [
-        ("limits.sim_second=3", "--set limits.sim_second=3: unknown key 'sim_second'; did you mean 'sim_seconds'?"),
-        ("expect.tries=many", "--set expect.tries=many: expect.tries is 'many'; expected a whole number"),
-        ("inputs.tries", "--set inputs.tries: no key with a value; write key.path=value, such as gravity=earth"),
-        ("inputs..tries=1", "--set inputs..tries=1: no key with a value; write key.path=value"),
-        ("=1", "--set =1: no key with a value; write key.path=value"),
-        ("obstacles.1.name=x", "--set obstacles.1.name=x: no item '1' in obstacles; give a number from 0 to 0"),
-        ("obstacles.x=1", "--set obstacles.x=1: no item 'x' in obstacles; give"),
-        ("markers.0=slow", "--set markers.0=slow: markers is empty, so it has no item to change; set the whole"),
-        ("light.direction=[0, 0, 0]", "--set light.direction=[0, 0, 0]: light.direction: a direction must not be zero"),
-        ("gravity=1e9", "--set gravity=1e9: '1e9' is text to YAML, not a number; write 1.0e+9"),
-        ("gravity.x=1", "--set gravity.x=1: gravity is a single value"),
-        ("gravity=[", "--set gravity=[: not YAML"),
-        ("cell.hidden.errors.arm_tol=0", "--set cell.hidden.errors.arm_tol=0: unknown key 'arm_tol'; did you mean 'arm_tool'?"),
-        ("cell.known.plugged_into=back_9", "--set cell.known.plugged_into=back_9: no socket 'back_9'; did you mean 'back_"),
-        ("cell.known.arms.1.name=left", f"cells/thesis.yaml:{ARMS}: arms are left, left; give one each of left, right"),
-        ("cell.known.cameras.0.mount.position.0=x", "--set cell.known.cameras.0.mount.position.0=x: known.cameras.0.mount.position.0 is 'x'; expected a"),
-        ("cell.known.cameras.0.mount={arm: middle, offset: [0, 0, 0]}", "--set cell.known.cameras.0.mount={arm: middle, offset: [0, 0, 0]}: known.cameras.0.mount.arm: no"),
+        ("limits.sim_second=3", "unknown key 'sim_second'; did you mean 'sim_seconds'?"),
+        ("expect.tries=many", "expect.tries is 'many'; expected a whole number"),
+        ("inputs.tries", "no key with a value; write key.path=value, such as gravity=earth"),
+        ("inputs..tries=1", "no key with a value; write key.path=value"),
+        ("=1", "no key with a value; write key.path=value"),
+        ("obstacles.1.name=x", "no item '1' in obstacles; give a number from 0 to 0"),
+        ("obstacles.x=1", "no item 'x' in obstacles; give"),
+        ("markers.0=slow", "markers is empty, so it has no item to change; set the whole"),
+        ("light.direction=[0, 0, 0]", "light.direction: a direction must not be zero"),
+        ("gravity=1e9", "'1e9' is text to YAML, not a number; write 1.0e+9"),
+        ("gravity.x=1", "gravity is a single value"),
+        ("gravity=[", "not YAML"),
+        ("cell.hidden.errors.arm_tol=0", "unknown key 'arm_tol'; did you mean 'arm_tool'?"),
+        ("cell.known.plugged_into=back_9", "no socket 'back_9'; did you mean 'back_"),
+        ("cell.known.cameras.0.mount.position.0=x", "known.cameras.0.mount.position.0 is 'x'; expected a"),
+        ("cell.known.cameras.0.mount={arm: middle, offset: [0, 0, 0]}", "known.cameras.0.mount.arm: no"),
     ],
 )  # fmt: skip
 def test_a_wrong_override_is_a_finding(scenario: Path, override: str, expected: str) -> None:
-    assert len(findings(override)) == 1
-    assert expected in findings(override)[0]
+    [finding] = findings(override)
+    assert finding.startswith(f"--set {override}: {expected}")
+
+
+def test_what_an_override_makes_of_a_list_is_told_at_the_list(scenario: Path) -> None:
+    [finding] = findings("cell.known.arms.1.name=left")
+    assert f"cells/thesis.yaml:{ARMS}: arms are left, left; give one each of left, right" in finding
+
+
+@pytest.mark.parametrize("key", ["tree", "cell"])
+def test_a_path_on_the_command_line_is_taken_from_the_current_folder(
+    scenario: Path, monkeypatch: pytest.MonkeyPatch, key: str
+) -> None:
+    """In a scenario file it is taken from that file's folder."""
+    here = scenario.parent / "elsewhere"
+    here.mkdir()
+    monkeypatch.chdir(here)
+    source = scenario.parent / "tree.xml" if key == "tree" else shipped("cell")["thesis"]
+    (here / f"mine{source.suffix}").write_text(source.read_text())
+    for override in (f"{key}=mine{source.suffix}", f"vary.{key}=[mine{source.suffix}]"):
+        assert load_scenario("../mine.yaml", [override]).file.tree
+    with pytest.raises(Findings, match=f"'gone{source.suffix}' does not exist; name a file"):
+        load_scenario("../mine.yaml", [f"{key}=gone{source.suffix}"])
 
 
 def test_findings_of_all_files_come_at_once(scenario: Path) -> None:

@@ -115,7 +115,7 @@ def _odd_rate(data: Any) -> None:
         (_misspell, "Extra inputs"),
         (_no_direction, "a direction must not be zero"),
         (_too_many_links, "less than or equal to 30"),
-        (_not_finite, "finite number"),
+        (_not_finite, "less than or equal to 100"),
         (_odd_rate, "multiple of 240"),
     ],
 )

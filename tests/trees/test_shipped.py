@@ -29,7 +29,12 @@ def test_a_shipped_tree_is_clean_loads_and_is_shown_in_full(path: Path) -> None:
 WRONG = {
     "a period of no time": ('period="0.1"', 'period="-1"', "period='-1' is not above 0; write more than 0"),
     "no time for the search": ('time_limit="300.0"', 'time_limit="0"', "time_limit='0' is not above 0"),
-    "no such socket": ('"back_4"', '"back_44"', "Unplug 'unplug': socket='back_44' is unknown; did you mean back_4?"),
+    "no such socket": ('"plugged_into"', '"back_44"', "is 'back_44' here, which is unknown; did you mean back_4?"),
+    "an empty socket": (
+        '"plugged_into"',
+        '"back_3"',
+        "Unplug 'unplug': socket={socket} is 'back_3' here, which is empty",
+    ),
     "a watch that would succeed": (
         '<Monitor name="monitor" period="0.1"/>',
         '<DetectSlip name="first"/><Monitor name="monitor" period="0.1"/>',
@@ -56,5 +61,7 @@ def test_what_our_leaves_declare_is_enforced(tmp_path: Path, old: str, new: str,
     if "Fallback" in new:
         text = text.replace('slip"/>\n        </Sequence>', 'slip"/>\n        </Fallback>')
     (tmp_path / "tree.xml").write_text(text)
-    (_, told), *_ = check_tree(tmp_path / "tree.xml", names={"socket": ["back_3", "back_4"]})
+    (_, told), *_ = check_tree(
+        tmp_path / "tree.xml", names={"socket": {"plugged_into": "", "back_3": "is empty", "back_4": ""}}
+    )
     assert sentence in told
