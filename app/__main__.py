@@ -2,23 +2,19 @@
 
 import io
 import os
-import signal
 import sys
-from types import FrameType
+
+from app.interrupts import listen
 
 # What a shell reports of cat or git when the reader of their pipe has gone. Not 0, for not all was told; not 1, which
 # says that a run did not come out. SIGPIPE itself stays ignored: it would kill us, too, when a child process dies.
 EXIT_NO_READER = 141
 
 
-def _interrupt(_signal: int, _frame: FrameType | None) -> None:
-    raise KeyboardInterrupt
-
-
 def main() -> None:
-    """Run the command line; SIGTERM ends it as Ctrl-C does, with the record kept."""
+    """Run the command line; SIGTERM and SIGHUP end it as Ctrl-C does, with the record kept."""
     _open_streams()
-    signal.signal(signal.SIGTERM, _interrupt)
+    listen()
     try:
         try:
             from app.cli import app  # takes a moment, in which Ctrl-C may come

@@ -1,17 +1,22 @@
 """Many runs, each in a process of its own, and the row that each leaves."""
 
 import contextlib
+import math
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from app.processes import Done, run_each
-from app.record import Result
+from app.record import Outcome, Result, finish_killed
 from app.scenario_file import Scenario
 from app.summary import asked
+from interfaces.cause import Cause, CauseCode
+
+if TYPE_CHECKING:
+    from sim.renderer import RendererName
 
 Episode = Callable[..., Result]
 
@@ -59,17 +64,23 @@ def run_all(
     *,
     video: bool = False,
     quiet: bool = False,
+    renderer: "RendererName" = "auto",
+    wall_limit: float = math.inf,
     episode: Episode | None = None,
 ) -> tuple[dict[int, Row], bool]:
     """Do all, `jobs` at a time; the rows by the runs' numbers, and whether Ctrl-C cut it short.
 
     After each run a line goes to stderr, unless `quiet`, and `keep` gets the rows so far. A run whose process died
-    counts as an internal error. `episode` stands in for `run_episode` in tests.
+    counts as an internal error; one that takes longer than `wall_limit` seconds, by the clock on the wall, is stopped.
+    `episode` stands in for `run_episode` in tests.
     """
-    tasks = [partial(episode or _run_episode, run.scenario, run.folder, seed=run.seed, video=video) for run in runs]
+    tasks = [
+        partial(episode or _run_episode, run.scenario, run.folder, seed=run.seed, video=video, renderer=renderer)
+        for run in runs
+    ]
     rows: dict[int, Row] = {}
     try:
-        with contextlib.closing(run_each(tasks, jobs)) as ended:
+        with contextlib.closing(run_each(tasks, jobs, wall_limit)) as ended:
             for done in ended:
                 row = rows[done.number] = row_of(runs[done.number], done)
                 keep([rows[i] for i in sorted(rows)])
@@ -94,14 +105,21 @@ def _summary(row: Row) -> str:
     return f"{verdict}, {row.sim_seconds:.1f} s simulated, {row.real_time_factor:.2f} x real time"
 
 
+def result_of(run: Run, done: Done[Result]) -> Result:
+    """What a run came to; of a process that died or was killed the record is finished here, with the leaf at work."""
+    if done.value is not None:
+        return done.value
+    code = CauseCode.WALL_LIMIT if done.timed_out else CauseCode.INTERNAL_ERROR
+    outcome: Outcome = "wall_limit" if done.timed_out else "internal_error"
+    cause = Cause(code, done.error)
+    result = Result(run.scenario.name, run.seed, outcome, succeeded=False, case=run.scenario.case, cause=cause)
+    return finish_killed(run.folder, result) if run.folder else result
+
+
 def row_of(run: Run, done: Done[Result]) -> Row:
     """A run's row."""
     what = (run.scenario.name, run.scenario.case, run.scenario.file.gravity, run.seed)
-    result = done.value
-    if result is None:
-        cause = {"code": "internal_error", "message": done.error, "node": ""}
-        why = f"internal_error: {done.error}"
-        return Row(*what, "internal_error", succeeded=False, cause=cause, why=why, peak_memory_mb=done.peak_memory_mb)
+    result = result_of(run, done)
     values = {e.name: e.value for e in result.expectations}
     return Row(
         *what,

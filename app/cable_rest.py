@@ -54,8 +54,13 @@ def rest_shape(
         return bent / 2 + weight * height + stretching * stretched / 2, by_point[:-1].ravel()
 
     guess = _cubic(anchor, clamp * cable.length, last[0], (last[1] - last[0]) * n, n)
-    options = {"maxiter": MOST_ITERATIONS, "maxfun": 10 * MOST_ITERATIONS}
-    found = minimize(energy, guess[1:-1].ravel(), jac=True, method="L-BFGS-B", options=options)
+    found = minimize(
+        energy,
+        guess[1:-1].ravel(),
+        jac=True,
+        method="L-BFGS-B",
+        options={"maxiter": MOST_ITERATIONS, "maxfun": 10 * MOST_ITERATIONS},
+    )
     return points_of(found.x)
 
 

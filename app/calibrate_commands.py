@@ -6,9 +6,9 @@ from typing import Annotated
 import typer
 
 from app import output
-from app.findings import Finding, Findings, nearest, shown
+from app.findings import Finding, Findings, nearest, real, shown
+from app.interrupts import late_imports
 from app.options import IMAGE_SUFFIXES, MOST_SEED
-from app.progress import late_imports
 from app.resources import resolve
 from app.scenario_file import load_cell
 from interfaces.quote import quoted
@@ -26,7 +26,7 @@ def calibrate(
     columns: Annotated[int, typer.Option(min=3, max=40, help="Inner corners of the board, across.")] = 9,
     rows: Annotated[int, typer.Option(min=3, max=40, help="Inner corners of the board, down.")] = 6,
     square: Annotated[float, typer.Option(min=0.001, max=1.0, help="Width of a square in metres.")] = 0.025,
-    out: Annotated[Path, typer.Option("-o", "--out", metavar="FILE", help="The calibration file.")] = Path(
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="FILE", help="The calibration file, a new one.")] = Path(
         "calibration.yaml"
     ),
     draw: Annotated[
@@ -48,12 +48,10 @@ def calibrate(
     holds width, height, fx, fy, cx, cy (pixels; 0, 0 is the middle of the first), OpenCV's distortion k1, k2, p1, p2,
     k3, and the residual.
     """
-    wrong = output.unwritable(out.parent) + (output.unwritable(draw) if draw else [])
-    if out.is_dir():
-        wrong.append(Finding(shown(out), 0, "is a folder; name a file"))
+    wrong = output.unwritable_file(out, new=True) + (output.unwritable(draw) if draw else [])
     if out.suffix.lower() in IMAGE_SUFFIXES:
         wrong.append(Finding(shown(out), 0, "is a picture's name, and a calibration is YAML; end it in .yaml"))
-    if draw is not None and images is not None and draw.resolve() == images.resolve():
+    if draw is not None and images is not None and real(draw) == real(images):
         wrong.append(Finding("--draw", 0, "is the folder of your pictures, which it would overwrite; name another"))
     if wrong:
         raise Findings(wrong)

@@ -156,7 +156,9 @@ def _no_grasp(known: KnownCell) -> str | None:
     from motion.kinematics import ArmKinematics
     from motion.service import GRIP_OFFSETS, NEAR_MARGINS, OPEN_GAP, TIGHT_MARGIN
 
-    arms = {arm.name: ArmKinematics(RigidTransform.from_translation(arm.base)) for arm in known.arms}
+    arms: dict[str, ArmKinematics] = {
+        arm.name: ArmKinematics(RigidTransform.from_translation(arm.base)) for arm in known.arms
+    }
     boxes, connector = known.solids(), known.connector
     others = [CollisionModel(arms[a.name], boxes).spheres(np.array(a.sleep)) for a in known.arms if a.name != HAND]
     model = CollisionModel(arms[HAND], boxes, other_arm=np.vstack(others), opening=OPEN_GAP)

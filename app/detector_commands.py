@@ -96,9 +96,7 @@ def evaluate_detector(
     Example:
       regrasp evaluate-detector results/detector/detector.onnx --out evaluation.json
     """
-    wrong = output.unwritable(out.parent) if out else []
-    if out is not None and out.is_dir():
-        wrong.append(Finding(shown(out), 0, "is a folder; name a file"))
+    wrong = output.unwritable_file(out, new=True) if out else []
     if out is not None and out.suffix.lower() == ".onnx":
         wrong.append(Finding(shown(out), 0, "is a network's name, and the figures are JSON; end it in .json"))
     if model is not None and not model.is_file():

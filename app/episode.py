@@ -2,7 +2,6 @@
 
 import time
 import traceback
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,11 +15,13 @@ from app.belief import belief_state
 from app.draw import draw_faults, draw_obstacles
 from app.fault_service import EnteredNodes, FaultLog, break_services
 from app.film import Film
+from app.interrupts import WallLimit
 from app.judge import Judge
+from app.progress import OnEvent, Progress
 from app.record import Link, Outcome, Record, Result
 from app.rerun import copies
 from app.scenario_file import Scenario
-from app.tick_log import TickLog, active_leaf, running_leaf
+from app.tick_log import TickLog, active_leaf, note_leaf_at_work, running_leaf
 from behaviors import LEAVES
 from behaviors.services import Services
 from interfaces.cause import Cause, CauseCode
@@ -32,7 +33,6 @@ from sim.world import World
 from trees import in_tree_order, load_tree, node_paths, read_graph
 
 TICK = 0.05  # simulated seconds
-Progress = Callable[[float, str], None]
 
 
 @dataclass
@@ -65,18 +65,19 @@ def run_episode(
     gui: bool = False,
     renderer: RendererName = "auto",
     progress: Progress | None = None,
+    on_event: OnEvent | None = None,
 ) -> Result:
     """Run a scenario to its end and leave its record in the folder `out` (None: nowhere).
 
-    `progress` is called at every tick with the simulated second and the active leaf; a KeyboardInterrupt from it ends
-    the run cleanly. An exception inside a leaf ends it with the cause `internal_error` and its traceback
-    in the record.
+    `progress` is called at every tick with the simulated second and the active leaf, `on_event` with each event of
+    the run's log. A KeyboardInterrupt, from them or inside a leaf, ends the run cleanly. An exception inside a leaf
+    ends it with the cause `internal_error` and its traceback in the record.
     """
     began = time.perf_counter()
     with Record(out, scenario.name, seed, scenario.case, copies(scenario, seed)) as record:
         world = build_world(scenario, seed, renderer, gui)
         try:
-            log = record.logger(world.now)
+            log = record.logger(world.now, on_event)
             log.info(
                 "begin",
                 scenario=scenario.name,
@@ -95,6 +96,7 @@ def run_episode(
             ticks = TickLog(episode.tree.root, record.ticks, world.now)
             faults = [EnteredNodes(episode.tree.root, world.notice), FaultLog(world.faults, log)]
             episode.tree.visitors += [ticks, episode.attempts, *faults]
+            note_leaf_at_work(episode.tree, lambda node: record.at_work(world.now(), node))
             with Film(out / "video.mp4" if video and out else None, world) as film:
                 ending = _run(episode, scenario, film, progress, log)
             ticks.finalise()
@@ -137,9 +139,8 @@ def _run(episode: Episode, scenario: Scenario, film: Film, progress: Progress | 
     root = episode.tree.root
     try:
         ending = _loop(episode, scenario, film, progress)
-    except KeyboardInterrupt:
-        cause = Cause(CauseCode.INTERRUPTED, "stopped from outside", _path(running_leaf(root), root))
-        ending = Ending("interrupted", cause, _unfinished(episode))
+    except KeyboardInterrupt as stop:
+        ending = _stopped(episode, stop)
     except Exception as error:
         ending = _broken(episode, error, log)
     try:
@@ -174,9 +175,25 @@ def _loop(episode: Episode, scenario: Scenario, film: Film, progress: Progress |
     return Ending("time_limit", cause, _unfinished(episode))
 
 
-def _unfinished(episode: Episode) -> tuple[Link, ...] | None:
-    """The chain down to the leaf that the run's end cut short."""
-    return episode.attempts.chain_to(running_leaf(episode.tree.root), "was running", "was still running")
+def _stopped(episode: Episode, stop: KeyboardInterrupt) -> Ending:
+    """The ending by a stop from outside: between two ticks, or inside a leaf, which it then names."""
+    root, seconds = episode.tree.root, episode.world.now()
+    inside = _raising(stop, root)
+    is_limit = isinstance(stop, WallLimit)
+    code = CauseCode.WALL_LIMIT if is_limit else CauseCode.INTERRUPTED
+    by = "at the limit of wall time" if is_limit else "from outside"
+    where = " in the middle of a tick" if inside else ""
+    message = f"stopped {by}{where}, after {seconds:.2f} simulated seconds"
+    cause = Cause(code, message, _path(inside or running_leaf(root), root))
+    chain = _unfinished(episode, inside)
+    if inside is not None and not inside.children:
+        episode.attempts.raised(inside, cause)
+    return Ending("wall_limit" if is_limit else "interrupted", cause, chain)
+
+
+def _unfinished(episode: Episode, leaf: py_trees.behaviour.Behaviour | None = None) -> tuple[Link, ...] | None:
+    """The chain down to the leaf that the run's end cut short, by default the one that is RUNNING."""
+    return episode.attempts.chain_to(leaf or running_leaf(episode.tree.root), "was running", "was still running")
 
 
 def _broken(episode: Episode, error: Exception, log: Any) -> Ending:

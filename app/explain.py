@@ -46,8 +46,10 @@ def _page(record: RunRecord, width: int) -> Iterator[str]:
     leaves = [
         path for path, after in zip(running, [*running[1:], ""], strict=False) if not after.startswith(path + "/")
     ]
-    seconds = record.ticks[-1].t if record.ticks else 0.0
-    yield from _section(f"What was running at {seconds:.2f} s, when the record ends", leaves)
+    if record.at_work:
+        at, leaf = record.at_work
+        leaves = [f"{leaf}: its tick at {at:.2f} s has not ended", *(other for other in leaves if other != leaf)]
+    yield from _section(f"What was running at {record.end:.2f} s, when the record ends", leaves)
     events = [event for event in record.events if event.event != "begin"]
     last = (f"{e.t:8.2f}  {e.node or '-'}  {event_text(e)}" for e in events[-LAST_EVENTS:])
     yield from _section("The last events", (line for text in last for line in wrapped(text, width - 2)))

@@ -1,6 +1,7 @@
 """What is wrong with an input: one line a finding, all findings at once."""
 
 import difflib
+import os
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -57,6 +58,23 @@ def closest(name: str, names: Iterable[str]) -> str | None:
 def shown(path: Path) -> str:
     """A path as the user would write it: relative when it lies under the current folder."""
     try:
-        return str(path.resolve().relative_to(Path.cwd()))
+        return str(real(path).relative_to(Path.cwd()))
     except (ValueError, OSError):
         return str(path)
+
+
+def real(path: Path) -> Path:
+    """The path without links, from the root; of links that lead back to themselves as far as they can be followed.
+
+    `Path.resolve` raises RuntimeError for such links before Python 3.13.
+    """
+    return Path(os.path.realpath(path))
+
+
+def why_no_file(path: Path) -> str:
+    """What stands at `path` in place of a file that can be read, as the end of a sentence."""
+    if os.path.isdir(path):
+        return "is a folder"
+    if os.path.exists(path):
+        return "is no file"
+    return "is a link that leads nowhere" if os.path.lexists(path) else "does not exist"

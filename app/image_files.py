@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from app.findings import Finding, Findings, shown
+from app.findings import Finding, Findings, shown, why_no_file
 from interfaces.quote import quoted
 
 NEAREST, FARTHEST = 0.05, 20.0  # m; choice: a median depth beyond these is one in another unit
@@ -66,8 +66,7 @@ def _array(path: Path) -> NDArray[np.generic] | None:
 
 def _check_file(path: Path) -> None:
     if not os.path.isfile(path):  # also in a folder that may not be looked into
-        wrong = "is no file" if os.path.exists(path) else "does not exist"
-        raise Findings([Finding(shown(path), 0, f"{quoted(shown(path))} {wrong}; name an image file")])
+        raise Findings([Finding(shown(path), 0, f"{quoted(shown(path))} {why_no_file(path)}; name an image file")])
 
 
 def _wrong(path: Path, message: str) -> Findings:

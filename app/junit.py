@@ -8,6 +8,8 @@ from app.batch import Row, Run
 from app.findings import Findings, printable
 from app.record import write_whole
 
+ERRORS = ("internal_error", "wall_limit")  # outcomes that say nothing of the robot
+
 
 def write_junit(path: Path, name: str, runs: Sequence[Run], rows: Mapping[int, Row]) -> None:
     """One testcase a run: time on the wall, why it failed in a sentence and in full, the record's folder.
@@ -17,7 +19,7 @@ def write_junit(path: Path, name: str, runs: Sequence[Run], rows: Mapping[int, R
     Raises:
         OSError: the file cannot be written.
     """
-    errors = sum(row.outcome == "internal_error" for row in rows.values())
+    errors = sum(row.outcome in ERRORS for row in rows.values())
     counts = {
         "tests": len(runs),
         "failures": sum(not row.succeeded for row in rows.values()) - errors,
@@ -42,7 +44,7 @@ def _testcase(suite: ET.Element, run: Run, row: Row | None) -> None:
     if row is None:
         ET.SubElement(case, "skipped", {"message": "interrupted before its end"})
     elif not row.succeeded:
-        tag = "error" if row.outcome == "internal_error" else "failure"
+        tag = "error" if row.outcome in ERRORS else "failure"
         code = row.cause["code"] if row.cause else row.outcome
         why = printable(row.why)
         ET.SubElement(case, tag, {"type": str(code), "message": why}).text = _in_full(run.folder) or why

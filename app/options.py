@@ -1,7 +1,8 @@
 """Options that several commands take."""
 
 import re
-from typing import Annotated
+from collections.abc import Iterator
+from typing import Annotated, Literal
 
 import typer
 
@@ -12,6 +13,37 @@ MOST_SEED = 2**31 - 1
 MOST_SEEDS = 10_000  # of one study
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
 
+
+def _scenarios(incomplete: str) -> Iterator[str]:
+    """Names for the shell's completion; it completes paths by itself."""
+    from app.resources import shipped
+
+    return (name for name in shipped("scenario") if name.startswith(incomplete))
+
+
+ScenarioName = Annotated[
+    str,
+    typer.Argument(
+        metavar="SCENARIO", help="A shipped scenario's name, or a path to a .yaml file.", autocompletion=_scenarios
+    ),
+]
+Seed = Annotated[
+    int | None, typer.Option(min=0, max=MOST_SEED, help="Draws every error, noise and jitter; default the scenario's.")
+]
+Renderer = Annotated[
+    Literal["auto", "moderngl", "tiny"],
+    typer.Option(
+        help="What draws the cameras' pictures; auto takes OpenGL (moderngl) where it works, else PyBullet's."
+    ),
+]
+WallLimit = Annotated[
+    float | None,
+    typer.Option(min=1.0, metavar="SECONDS", help="Stop a run that takes longer, by the clock on the wall."),
+]
+LogLevel = Annotated[
+    Literal["debug", "info", "warning", "error"] | None,
+    typer.Option(help="Show the run's events from this level on, as events.jsonl has them all."),
+]
 Sets = Annotated[
     list[str] | None,
     typer.Option(

@@ -1,5 +1,6 @@
 """Where a run's record goes, and whether it can."""
 
+import contextlib
 import hashlib
 import os
 import re
@@ -7,15 +8,34 @@ import tempfile
 from itertools import count
 from pathlib import Path
 
-from app.findings import Finding, shown
+from app.findings import Finding, real, shown
 from interfaces.quote import quoted
 
+RUNS = Path("runs")  # where records go by default
 FILES = ("result.json", "events.jsonl", "ticks.jsonl", "scenario.yaml", "cell.yaml", "tree.xml")  # of a run's folder
 
 
-def free_folder(scenario: str, which: int | str) -> Path:
-    """The first of runs/SCENARIO-WHICH-1, -2, ... that does not exist; WHICH is a seed, or "all"."""
-    return next(p for n in count(1) if not (p := Path("runs", f"{scenario}-{which}-{n}")).exists())
+def new_folder(name: str, within: Path = RUNS) -> Path:
+    """Make the first folder NAME-1, NAME-2, ... that does not exist, in the folder `within`.
+
+    The folder is made at once: of two runs that begin together each gets its own.
+
+    Raises:
+        OSError: none can be made.
+    """
+    within.mkdir(parents=True, exist_ok=True)
+    for n in count(1):
+        folder = within / f"{folder_name(name)}-{n}"
+        with contextlib.suppress(FileExistsError):
+            folder.mkdir()
+            return folder
+    raise AssertionError("unreachable")
+
+
+def leave_if_empty(folder: Path) -> None:
+    """Take a folder away in which nothing was written."""
+    with contextlib.suppress(OSError):
+        folder.rmdir()
 
 
 def folder_name(case: str) -> str:
@@ -29,13 +49,31 @@ def taken(out: Path) -> list[str]:
     return [name for name in FILES if os.path.lexists(out / name)]
 
 
+def holds_a_run(out: Path) -> list[Finding]:
+    """The finding of a folder that another run has taken, [] of one that is free."""
+    if there := taken(out):
+        return [Finding(shown(out), 0, f"holds a run already ({', '.join(there)}); name another folder")]
+    return []
+
+
 def findings(out: Path) -> list[Finding]:
     """Why no run can be written to `out`; nothing is left behind by the look."""
-    if there := taken(out):
-        return [Finding(shown(out), 0, f"already holds {', '.join(there)}; name another folder for the run")]
+    if there := holds_a_run(out):
+        return there
     if out == Path():
         return [Finding("--out", 0, "names this very folder; name one of its own for the run")]
     return unwritable(out)
+
+
+def unwritable_file(file: Path, *, new: bool = False) -> list[Finding]:
+    """Why no file can be written there; nothing is left behind by the look. `new`: one that exists is not replaced."""
+    if os.path.isdir(file):
+        return [Finding(shown(file), 0, "is a folder; name a file")]
+    if real(file).is_symlink():
+        return [Finding(shown(file), 0, "is a link that leads back to itself; name another file")]
+    if new and os.path.exists(file):
+        return [Finding(shown(file), 0, "exists already; name another file, or remove it")]
+    return unwritable(file.parent)
 
 
 def unwritable(out: Path) -> list[Finding]:

@@ -17,7 +17,7 @@ from scipy.spatial.transform import RigidTransform
 from app.calibration_file import CalibrationFile, load_calibration
 from app.camera_pose_file import load_camera_pose
 from app.draw_pose import draw_pose
-from app.findings import Finding, Findings, nearest, shown
+from app.findings import Finding, Findings, nearest, real, shown
 from app.image_files import read_depth, read_rgb
 from app.record import write_whole
 from interfaces.cell import FixedMount, KnownCell
@@ -97,7 +97,7 @@ def _technique(name: str) -> TechniqueName:
 def _in_world(files: Sequence[Files]) -> bool:
     """Whether the cameras' places are known. Raises `Findings` for several cameras, of some of which they are not."""
     placed = [f.camera is not None or f.pose is not None for f in files]
-    if not all(placed) and (any(placed) or len({f.intrinsics.resolve() for f in files}) > 1):
+    if not all(placed) and (any(placed) or len({real(f.intrinsics) for f in files}) > 1):
         message = "frames of several cameras meet in the world; give --camera or --camera-pose for each, too"
         raise Findings([Finding("--intrinsics", 0, message)])
     return all(placed)

@@ -8,9 +8,9 @@ from typing import Annotated, TypeVar
 import typer
 
 from app import output
-from app.findings import Finding, Findings, nearest, shown
+from app.findings import Finding, Findings, nearest, real, shown
+from app.interrupts import late_imports
 from app.options import MOST_SEED, Sets
-from app.progress import late_imports
 from app.resources import resolve
 from app.scenario_file import load_cell, load_scenario
 from interfaces.cell import Color
@@ -131,17 +131,13 @@ def _bad_drawing(draw: Path, inputs: Sequence[Path]) -> list[Finding]:
     """Why nothing can be drawn there."""
     if draw.suffix.lower() not in SUFFIXES:
         return [Finding("--draw", 0, f"{quoted(draw.name)} is no name of a picture; end it in {' or '.join(SUFFIXES)}")]
-    if draw.is_dir():
-        return [Finding("--draw", 0, f"{quoted(shown(draw))} is a folder; name a file")]
-    if any(
-        draw.resolve() == path.resolve() or (draw.exists() and path.exists() and draw.samefile(path)) for path in inputs
-    ):
+    if any(real(draw) == real(path) or (draw.exists() and path.exists() and draw.samefile(path)) for path in inputs):
         return [
             Finding(
                 "--draw", 0, f"{quoted(shown(draw))} is one of your own files, which it would overwrite; name another"
             )
         ]
-    return output.unwritable(draw.parent)
+    return output.unwritable_file(draw)
 
 
 def _color(text: str, wrong: list[Finding]) -> Color | None:

@@ -1,92 +1,132 @@
 """Work in processes of its own, one a task: py_trees' blackboard and PyBullet's globals are one per process."""
 
 import contextlib
+import math
+import os
 import signal
-from collections.abc import Callable, Generator, Iterator, Sequence
+import time
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from multiprocessing import get_context, resource_tracker
 from multiprocessing.connection import Connection, wait
-from typing import Any, Generic, NamedTuple, NoReturn, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
+
+from app.interrupts import WALL_LIMIT_SIGNAL, listen_to_parent
 
 T = TypeVar("T")
+GRACE = 10.0  # seconds that a process has to put its things in order
 
 
 class Done(NamedTuple, Generic[T]):
-    """How one task ended: its number, what it returned (None where it died), the error in words, peak memory in MB."""
+    """How one task ended: its number, what it returned (None where it died), the error in words, peak memory in MB.
+
+    `timed_out`: it was stopped at the wall limit, and returned nothing after that.
+    """
 
     number: int
     value: T | None
     error: str
     peak_memory_mb: float
+    timed_out: bool = False
 
 
-def run_each(tasks: Sequence[Callable[[], T]], jobs: int) -> Generator[Done[T]]:
+@dataclass
+class _Child:
+    number: int
+    process: Any
+    deadline: float  # on the monotonic clock
+    told: bool = False  # that its time is over
+
+
+def run_each(tasks: Sequence[Callable[[], T]], jobs: int, wall_limit: float = math.inf) -> Generator[Done[T]]:
     """Run picklable tasks, at most `jobs` at a time, and yield each as it ends, in whatever order.
 
-    A task that raises or crashes yields its error; the others go on. When the caller closes the iterator or Ctrl-C
-    comes, those under way get a KeyboardInterrupt and ten seconds to put their things in order.
+    A task that raises or crashes yields its error; the others go on. One that takes longer than `wall_limit` seconds,
+    by the clock on the wall, gets a `WallLimit`, and is killed when it has not ended `GRACE` seconds later. When the
+    caller closes the iterator or Ctrl-C comes, those under way get a KeyboardInterrupt and as long to put their things
+    in order.
     """
     context = get_context("spawn")
     waiting = list(enumerate(tasks))
-    running: dict[Any, tuple[int, Any]] = {}
+    running: dict[Any, _Child] = {}
     try:
         while waiting or running:
             while waiting and len(running) < jobs:
                 number, task = waiting.pop(0)
                 reader, writer = context.Pipe(duplex=False)
                 process = context.Process(target=_child, args=(writer, task), daemon=True)
-                with _sigint_blocked():
+                with _deaf():
                     process.start()
                 writer.close()  # the child has the only one now: its death shows as an end of file
-                running[reader] = number, process
-            for ready in wait(list(running)):
-                number, process = running[ready]
-                yield _received(number, ready, process)
+                running[reader] = _Child(number, process, time.monotonic() + wall_limit)
+            for ready in wait(list(running), _until_a_deadline(running.values())):
+                child = running[ready]
+                yield _received(child, ready, wall_limit)
                 del running[ready]
+            _press(running.values())
     finally:
-        _stop([process for _, process in running.values()])
+        _stop([child.process for child in running.values()])
+
+
+def _until_a_deadline(children: Iterable[_Child]) -> float | None:
+    """Seconds; None where there is none."""
+    first = min(child.deadline for child in children)
+    return None if first == math.inf else max(0.0, first - time.monotonic())
+
+
+def _press(children: Iterable[_Child]) -> None:
+    """Tell those whose time is over, and kill those that were told and did not end."""
+    now = time.monotonic()
+    for child in children:
+        if now >= child.deadline:
+            if child.told:
+                child.process.kill()
+            else:
+                os.kill(child.process.pid, WALL_LIMIT_SIGNAL)
+            child.told, child.deadline = True, math.inf if child.told else now + GRACE
 
 
 @contextlib.contextmanager
-def _sigint_blocked() -> Iterator[None]:
-    """What is started meanwhile never hears of a terminal's Ctrl-C, which reaches all of us; here it comes afterwards.
+def _deaf() -> Iterator[None]:
+    """What is started meanwhile never hears of a terminal's Ctrl-C or end, which reach all of us; we do afterwards.
 
-    Ignored by the child itself it would come while it still imports.
+    Ignored by the child itself they would come while it still imports.
     """
     resource_tracker.ensure_running()  # its start would end the block
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGHUP})
     try:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _received(number: int, reader: Any, process: Any) -> Done[Any]:
+def _received(child: _Child, reader: Any, wall_limit: float) -> Done[Any]:
     try:
         value, error, peak = reader.recv()
     except EOFError:
         value, error, peak = None, "", 0.0
-    process.join()
+    child.process.join()
     reader.close()
-    if value is None and not error:
-        error = f"the process died with exit code {process.exitcode}"
-    return Done(number, value, error, peak)
+    timed_out = value is None and child.told
+    if timed_out:
+        error = f"stopped after {wall_limit:g} s of wall time"
+    elif value is None and not error:
+        error = f"the process died with exit code {child.process.exitcode}"
+    return Done(child.number, value, error, peak, timed_out)
 
 
 def _stop(processes: Sequence[Any]) -> None:
     for process in processes:
         process.terminate()
     for process in processes:
-        process.join(10)
+        process.join(GRACE)
         if process.is_alive():
             process.kill()
             process.join()
 
 
 def _child(writer: "Connection[Any, Any]", task: Callable[[], Any]) -> None:
-    def interrupt(_number: int, _frame: object) -> NoReturn:
-        raise KeyboardInterrupt
-
-    signal.signal(signal.SIGTERM, interrupt)  # the parent passes Ctrl-C on once
+    listen_to_parent()
     with contextlib.suppress(KeyboardInterrupt):
         try:
             value, error = task(), ""

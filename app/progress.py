@@ -1,27 +1,53 @@
 """What a running episode shows on stderr, and how Ctrl-C reaches it."""
 
-import signal
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from types import FrameType
+from typing import Any, NamedTuple
 
 from rich.console import Console
 
+from app.findings import printable
+from app.interrupts import interruptible
+from app.options import LogLevel
+from app.summary import in_words
+
 Progress = Callable[[float, str], None]  # simulated seconds, active leaf; called at each tick
+OnEvent = Callable[[Mapping[str, Any]], None]  # called with each event as events.jsonl has it
 QUIET_SECONDS = 5.0  # simulated, between two lines of a leaf that goes on
+LEVELS = ("debug", "info", "warning", "error")
+
+
+class Shown(NamedTuple):
+    """What `run_episode` calls: at each tick, and for each event."""
+
+    tick: Progress
+    event: OnEvent
 
 
 @contextmanager
-def shown_progress(quiet: bool) -> Iterator[Progress]:
-    """A callback for `run_episode`: one live line on a terminal, else a line a leaf; `quiet` shows nothing.
+def shown_progress(quiet: bool, level: LogLevel = None) -> Iterator[Shown]:
+    """Callbacks for `run_episode`: one live line on a terminal, else a line a leaf; `quiet` shows nothing.
 
-    While it is open, Ctrl-C raises KeyboardInterrupt from the callback, so between two ticks; a second one at once.
+    Events from `level` on are shown as lines; None shows none. While it is open, Ctrl-C raises KeyboardInterrupt from
+    the tick's callback, so between two ticks; a second one at once.
     """
     console = Console(stderr=True, highlight=False, markup=False)
+    shown_levels = LEVELS[LEVELS.index(level) :] if level else ()
+
+    def event(values: Mapping[str, Any]) -> None:
+        if values["level"] in shown_levels:
+            rest = {name: value for name, value in values.items() if name not in ("t", "level", "event", "node")}
+            what = in_words(str(values["event"]), rest)
+            told = printable(f"{values['t']:7.2f} s  {values['level']:<7}  {values.get('node') or '-'}  {what}")
+            if console.is_terminal:
+                console.print(told, soft_wrap=True)
+            else:
+                _print(told)
+
     with interruptible() as check:
         if quiet:
-            yield lambda _time, _leaf: check()
+            yield Shown(lambda _time, _leaf: check(), event)
         elif console.is_terminal:
             with console.status("starting") as status:
 
@@ -29,7 +55,7 @@ def shown_progress(quiet: bool) -> Iterator[Progress]:
                     check()
                     status.update(f"{time:7.1f} s  {leaf}")
 
-                yield live
+                yield Shown(live, event)
         else:
             lines = _Lines()
 
@@ -37,7 +63,7 @@ def shown_progress(quiet: bool) -> Iterator[Progress]:
                 check()
                 lines.show(time, leaf)
 
-            yield plain
+            yield Shown(plain, event)
 
 
 class _Lines:
@@ -50,36 +76,11 @@ class _Lines:
     def show(self, time: float, leaf: str) -> None:
         if time - self.time >= (QUIET_SECONDS if leaf == self.leaf else 1.0):
             self.time, self.leaf = time, leaf
-            try:
-                print(f"{time:7.1f} s  {leaf}", file=sys.stderr, flush=True)
-            except BrokenPipeError:  # who watched has gone: as Ctrl-C, with the record kept
-                raise KeyboardInterrupt from None
+            _print(f"{time:7.1f} s  {leaf}")
 
 
-@contextmanager
-def late_imports() -> Iterator[None]:
-    """Ctrl-C waits for the end of it: in the middle of their import libraries in C++ swallow it, or die of it."""
-    with interruptible() as check:
-        yield
-        check()
-
-
-@contextmanager
-def interruptible() -> Iterator[Callable[[], None]]:
-    """A check that raises KeyboardInterrupt if Ctrl-C came since; the second Ctrl-C does so where it strikes."""
-    asked = False
-
-    def note(number: int, frame: FrameType | None) -> None:
-        nonlocal asked
-        asked = True
-        signal.signal(signal.SIGINT, signal.default_int_handler)
-
-    def check() -> None:
-        if asked:
-            raise KeyboardInterrupt
-
-    before = signal.signal(signal.SIGINT, note)
+def _print(line: str) -> None:
     try:
-        yield check
-    finally:
-        signal.signal(signal.SIGINT, before)
+        print(line, file=sys.stderr, flush=True)
+    except BrokenPipeError:  # who watched has gone: as Ctrl-C, with the record kept
+        raise KeyboardInterrupt from None

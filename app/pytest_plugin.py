@@ -6,6 +6,7 @@ message is the run's explanation. The file's `markers` are the test's markers, s
 marks `slow`. Each case runs in a process of its own, hence `-n 2` is fine.
 
     pytest --scenario-seed 0:5 --scenario-records runs     # every case with five seeds; the records are kept
+    pytest --scenario-wall-limit 600                       # a case that takes longer than ten minutes fails
 
 Try a tree out: put tree files into a folder `trees` beside pytest's configuration, or name them `*.tree.xml`, and call
 pytest; or name the files or their folder: `pytest my/tree.xml`, `pytest my`. Each gives two tests on scripted leaves:
@@ -21,11 +22,11 @@ Test a tree's logic: the fixture `scripted_tree` (see `trees.scripted`) takes a 
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Iterator
 from contextlib import closing, suppress
 from functools import partial
-from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
@@ -50,6 +51,9 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption(
         "--scenario-records", metavar="DIR", type=Path, help="Keep the runs' records there, not in pytest's folder."
     )
+    group.addoption(
+        "--scenario-wall-limit", metavar="SECONDS", type=float, help="Stop a case that takes longer, and fail it."
+    )
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -60,6 +64,11 @@ def pytest_configure(config: pytest.Config) -> None:
 
         raise pytest.UsageError(
             f"--scenario-seed {quoted(seed)} is no seed; write a whole number, or a range such as 0:5"
+        )
+    limit = config.getoption("--scenario-wall-limit")
+    if limit is not None and not 1 <= limit < math.inf:
+        raise pytest.UsageError(
+            f"--scenario-wall-limit {limit:g} is no limit; write seconds of at least 1, such as 600"
         )
     if records is not None:
         from app.output import findings
@@ -143,25 +152,31 @@ class ScenarioCase(_Item):
 
     def runtest(self) -> None:
         """Run it in a process of its own. Raises `Failed` with the explanation when it did not come out as expected."""
+        from app.batch import Run, result_of
         from app.processes import run_each
 
         folder = self._folder()
         self.user_properties += [("seed", self.scenario.file.seed), ("record", str(folder))]
-        with closing(run_each([partial(_run, self.scenario, folder)], 1)) as ended:
+        limit = self.config.getoption("--scenario-wall-limit") or math.inf
+        with closing(run_each([partial(_run, self.scenario, folder)], 1, limit)) as ended:
             [done] = ended
+        result = result_of(Run(self.scenario, self.scenario.file.seed, folder), done)
         if done.value is None:
-            raise Failed(f"{done.error}\n  record  {folder}")
-        if not done.value.succeeded:
+            page = _explained(folder) if (folder / "events.jsonl").exists() else f"record  {folder}"
+            raise Failed(f"{done.error}\n{page}")
+        if not result.succeeded:
             raise Failed(_explained(folder))
 
     def _folder(self) -> Path:
-        """A folder for the record that holds none."""
-        name = re.sub(r"[^\w=.,-]+", "_", f"{self.path.name.removesuffix(SCENARIO)}-{self.name}")[:120] + "-"
+        """A new folder for the record."""
+        from app.output import new_folder
+
         kept: Path | None = self.config.getoption("--scenario-records")
+        name = f"{self.path.name.removesuffix(SCENARIO)}-{self.name}"
         if kept is None:
             factory: pytest.TempPathFactory = self.config._tmp_path_factory  # type: ignore[attr-defined]
-            return factory.mktemp(name)
-        return next(folder for n in count() if not (folder := kept.absolute() / f"{name}{n}").exists())
+            return factory.mktemp(re.sub(r"[^\w=.,-]+", "_", name)[:120] + "-")
+        return new_folder(name, kept.absolute())
 
 
 def _run(scenario: Scenario, folder: Path) -> Result:

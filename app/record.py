@@ -1,6 +1,7 @@
 """A run's record: a folder of result.json, events.jsonl, ticks.jsonl and what was run; see app/RECORD.md."""
 
 import dataclasses
+import errno
 import io
 import json
 import logging
@@ -12,16 +13,20 @@ from collections.abc import Callable, Mapping, MutableMapping
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Literal, Self, TextIO
+from typing import Any, BinaryIO, Literal, Self, TextIO
 
 import structlog
 
 from app import output
+from app.findings import Findings, real
+from app.interrupts import WallLimit, held_back
 from interfaces.cause import Cause, CauseCode
 
-Outcome = Literal["stowed", "safe_stop", "time_limit", "interrupted", "internal_error"]
+Outcome = Literal["stowed", "safe_stop", "time_limit", "wall_limit", "interrupted", "internal_error"]
 NodeStatus = Literal["RUNNING", "SUCCESS", "FAILURE", "INVALID"]
 SCHEMA = 1  # of result.json; fields may be added to it, none changes its meaning
+MOST_AT_WORK = 1 << 16  # bytes of it
+AT_WORK = "at_work.json"  # while a run goes on: which leaf is in the middle of a tick
 
 _PACKAGES = (
     "regrasp",
@@ -184,7 +189,9 @@ def write_whole(path: Path, content: str | bytes) -> None:
     if path.exists() and not path.is_file():
         path.write_bytes(data)
         return
-    path = path.resolve()
+    path = real(path)
+    if path.is_symlink():  # it leads back to itself
+        raise OSError(errno.ELOOP, os.strerror(errno.ELOOP), str(path))
     part = path.with_name(path.name + ".part")
     try:
         with part.open("wb") as file:
@@ -194,7 +201,7 @@ def write_whole(path: Path, content: str | bytes) -> None:
             file.flush()
             os.fsync(file.fileno())
         part.replace(path)
-    except OSError:
+    except BaseException:
         part.unlink(missing_ok=True)
         raise
 
@@ -217,7 +224,7 @@ class Record:
         """Create the folder, with `copies` (name to text) of what is run.
 
         Raises:
-            FileExistsError: it holds a run already.
+            app.findings.Findings: it holds a run already, or cannot be written.
             OSError: it cannot be created or written.
         """
         self.folder = folder
@@ -227,26 +234,47 @@ class Record:
         self._case = case
         self.events: TextIO = io.StringIO()
         self.ticks: TextIO = io.StringIO()
+        self._at_work: BinaryIO = io.BytesIO()
         if folder is not None:
             folder.mkdir(parents=True, exist_ok=True)
-            if taken := output.taken(folder):
-                raise FileExistsError(f"{folder} holds a run already ({', '.join(taken)})")
-            self.events = (folder / "events.jsonl").open("x", encoding="utf-8", newline="\n")
+            if found := output.findings(folder):
+                raise Findings(found)
+            try:
+                self.events = (folder / "events.jsonl").open("x", encoding="utf-8", newline="\n")
+            except FileExistsError:  # another run took the folder this very moment
+                raise Findings(output.holds_a_run(folder)) from None
+            self._at_work = (folder / AT_WORK).open("wb", buffering=0)
             self.ticks = (folder / "ticks.jsonl").open("x", encoding="utf-8", newline="\n")
             for name, text in (copies or {}).items():
                 (folder / name).write_text(text, encoding="utf-8", newline="\n")
 
-    def logger(self, now: Callable[[], float]) -> Any:
-        """A structlog logger into events.jsonl; each line begins with `t`, the simulated second by `now`."""
+    def logger(self, now: Callable[[], float], on_event: Callable[[Mapping[str, Any]], None] | None = None) -> Any:
+        """A structlog logger into events.jsonl; each line begins with `t`, the simulated second by `now`.
+
+        `on_event` is called with each event's values, too.
+        """
 
         def stamp(_logger: Any, level: str, event: MutableMapping[str, Any]) -> dict[str, Any]:
-            return {"t": round(now(), 6), "level": level, "event": event.pop("event", ""), **plain(dict(event))}
+            values = {"t": round(now(), 6), "level": level, "event": event.pop("event", ""), **plain(dict(event))}
+            if on_event is not None:
+                on_event(values)
+            return values
 
         return structlog.wrap_logger(
             structlog.WriteLogger(self.events),
             processors=[structlog.processors.format_exc_info, stamp, structlog.processors.JSONRenderer()],
             wrapper_class=structlog.make_filtering_bound_logger(logging.DEBUG),
         )
+
+    def at_work(self, t: float, node: str) -> None:
+        """Note that a leaf begins its tick at second `t`, or, with "" for its path, that the tick has ended.
+
+        Should the process die or hang in the middle of it, this is all that names the leaf.
+        """
+        line = json.dumps({"t": round(t, 6), "node": node}).encode() + b"\n"
+        self._at_work.seek(0)
+        self._at_work.write(line)
+        self._at_work.truncate()
 
     def finish(self, result: Result) -> None:
         """The run's result, written when the record closes; a later one replaces it."""
@@ -258,20 +286,22 @@ class Record:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        try:
+        with held_back():
             if self.result is None:
                 self.result = self._cut_short(error)
             if self.folder is not None:
-                write_whole(self.folder / "result.json", self.result.to_json())
-        finally:
-            if self.folder is not None:
                 self.events.close()
                 self.ticks.close()
+                self._at_work.close()
+                write_whole(self.folder / "result.json", self.result.to_json())
+                (self.folder / AT_WORK).unlink(missing_ok=True)
 
     def _cut_short(self, error: BaseException | None) -> Result:
         if isinstance(error, KeyboardInterrupt):
-            cause = Cause(CauseCode.INTERRUPTED, "stopped from outside before the run could end")
-            return Result(self._scenario, self._seed, "interrupted", succeeded=False, case=self._case, cause=cause)
+            code = CauseCode.WALL_LIMIT if isinstance(error, WallLimit) else CauseCode.INTERRUPTED
+            cause = Cause(code, "stopped from outside before the run could end")
+            outcome: Outcome = "wall_limit" if isinstance(error, WallLimit) else "interrupted"
+            return Result(self._scenario, self._seed, outcome, succeeded=False, case=self._case, cause=cause)
         message = f"{type(error).__name__}: {error}" if error else "the run ended without a result"
         cause = Cause(CauseCode.INTERNAL_ERROR, message)
         trace = "".join(traceback.format_exception(error)) if error else None
@@ -284,3 +314,27 @@ class Record:
             cause=cause,
             traceback=trace,
         )
+
+
+def finish_killed(folder: Path, run: Result) -> Result:
+    """The result `run` of a run whose process is gone, with the leaf that was at work; written where there is none.
+
+    Nothing is written where the folder holds no run.
+    """
+    if run.cause is not None and (leaf := leaf_at_work(folder)):
+        run = dataclasses.replace(run, cause=dataclasses.replace(run.cause, node=leaf[1]), sim_seconds=leaf[0])
+    if (folder / "events.jsonl").is_file() and not os.path.lexists(folder / "result.json"):
+        with held_back():
+            write_whole(folder / "result.json", run.to_json())
+            (folder / AT_WORK).unlink(missing_ok=True)
+    return run
+
+
+def leaf_at_work(folder: Path) -> tuple[float, str] | None:
+    """The second (simulated) and the path of the leaf in whose tick a run was killed, or hangs; None: in none."""
+    try:
+        noted = json.loads((folder / AT_WORK).read_bytes()[:MOST_AT_WORK])
+        t, node = float(noted["t"]), noted["node"]
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+    return (t, node) if isinstance(node, str) and node and math.isfinite(t) else None

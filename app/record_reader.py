@@ -13,7 +13,7 @@ from pydantic_core import from_json
 
 from app import output
 from app.findings import Finding, Findings, shown
-from app.record import SCHEMA, NodeStatus, Result
+from app.record import SCHEMA, NodeStatus, Result, leaf_at_work
 from trees.wiring import MAX_TREE_DEPTH
 
 MAX_RESULT, MAX_LINES = 16 << 20, 64 << 20  # bytes of result.json, of each of the others: hours of a run
@@ -61,6 +61,13 @@ class RunRecord:
     events: tuple[Event, ...]
     ticks: tuple[Tick, ...]
     remarks: tuple[str, ...] = ()
+    at_work: tuple[float, str] | None = None  # second and path of the leaf in whose tick a run was killed, or is now
+
+    @property
+    def end(self) -> float:
+        """The last second that the record knows of."""
+        lines = (self.ticks[-1:], self.events[-1:])
+        return max([line.t for last in lines for line in last] + [self.at_work[0] if self.at_work else 0.0])
 
     @property
     def begin(self) -> dict[str, Any]:
@@ -92,7 +99,8 @@ def read_record(folder: Path) -> RunRecord:
         remarks.append(f"there is no result.json: {why}")
     if found:
         raise Findings(found)
-    return RunRecord(folder, result, tuple(events), tuple(ticks), tuple(remarks))
+    at_work = None if result else leaf_at_work(folder)
+    return RunRecord(folder, result, tuple(events), tuple(ticks), tuple(remarks), at_work)
 
 
 @cache

@@ -56,7 +56,8 @@ class Replay:
             raise Findings(
                 [Finding(shown(record.folder), 0, "nothing happened in this run; there is nothing to replay")]
             )
-        self.frames = [frames[t] for t in sorted(changed) if t <= max(end, min(changed)) + SLACK]
+        last_shown = max(end, min(changed)) + SLACK
+        self.frames = [frames[t] for t in sorted(changed) if t <= last_shown]
         self.rows = _rows(record)
         self._times = [frame.t for frame in self.frames]
         self._history: dict[str, tuple[list[int], list[str]]] = {}

@@ -5,7 +5,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Literal
 
-from app.findings import Finding, Findings, nearest, shown
+from app.findings import Finding, Findings, nearest, shown, why_no_file
 from interfaces.quote import cut, quoted
 
 Kind = Literal["scenario", "cell", "tree"]
@@ -46,8 +46,7 @@ def read_text(path: Path, where: tuple[str, int] | None = None) -> str:
     """The text of a file that a person wrote. Raises `Findings` when there is no such file or it is no text."""
     source, line = where or (shown(path), 0)
     if not os.path.isfile(path):
-        wrong = "is a folder" if os.path.isdir(path) else "does not exist" if not os.path.exists(path) else "is no file"
-        raise Findings([Finding(source, line, f"{quoted(shown(path))} {wrong}; name a file")])
+        raise Findings([Finding(source, line, f"{quoted(shown(path))} {why_no_file(path)}; name a file")])
     try:
         with path.open("rb") as stream:
             data = stream.read(MAX_BYTES + 1)

@@ -1,15 +1,19 @@
 """Every case of a scenario, and what to tell of them."""
 
-import os
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from app import output
 from app.batch import Episode, Row, Run, run_all
-from app.findings import Finding, Findings, printable, shown
+from app.findings import Finding, Findings, printable
 from app.junit import write_junit
 from app.scenario_file import cases
 from app.table import print_table
+
+if TYPE_CHECKING:
+    from sim.renderer import RendererName
 
 
 def run_every(
@@ -21,39 +25,40 @@ def run_every(
     video: bool = False,
     quiet: bool = False,
     wrong: Sequence[Finding] = (),
+    *,
+    renderer: "RendererName" = "auto",
+    wall_limit: float = math.inf,
     episode: Episode | None = None,
 ) -> int:
     """Run every case, each in its own process, its record in a folder of `out` with its name.
 
     Progress goes to stderr, a table to stdout, JUnit XML to `junit`. Returns the exit code: 0 when all came out as
-    expected, 1 when not, 130 after Ctrl-C, which keeps what was done. `episode` stands in for `run_episode` in tests.
+    expected, 1 when not, 130 after Ctrl-C, which keeps what was done. A run that takes longer than `wall_limit` s of
+    wall time is stopped. `episode` stands in for `run_episode` in tests.
 
     Raises:
         app.findings.Findings: bad input; `wrong` holds what the caller found.
         OSError: the disk is full or the like.
     """
-    found = [*wrong, *(_unwritable(junit) if junit else [])]
+    found = [*wrong, *(output.unwritable_file(junit) if junit else [])]
     try:
         loaded = cases(scenario, overrides)
     except Findings as error:
         raise Findings([*found, *error.items]) from None
-    into = out or output.free_folder(loaded[0].name, "all")
-    runs = [Run(case, case.file.seed, into / output.folder_name(case.case)) for case in loaded]
-    found += [f for run in runs if run.folder for f in output.findings(run.folder)]
+    folders = [output.folder_name(case.case) for case in loaded]
+    found += [f for name in folders for f in output.findings(out / name)] if out else output.unwritable(output.RUNS)
     if found:
         raise Findings(found)
-    rows, interrupted = run_all(runs, jobs, video=video, quiet=quiet, episode=episode)
+    into = out or output.new_folder(f"{loaded[0].name}-all")
+    runs = [Run(case, case.file.seed, into / name) for case, name in zip(loaded, folders, strict=True)]
+    rows, interrupted = run_all(
+        runs, jobs, video=video, quiet=quiet, renderer=renderer, wall_limit=wall_limit, episode=episode
+    )
     if junit:
         junit.parent.mkdir(parents=True, exist_ok=True)
         write_junit(junit, loaded[0].name, runs, rows)
     _tell(loaded[0].name, runs, rows, into)
     return 130 if interrupted else 0 if all(row.succeeded for row in rows.values()) else 1
-
-
-def _unwritable(junit: Path) -> list[Finding]:
-    if os.path.isdir(junit):
-        return [Finding(shown(junit), 0, "is a folder; name a file for --junit")]
-    return output.unwritable(junit.parent)
 
 
 def _tell(name: str, runs: Sequence[Run], rows: Mapping[int, Row], into: Path) -> None:

@@ -1,16 +1,17 @@
 """`regrasp study`: many episodes or scenes, counted."""
 
+import math
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import typer
 
 from app import output
 from app.findings import Finding, Findings, nearest, shown
-from app.options import Sets, parse_seeds
-from app.progress import late_imports
+from app.interrupts import late_imports
+from app.options import Renderer, Sets, WallLimit, parse_seeds
 from interfaces.quote import quoted
 
 app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Run many episodes or scenes and count.")
@@ -22,6 +23,8 @@ def demo(
     jobs: Annotated[int, typer.Option(min=1, help="Episodes side by side.")] = os.cpu_count() or 1,
     out: Annotated[Path | None, typer.Option(help="Folder of demo.json and the runs' records.")] = None,
     sets: Sets = None,
+    renderer: Renderer = "auto",
+    wall_limit: WallLimit = None,
 ) -> None:
     """The whole demonstration: no, short and tall obstacle, each without and with gravity, over many seeds.
 
@@ -35,11 +38,11 @@ def demo(
     with late_imports():
         from app.study import run_demo
 
-    raise typer.Exit(run_demo(chosen, jobs, out, sets or []))
+    limit = math.inf if wall_limit is None else wall_limit
+    raise typer.Exit(run_demo(chosen, jobs, out, sets or [], renderer=renderer, wall_limit=limit))
 
 
 Techniques = Annotated[str | None, typer.Option(metavar="A,B", help="Techniques to try; default all.")]
-Renderer = Annotated[Literal["auto", "moderngl", "tiny"], typer.Option(help="What draws the pictures.")]
 CellName = Annotated[
     str | None,
     typer.Option("--cell", help="A cell's name, or a .yaml file; for fiducial thesis_tags, else thesis."),

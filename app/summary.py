@@ -1,9 +1,9 @@
 """What came out of a run, in lines for a person."""
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from app.vary import DEFAULT
 
@@ -63,6 +63,12 @@ def slip_lines(result: "Result") -> Iterator[str]:
             else "not noticed"
         )
         yield f"lost at {slip.released_at:.2f} s, {seen}"
+
+
+def in_words(event: str, values: Mapping[str, Any]) -> str:
+    """An event's name, and its values as name=value."""
+    told = ", ".join(f"{name}={value}" for name, value in values.items())
+    return f"{event}: {told}" if told else event
 
 
 def marks() -> tuple[str, str]:

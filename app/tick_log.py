@@ -1,7 +1,7 @@
 """The tick log: each change of a node's status, and each end that is like the one before, as one JSON line."""
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import TextIO
 
 import py_trees
@@ -53,6 +53,28 @@ class TickLog(py_trees.visitors.VisitorBase):
         if lines:
             self._stream.write("".join(lines))
             self._stream.flush()
+
+
+def note_leaf_at_work(tree: py_trees.trees.BehaviourTree, note: Callable[[str], None]) -> None:
+    """Have `note` called with the path of each leaf before each of its ticks, and with "" after each tick of the tree.
+
+    py_trees calls visitors after a node's tick: of one that never returns they hear nothing.
+    """
+    paths = node_paths(tree.root)
+    for node in in_tree_order(tree.root):
+        if not node.children:
+            node.tick = _noting(node.tick, paths[node.id], note)
+    tree.add_post_tick_handler(lambda _tree: note(""))
+
+
+def _noting(
+    tick: Callable[[], Iterator[py_trees.behaviour.Behaviour]], path: str, note: Callable[[str], None]
+) -> Callable[[], Iterator[py_trees.behaviour.Behaviour]]:
+    def noted() -> Iterator[py_trees.behaviour.Behaviour]:
+        note(path)
+        yield from tick()
+
+    return noted
 
 
 def running_leaf(root: py_trees.behaviour.Behaviour) -> py_trees.behaviour.Behaviour | None:

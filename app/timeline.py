@@ -9,6 +9,7 @@ from typing import Any
 
 from app.record import Attempt
 from app.record_reader import Event
+from app.summary import in_words
 from app.tried import Course
 
 Names = tuple[str, ...]  # a path's parts
@@ -128,5 +129,4 @@ def wrapped(text: str, width: int, indent: str = "", further: str = "  ") -> lis
 
 def event_text(event: Event) -> str:
     """An event in words: its name, and its values as name=value."""
-    values = ", ".join(f"{name}={value}" for name, value in event.values.items())
-    return f"{event.event}: {values}" if values else event.event
+    return in_words(event.event, event.values)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from app.findings import Finding, Findings, nearest, shown
-from app.output import FILES
+from app.output import FILES, unwritable_file
 from app.record import write_whole
 from app.record_reader import RunRecord, read_record
 from app.resources import read_text, resolve
@@ -83,9 +83,11 @@ def _wrong_form(form: str, out: Path | None) -> Iterator[Finding]:
 def _wrong_out(out: Path, form: str) -> Iterator[Finding]:
     if not form:
         yield Finding(shown(out), 0, f"the name ends in none of {', '.join(SUFFIXES)}; rename it, or name a --format")
-    if out.is_dir() or not out.absolute().parent.is_dir():
-        wrong = "is a folder" if out.is_dir() else f"there is no folder {quoted(shown(out.absolute().parent))}"
-        yield Finding(shown(out), 0, f"{wrong}; name a file in a folder that exists")
+    if not out.absolute().parent.is_dir():
+        wrong = f"there is no folder {quoted(shown(out.absolute().parent))}; name a file in a folder that exists"
+        yield Finding(shown(out), 0, wrong)
+    else:
+        yield from unwritable_file(out)
 
 
 def _tree_file(request: Request, record: RunRecord | None) -> Path:

@@ -56,7 +56,10 @@ def course(record: RunRecord) -> Course:
 
 def attempts(record: RunRecord) -> Sequence[Attempt]:
     """The attempts of the record's leaves in the order of beginning; RUNNING: at work when the record ends."""
-    return record.result.attempts if record.result else told_by_ticks(_executions(record), record.events)
+    if record.result:
+        return record.result.attempts
+    told = told_by_ticks(_executions(record), record.events)
+    return [replace(one, ended=record.end) if one.status == "RUNNING" else one for one in told]
 
 
 def told_by_ticks(made: Sequence[Execution], events: Iterable[Event]) -> list[Attempt]:

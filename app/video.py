@@ -13,6 +13,8 @@ from imageio_ffmpeg import get_ffmpeg_exe
 from numpy.typing import NDArray
 
 Frame = NDArray[np.uint8]
+# In pieces of a second that play without the end, should ffmpeg be killed; one whole film when it is closed.
+_KEPT = ["-movflags", "+hybrid_fragmented", "-frag_duration", "1000000"]
 
 # Width and height are multiples of 16, as h264 has it. The cameras' 848x480 halved give the right column.
 SIZE = (1280, 544)
@@ -77,7 +79,7 @@ class VideoWriter:
         source = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}", "-r", str(fps), "-i", "-"]
         target = ["-an", "-c:v", "libx264", "-preset", "veryfast", "-crf", "23", "-pix_fmt", "yuv420p"]
         self._ffmpeg = subprocess.Popen(
-            [get_ffmpeg_exe(), "-y", "-v", "error", *source, *target, "-movflags", "+faststart", str(path)],
+            [get_ffmpeg_exe(), "-y", "-v", "error", *source, *target, *_KEPT, str(path)],
             stdin=subprocess.PIPE,
             stdout=subprocess.DEVNULL,
             start_new_session=True,

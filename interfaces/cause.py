@@ -25,6 +25,7 @@ class CauseCode(StrEnum):
     SERVICE_FAILED = "service_failed"
     TOO_MANY_TRIES = "too_many_tries"
     TIME_LIMIT = "time_limit"
+    WALL_LIMIT = "wall_limit"
     INTERRUPTED = "interrupted"
     INTERNAL_ERROR = "internal_error"
 

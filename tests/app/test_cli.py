@@ -1,6 +1,9 @@
+import math
 import os
+import re
 import signal
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -12,7 +15,7 @@ from typer.testing import CliRunner
 from app.cli import app
 from app.findings import Findings
 from app.options import parse_seeds
-from app.output import free_folder
+from app.output import new_folder
 from app.record import Expectation, Result, Slip
 from app.resources import shipped
 from interfaces.cause import Cause, CauseCode
@@ -79,6 +82,7 @@ def test_run_ends_with_a_summary_on_stdout_and_progress_on_stderr(calls: list[Si
     assert ran.stderr.splitlines() == ["    0.0 s  carry", "    3.0 s  look"]
     (call,) = calls
     assert (call.out, call.seed, call.video, call.gui) == (Path("runs/mine-7-1"), 7, True, False)
+    assert (call.renderer, list(Path("runs").iterdir())) == ("auto", [])  # nothing was written: the folder is gone
     assert call.scenario.file.inputs == {"tries": 2}
 
 
@@ -171,9 +175,17 @@ def test_an_output_folder_that_cannot_be_is_a_finding(calls: list[SimpleNamespac
 
 
 def test_each_run_gets_the_next_free_folder(tmp_path: Path) -> None:
-    assert free_folder("mine", 3) == Path("runs/mine-3-1")
-    (tmp_path / "runs" / "mine-3-1").mkdir(parents=True)
-    assert free_folder("mine", 3) == Path("runs/mine-3-2")
+    with ThreadPoolExecutor(8) as pool:  # all at once
+        made = list(pool.map(new_folder, ["mine-3"] * 20))
+    assert {str(folder) for folder in made} == {f"runs/mine-3-{n}" for n in range(1, 21)}
+    assert all(folder.is_dir() for folder in made)
+
+
+def test_a_scenario_s_odd_name_becomes_a_plain_folder(calls: list[SimpleNamespace], scenario: Path) -> None:
+    scenario.rename(scenario.with_name("mine of [today]\n.yaml"))
+    assert invoke("run", "mine of [today]\n.yaml", "--quiet").exit_code == 0
+    [call] = calls
+    assert re.fullmatch(r"runs/mine_of_today_-0-[0-9a-f]{8}-1", str(call.out))
 
 
 def test_lists_name_what_is_shipped() -> None:
@@ -219,14 +231,15 @@ def test_trees_leaves_says_what_a_tree_may_hold() -> None:
 def test_study_demo_hands_on_seeds_jobs_and_overrides(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[Any] = []
 
-    def run_demo(*args: Any) -> int:
-        asked.extend(args)
+    def run_demo(*args: Any, **options: Any) -> int:
+        asked.extend([*args, options])
         return 130
 
     monkeypatch.setattr("app.study.run_demo", run_demo)
     ran = invoke("study", "demo", "--seeds", "2:5", "--jobs", "3", "--out", "study", "--set", "inputs.tries=1")
     assert ran.exit_code == 130
-    assert asked == [range(2, 5), 3, Path("study"), ["inputs.tries=1"]]
+    options = {"renderer": "auto", "wall_limit": math.inf}
+    assert asked == [range(2, 5), 3, Path("study"), ["inputs.tries=1"], options]
 
 
 @pytest.mark.parametrize("text", ["5", "5:", ":5", "5:5", "6:5", "a:b", "-1:3", "1:2:3", ""])

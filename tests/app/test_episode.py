@@ -10,6 +10,7 @@ from py_trees.common import Status
 
 from app.episode import run_episode
 from app.explain import explanation
+from app.findings import Findings
 from app.record import Result
 from app.record_reader import read_record
 from app.scenario_file import Scenario, load_scenario
@@ -267,7 +268,7 @@ def test_a_folder_that_holds_a_run_is_refused_before_anything_moves(
     tmp_path: Path, ends: list[tuple[bool, float]]
 ) -> None:
     (tmp_path / "result.json").write_text("mine")
-    with pytest.raises(FileExistsError):
+    with pytest.raises(Findings, match="holds a run already"):
         run_episode(scenario(tmp_path, '<Done name="done"/>'), tmp_path, seed=0)
     assert ends == []
     assert (tmp_path / "result.json").read_text() == "mine"

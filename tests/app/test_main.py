@@ -38,9 +38,9 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def shell(line: str, stdout: IO[str] | None = None) -> subprocess.CompletedProcess[str]:
-    """Run a line of sh, in which `regrasp` is ours."""
-    text = line.replace("regrasp", f'"{sys.executable}" -m app')
-    return subprocess.run(["sh", "-c", text], stdout=stdout, stderr=subprocess.PIPE, text=True, timeout=120)
+    """Run a line of sh, in which the command `regrasp` is ours."""
+    ours = f'regrasp() {{ "{sys.executable}" -m app "$@"; }}; {line}'
+    return subprocess.run(["sh", "-c", ours], stdout=stdout, stderr=subprocess.PIPE, text=True, timeout=120)
 
 
 @pytest.fixture
@@ -81,8 +81,8 @@ def test_what_is_only_written_at_the_end_finds_no_reader_either(no_reader: IO[st
 
 def test_a_run_that_nobody_watches_ends_as_by_ctrl_c(monkeypatch: pytest.MonkeyPatch, no_reader: IO[str]) -> None:
     monkeypatch.setattr("sys.stderr", no_reader)
-    with shown_progress(quiet=False) as progress, pytest.raises(KeyboardInterrupt):
-        progress(0.0, "carry")
+    with shown_progress(quiet=False) as show, pytest.raises(KeyboardInterrupt):
+        show.tick(0.0, "carry")
 
 
 def test_an_encoding_without_a_sign_shows_a_question_mark() -> None:

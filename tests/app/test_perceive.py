@@ -277,7 +277,7 @@ def test_bad_files_are_findings_that_say_what_would_be_right(small: Path) -> Non
     assert "mm.npy: its middle reading is 800 m" in told
     told = finding("--rgb", "gone.png", "--depth", "gone.npy", "--intrinsics", "k.yaml")
     assert "'gone.png' does not exist; name an image file" in told
-    assert "is no file" in finding("--rgb", ".", "--depth", "depth.png", "--intrinsics", "k.yaml")
+    assert "is a folder" in finding("--rgb", ".", "--depth", "depth.png", "--intrinsics", "k.yaml")
     names = ("b.yaml", "a.yaml", "c.yaml")
     many = [word for name in names for word in (*SMALL[:4], "--intrinsics", name)]
     assert [line.split(":")[0] for line in finding(*many).splitlines()] == sorted(names)  # all at once

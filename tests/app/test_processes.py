@@ -5,8 +5,8 @@ import signal
 
 import pytest
 
+from app.interrupts import late_imports
 from app.processes import run_each
-from app.progress import late_imports
 
 
 def blocked() -> bool:

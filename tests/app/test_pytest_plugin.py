@@ -85,7 +85,7 @@ def test_each_case_has_a_process_and_a_record_folder_of_its_own(suite: pytest.Py
     for _ in range(2):
         run(suite, "--scenario-records", "kept", "-k", "zero").assert_outcomes(passed=1, deselected=1)
     folders = sorted((suite.path / "kept").iterdir())
-    assert [folder.name for folder in folders] == ["cells-gravity=zero-0", "cells-gravity=zero-1"]
+    assert [folder.name for folder in folders] == ["cells-gravity=zero-1", "cells-gravity=zero-1"]
     assert len({(folder / "pid").read_text() for folder in folders} | {str(os.getpid())}) == 3
 
 
@@ -124,7 +124,7 @@ def test_cases_are_shared_out_between_two_workers(suite: pytest.Pytester) -> Non
 def test_ctrl_c_lets_the_run_end_and_leaves_no_process(suite: pytest.Pytester) -> None:
     (suite.path / "conftest.py").write_text(CONFTEST.format("until_stopped"))
     arguments = [sys.executable, "-m", "pytest", *PLUGIN, "-k", "zero", "--scenario-records", "kept"]
-    folder = suite.path / "kept" / "cells-gravity=zero-0"
+    folder = suite.path / "kept" / "cells-gravity=zero-1"
     with subprocess.Popen(arguments, stdout=subprocess.PIPE, text=True, start_new_session=True) as process:
         while not (folder / "started").exists():
             assert process.poll() is None

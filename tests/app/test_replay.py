@@ -17,7 +17,8 @@ from typer.testing import CliRunner
 
 from app.cli import app
 from app.findings import Findings
-from app.record_reader import read_record
+from app.record import NodeStatus
+from app.record_reader import Tick, read_record
 from app.replay import Replay
 from app.replay_screen import View, draw, pressed
 
@@ -257,3 +258,25 @@ def test_a_narrow_and_a_wide_terminal_show_statuses_and_how_to_quit(
     assert b"FAILURE" in type_(b"n", b"q quit")
     type_(b"q", b"\x1b[?1049l")
     assert process.wait(60) == 0
+
+
+def test_a_long_record_takes_a_time_that_grows_with_its_length(folder: Path) -> None:
+    """Comparisons of seconds are counted; they used to grow with the square of the number of ticks."""
+    compared = 0
+
+    class Second(float):
+        def __lt__(self, other: float) -> bool:
+            nonlocal compared
+            compared += 1
+            return float(self) < float(other)
+
+        def __le__(self, other: float) -> bool:
+            nonlocal compared
+            compared += 1
+            return float(self) <= float(other)
+
+    statuses: list[NodeStatus] = ["RUNNING", "SUCCESS"]
+    ticks = tuple(Tick(Second(0.05 * i), "root", statuses[i % 2]) for i in range(2000))
+    long = replace(read_record(folder), ticks=ticks, events=())
+    assert len(Replay(long).frames) == 2000
+    assert compared < 50 * 2000

@@ -25,7 +25,7 @@ def scenario(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return path
 
 
-def episode(scenario: Scenario, out: Path | None, *, seed: int, video: bool) -> Result:
+def episode(scenario: Scenario, out: Path | None, *, seed: int, video: bool, renderer: str) -> Result:
     """Comes out for seed 0, not for 1, dies for 2, is lost with a strange word for 3."""
     if seed == 2:
         os._exit(7)
@@ -49,7 +49,7 @@ def episode(scenario: Scenario, out: Path | None, *, seed: int, video: bool) -> 
     return result
 
 
-def good(*args: Any, seed: int, video: bool) -> Result:
+def good(*args: Any, seed: int, video: bool, renderer: str) -> Result:
     return Result(args[0].name, seed, "stowed", succeeded=True)
 
 
@@ -104,7 +104,7 @@ def test_all_as_expected_exits_0_and_a_set_value_narrows(capfd: pytest.CaptureFi
 
 def test_ctrl_c_keeps_what_was_done_and_tells_what_was_not(tmp_path: Path) -> None:
     runs = [Run(case, case.file.seed, tmp_path / str(i)) for i, case in enumerate(cases("mine.yaml"))]
-    done = row_of(runs[1], Done(1, good(runs[1].scenario, seed=1, video=False), "", 0.0))
+    done = row_of(runs[1], Done(1, good(runs[1].scenario, seed=1, video=False, renderer="auto"), "", 0.0))
     write_junit(tmp_path / "cut.xml", "mine", runs, {1: done})
     [suite] = ET.parse(tmp_path / "cut.xml").getroot()
     assert (suite.attrib["tests"], suite.attrib["skipped"]) == ("4", "3")
@@ -117,8 +117,8 @@ def test_all_that_is_wrong_is_told_before_anything_runs(tmp_path: Path) -> None:
     with pytest.raises(Findings) as raised:
         run_every("mine.yaml", [], 1, Path("out"), Path("out"), episode=good)
     assert str(raised.value).splitlines() == [
-        "out: is a folder; name a file for --junit",
-        "out/seed=1: already holds result.json; name another folder for the run",
+        "out: is a folder; name a file",
+        "out/seed=1: holds a run already (result.json); name another folder",
     ]
 
 

@@ -51,7 +51,7 @@ def changed(scenario: Path, old: str, new: str) -> None:
 def test_a_scenario_brings_its_cell_and_tree(scenario: Path) -> None:
     loaded = load_scenario("mine.yaml")
     assert (loaded.name, loaded.tree) == ("mine", Path("tree.xml"))
-    assert loaded.file.obstacles[0].position.zero == (0.30, 0.14, 0.16)
+    assert loaded.file.obstacles[0].position_in("zero") == (0.30, 0.14, 0.16)
     assert loaded.file.faults[0].when.carried == (0.3, 0.8)
     assert loaded.cell.known.plugged_into == "back_4"
 

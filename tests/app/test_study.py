@@ -15,7 +15,7 @@ from app.study import run_demo, wilson
 from interfaces.cause import Cause, CauseCode
 
 
-def episode(scenario: Scenario, out: Path | None, *, seed: int, video: bool) -> Result:
+def episode(scenario: Scenario, out: Path | None, *, seed: int, video: bool, renderer: str) -> Result:
     """Succeeds but for the tall obstacle's seed 1, and dies, raises there in other ways."""
     name, gravity = scenario.name, scenario.file.gravity
     if (name, gravity, seed) == ("no_obstacle", "earth", 0):
@@ -43,7 +43,7 @@ def episode(scenario: Scenario, out: Path | None, *, seed: int, video: bool) -> 
 
 
 def test_a_study_goes_on_to_its_end_and_counts_every_run(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    assert run_demo(range(2), 2, tmp_path, ["inputs.tries=2"], episode) == 0
+    assert run_demo(range(2), 2, tmp_path, ["inputs.tries=2"], episode=episode) == 0
     demo = json.loads((tmp_path / "demo.json").read_text())
     assert (demo["runs"], demo["succeeded"], demo["seeds"]) == (12, 8, [0, 1])
     rows = {(r["scenario"], r["gravity"], r["seed"]): r for r in demo["rows"]}
@@ -78,7 +78,7 @@ def test_a_folder_with_a_study_is_refused(tmp_path: Path, capsys: pytest.Capture
     assert "demo.json" in capsys.readouterr().err
 
 
-def slow_after_two(scenario: Scenario, out: Path | None, *, seed: int, video: bool) -> Result:
+def slow_after_two(scenario: Scenario, out: Path | None, *, seed: int, video: bool, renderer: str) -> Result:
     """The third run waits for a signal that only the study can bring."""
     if seed == 2:
         assert out is not None

@@ -1,0 +1,183 @@
+"""`regrasp run`."""
+
+import math
+import os
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from app import output
+from app.findings import Finding, Findings, printable, shown
+from app.interrupts import late_imports
+from app.options import LogLevel, Renderer, ScenarioName, Seed, Sets, WallLimit
+from app.progress import shown_progress
+from app.run_every import run_every
+from app.scenario_file import Scenario, cases, load_scenario
+from app.summary import summary
+
+if TYPE_CHECKING:
+    from app.record import Result
+
+EXIT_UNMET, EXIT_INTERRUPTED = 1, 130
+
+
+def add_to(app: typer.Typer) -> None:
+    """Make the command one of `app`."""
+    app.command("run")(run)
+
+
+def run(
+    scenario: ScenarioName,
+    case: Annotated[
+        str | None, typer.Option(metavar="NAME", help="The case to run; default that of the first values.")
+    ] = None,
+    every: Annotated[bool, typer.Option("--all", help="Run every case, each in a process of its own.")] = False,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, help="With --all: cases side by side; default one a processor.")
+    ] = None,
+    seed: Seed = None,
+    sets: Sets = None,
+    out: Annotated[
+        Path | None, typer.Option(help="The record's folder, with --all that of all records; default in runs/.")
+    ] = None,
+    junit: Annotated[Path | None, typer.Option(metavar="FILE", help="With --all: write JUnit XML, too.")] = None,
+    video: Annotated[bool, typer.Option("--video", help="Film the run into the record.")] = False,
+    renderer: Renderer = "auto",
+    wall_limit: WallLimit = None,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Check everything, say what would run, and run nothing.")
+    ] = False,
+    gui: Annotated[bool, typer.Option("--gui", help="Show PyBullet's window.")] = False,
+    log_level: LogLevel = None,
+    quiet: Annotated[bool, typer.Option("--quiet", help="No progress; only the summary.")] = False,
+) -> None:
+    """Run a scenario and leave a record of it.
+
+    \b
+    Examples:
+      regrasp run short_obstacle --video
+      regrasp run tall_obstacle --seed 7 --case gravity=earth --out runs/tall-7
+      regrasp run my/scenario.yaml --set obstacles.0.size=[0.08,0.12,0.3] --set cell.hidden.errors.arm_tool=0
+      regrasp run short_obstacle --all --set 'vary.seed="0:5"' --jobs 2 --junit short.xml
+
+    \b
+    Exit code: 0 all that the scenario expects came out, 1 something did not, 2 bad input, 130 Ctrl-C.
+    """
+    overrides = [*(sets or []), *([] if seed is None else [f"seed={seed}"])]
+    wrong = [] if not gui or _display() else [_NO_DISPLAY]
+    if every:
+        wrong += _given("is for a single case; leave --all out", case=case, gui=gui, log_level=log_level)
+        if dry_run:
+            _tell(_checked(partial(cases, scenario, overrides), wrong, out), out)
+            return
+        jobs, limit = jobs or os.cpu_count() or 1, wall_limit or math.inf
+        raise typer.Exit(
+            run_every(scenario, overrides, jobs, out, junit, video, quiet, wrong, renderer=renderer, wall_limit=limit)
+        )
+    wrong += _given("is for many cases; write --all, too", jobs=jobs, junit=junit)
+    [loaded] = _checked(lambda: [load_scenario(scenario, overrides, case)], wrong, out)
+    if dry_run:
+        _tell([loaded], out)
+        return
+    folder = out or output.new_folder(f"{loaded.name}-{loaded.file.seed}")
+    settings = _Settings(video, renderer, gui, quiet, log_level)
+    try:
+        result = (
+            _run(loaded, folder, settings) if wall_limit is None else _watched(loaded, folder, settings, wall_limit)
+        )
+    finally:
+        if out is None:
+            output.leave_if_empty(folder)
+    typer.echo(summary(result, folder))
+    raise typer.Exit(exit_code(result))
+
+
+@dataclass(frozen=True)
+class _Settings:
+    """How a run is drawn and shown."""
+
+    video: bool
+    renderer: Renderer
+    gui: bool
+    quiet: bool
+    log_level: LogLevel
+
+
+def _checked(load: Callable[[], list[Scenario]], wrong: list[Finding], out: Path | None) -> list[Scenario]:
+    """The scenarios, or the findings of all that is wrong with them and with the options."""
+    wrong += output.unwritable(output.RUNS) if out is None else output.findings(out)
+    try:
+        loaded = load()
+    except Findings as error:
+        raise Findings([*wrong, *error.items]) from None
+    if wrong:
+        raise Findings(wrong)
+    return loaded
+
+
+def _run(scenario: Scenario, folder: Path, settings: _Settings) -> "Result":
+    """Run in this process, with progress on stderr."""
+    with late_imports():
+        from app.episode import run_episode  # brings the planner, the compiler and the physics: seconds
+
+    with shown_progress(settings.quiet, settings.log_level) as show:
+        return run_episode(
+            scenario,
+            folder,
+            seed=scenario.file.seed,
+            video=settings.video,
+            gui=settings.gui,
+            renderer=settings.renderer,
+            progress=show.tick,
+            on_event=show.event,
+        )
+
+
+def _watched(scenario: Scenario, folder: Path, settings: _Settings, wall_limit: float) -> "Result":
+    """Run in a process of its own, which is stopped after `wall_limit` seconds."""
+    from app.batch import Run, result_of
+    from app.processes import run_each
+    from app.record_reader import read_record
+
+    try:
+        [done] = run_each([partial(_run, scenario, folder, settings)], 1, wall_limit)
+    except KeyboardInterrupt:
+        if (kept := read_record(folder).result) is None:
+            raise
+        return kept
+    return result_of(Run(scenario, scenario.file.seed, folder), done)
+
+
+def _tell(loaded: list[Scenario], out: Path | None) -> None:
+    """What a dry run says."""
+    first = loaded[0]
+    typer.echo(f"{shown(first.path)}: nothing wrong; tree {shown(first.tree)}, cell {first.file.cell}")
+    for scenario in loaded:
+        typer.echo(f"  would run {printable(scenario.title)}, seed {scenario.file.seed}")
+    typer.echo(f"  record{'s' if len(loaded) > 1 else ''} in {out or 'a new folder of runs/'}")
+
+
+def _given(message: str, **options: object) -> list[Finding]:
+    """A finding for each of these options that is given."""
+    return [Finding(f"--{name.replace('_', '-')}", 0, message) for name, value in options.items() if value]
+
+
+_NO_DISPLAY = Finding(
+    "--gui", 0, "there is no display here (DISPLAY is not set); run without it, and film with --video"
+)
+
+
+def _display() -> bool:
+    return sys.platform != "linux" or bool(os.environ.get("DISPLAY"))
+
+
+def exit_code(result: "Result") -> int:
+    """0 when all that was expected came out, 130 after Ctrl-C, else 1."""
+    if result.outcome == "interrupted":
+        return EXIT_INTERRUPTED
+    return 0 if result.succeeded else EXIT_UNMET
