@@ -4,7 +4,7 @@ import io
 import os
 import sys
 
-from app.interrupts import listen
+from app.interrupts import stoppable
 
 # What a shell reports of cat or git when the reader of their pipe has gone. Not 0, for not all was told; not 1, which
 # says that a run did not come out. SIGPIPE itself stays ignored: it would kill us, too, when a child process dies.
@@ -14,7 +14,11 @@ EXIT_NO_READER = 141
 def main() -> None:
     """Run the command line; SIGTERM and SIGHUP end it as Ctrl-C does, with the record kept."""
     _open_streams()
-    listen()
+    with stoppable():
+        _run()
+
+
+def _run() -> None:
     try:
         try:
             from app.cli import app  # takes a moment, in which Ctrl-C may come

@@ -1,6 +1,7 @@
 """Ctrl-C, SIGTERM, SIGHUP and the wall limit: each ends a run by a KeyboardInterrupt, and its record is kept."""
 
 import signal
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -32,17 +33,30 @@ class _Requests:
         return True
 
 
-def listen() -> None:
-    """Take SIGTERM and SIGHUP as Ctrl-C from now on; SIGHUP only where it was not ignored, as by nohup."""
-    requests = _Requests()
+_program: _Requests | None = None  # those of a `stoppable` program
+
+
+@contextmanager
+def stoppable() -> Iterator[None]:
+    """For a whole program: Ctrl-C, SIGTERM and SIGHUP (if not ignored, as by nohup) raise KeyboardInterrupt once each.
+
+    Afterwards they are ignored: what was to be kept is kept, and the exit code is to be that of the program.
+    """
+    global _program
+    requests = _program = _Requests()
 
     def stop(_number: int, _frame: FrameType | None) -> None:
         if requests.new():
             raise KeyboardInterrupt
 
-    signal.signal(signal.SIGTERM, stop)
-    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
-        signal.signal(signal.SIGHUP, stop)
+    heard = [number for number in STOPPING if signal.getsignal(number) is not signal.SIG_IGN]
+    for number in heard:
+        signal.signal(number, stop)
+    try:
+        yield
+    finally:
+        for number in heard:
+            signal.signal(number, signal.SIG_IGN)
 
 
 def listen_to_parent() -> None:
@@ -60,47 +74,42 @@ def listen_to_parent() -> None:
 
 @contextmanager
 def held_back() -> Iterator[None]:
-    """Signals that stop a run wait until the end of it: a record is written in one piece."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {*STOPPING, WALL_LIMIT_SIGNAL})
-    try:
+    """Signals that stop a run come at the end of it: in the middle a record would be torn.
+
+    They are noted by handlers. To block them would not do: another thread, as libraries start them, would take them.
+    """
+    if threading.current_thread() is not threading.main_thread():  # others are never interrupted
         yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-@contextmanager
-def late_imports() -> Iterator[None]:
-    """Signals that stop us wait for the end of imports: in their middle libraries in C++ swallow them, or die of it."""
-    asked = False
-
-    def note(_number: int, _frame: FrameType | None) -> None:
-        nonlocal asked
-        asked = True
-
-    before = {number: signal.getsignal(number) for number in STOPPING}
+        return
+    came: list[int] = []
+    before = {number: signal.getsignal(number) for number in (*STOPPING, WALL_LIMIT_SIGNAL)}
     for number, handler in before.items():
         if handler is not signal.SIG_IGN:
-            signal.signal(number, note)
+            signal.signal(number, lambda number, _frame: came.append(number))
     try:
         yield
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
-    if asked:
-        raise KeyboardInterrupt
+    for number in came[:1]:
+        signal.raise_signal(number)
+
+
+late_imports = held_back  # in the middle of their import libraries in C++ swallow signals, or die of them
 
 
 @contextmanager
 def interruptible() -> Iterator[Callable[[], None]]:
     """A check that raises KeyboardInterrupt if Ctrl-C came since; the second Ctrl-C does so where it strikes."""
-    requests = _Requests()
+    requests = _program or _Requests()
+    before_us = requests.count
 
     def note(_number: int, _frame: FrameType | None) -> None:
-        if requests.new() and requests.count > 1:
+        if requests.new() and requests.count > before_us + 1:
             raise KeyboardInterrupt
 
     def check() -> None:
-        if requests.count:
+        if requests.count > before_us:
             raise KeyboardInterrupt
 
     before = signal.signal(signal.SIGINT, note)

@@ -85,7 +85,7 @@ def test_each_case_has_a_process_and_a_record_folder_of_its_own(suite: pytest.Py
     for _ in range(2):
         run(suite, "--scenario-records", "kept", "-k", "zero").assert_outcomes(passed=1, deselected=1)
     folders = sorted((suite.path / "kept").iterdir())
-    assert [folder.name for folder in folders] == ["cells-gravity=zero-1", "cells-gravity=zero-1"]
+    assert [folder.name for folder in folders] == ["cells-gravity=zero-1", "cells-gravity=zero-2"]
     assert len({(folder / "pid").read_text() for folder in folders} | {str(os.getpid())}) == 3
 
 

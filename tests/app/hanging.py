@@ -1,0 +1,50 @@
+"""`python hanging.py ARGUMENTS...`: the command line with leaves that hang, in this process and in its children."""
+
+import signal
+import time
+from typing import Any, ClassVar
+
+from py_trees.common import Status
+
+import behaviors
+from behaviors.leaf import Leaf
+
+
+class Hangs(Leaf):
+    """Never comes back from its first tick; with `deaf` no signal reaches it, as in a library's own loop."""
+
+    INPUT_PORTS: ClassVar[dict[str, Any]] = {}
+    OUTPUT_PORTS: ClassVar[dict[str, Any]] = {}
+    DEAF: ClassVar[bool] = False
+
+    def work(self) -> Status:
+        """See the class."""
+        if self.DEAF:
+            signal.pthread_sigmask(signal.SIG_BLOCK, signal.valid_signals())
+        while True:
+            time.sleep(0.01)
+
+
+class HangsDeaf(Hangs):
+    """See `Hangs`."""
+
+    DEAF = True
+
+
+class Goes(Leaf):
+    """Goes on for ever."""
+
+    INPUT_PORTS: ClassVar[dict[str, Any]] = {}
+    OUTPUT_PORTS: ClassVar[dict[str, Any]] = {}
+
+    def work(self) -> Status:
+        """See the class."""
+        return Status.RUNNING
+
+
+behaviors.LEAVES = {"Hangs": Hangs, "HangsDeaf": HangsDeaf, "Goes": Goes}
+
+if __name__ == "__main__":
+    from app.__main__ import main
+
+    main()
