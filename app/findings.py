@@ -8,7 +8,7 @@ from pathlib import Path
 
 from interfaces.quote import MOST, cut, quoted
 
-MOST_LISTED = 50  # known names after an unknown one
+MOST_LISTED = 12  # known names after an unknown one
 
 
 @dataclass(frozen=True, order=True)
@@ -46,8 +46,8 @@ def nearest(name: str, names: Iterable[str], what: str = "there are") -> str:
     known = sorted(names)
     if close := closest(name, known):
         return f"did you mean {quoted(close)}?"
-    more = ["..."] if known[MOST_LISTED:] else []
-    return f"{what} {', '.join([*map(cut, known[:MOST_LISTED]), *more])}" if known else "there are none"
+    more = f" and {len(known) - MOST_LISTED} more" if known[MOST_LISTED:] else ""
+    return f"{what} {', '.join(map(cut, known[:MOST_LISTED]))}{more}" if known else "there are none"
 
 
 def closest(name: str, names: Iterable[str]) -> str | None:

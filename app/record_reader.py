@@ -162,7 +162,7 @@ def _result(path: Path, found: list[Finding]) -> Result | None:
         result = _adapter(Result).validate_python(value)
         for number, attempt in enumerate(result.attempts):
             if attempt.path.count("/") > MAX_TREE_DEPTH:
-                raise ValueError(f"attempts.{number}.path: {TOO_DEEP}; app/RECORD.md says what belongs there")
+                raise ValueError(f"attempts.{number}.path: {TOO_DEEP}; a run writes shorter ones")
         return result
     except ValueError as error:
         at = re.search(r" at line (\d+) column", str(error))
@@ -205,4 +205,4 @@ def _sentence(error: ValueError) -> str:
         return str(error)
     first = error.errors(include_url=False, include_input=False)[0]
     where = ".".join(str(step) for step in first["loc"])
-    return f"{where}: {first['msg']}; app/RECORD.md says what belongs there"
+    return f"{where}: {first['msg']}; a run writes it otherwise, so the file was changed"

@@ -5,11 +5,12 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Literal
 
-from app.findings import Finding, Findings, nearest, shown, why_no_file
+from app.findings import Finding, Findings, closest, shown, why_no_file
 from interfaces.quote import cut, quoted
 
 Kind = Literal["scenario", "cell", "tree"]
 _SUFFIX: dict[Kind, str] = {"scenario": ".yaml", "cell": ".yaml", "tree": ".xml"}
+MOST_NAMED = 5  # shipped ones, after an unknown name
 MAX_BYTES = 256 * 1024  # of a file that a person writes
 
 
@@ -38,8 +39,17 @@ def resolve(kind: Kind, name: str, beside: Path, where: tuple[str, int] | None =
     name = cut(name)
     what = "a folder" if os.path.isdir(path) else f"no {_SUFFIX[kind]} file" if os.path.exists(path) else ""
     wrong = f"{quoted(name)} is {what}" if name and what else f"no {kind} named {quoted(name)}"
-    hint = nearest(name, known, "the shipped ones are")
+    close = closest(name, known)
+    hint = f"did you mean {quoted(close)}?" if close else _those_shipped(kind, list(known))
     raise Findings([Finding(*(where or (name or kind, 0)), f"{wrong}; {hint} (a path ends in {_SUFFIX[kind]})")])
+
+
+def _those_shipped(kind: Kind, names: list[str]) -> str:
+    """The names in words; of many the first, and how to see all."""
+    if len(names) <= MOST_NAMED:
+        return f"the shipped ones are {', '.join(names)}"
+    more = f"regrasp {kind}s list shows {len(names) - MOST_NAMED} more"
+    return f"the shipped ones are {', '.join(names[:MOST_NAMED])}; {more}"
 
 
 def read_text(path: Path, where: tuple[str, int] | None = None) -> str:

@@ -55,7 +55,8 @@ def axes(document: Document, overrides: Sequence[Assignment]) -> tuple[list[Axis
             found.append(Axis(key, _values(document, key, spec)))
         elif fixed[-1].key == key:
             found.append(Axis(key, [fixed[-1].new]))
-    return found, [*(error.finding for error in errors), *_problems(found, document.place(("vary",)))]
+    own = [error.finding for error in errors if error.path]  # a file that is no mapping at all is told elsewhere
+    return found, [*own, *_problems(found, document.place(("vary",)))]
 
 
 def keys(document: Document) -> dict[str, Value]:

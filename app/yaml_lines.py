@@ -128,6 +128,8 @@ class _Builder:
     findings: list[Finding] = field(default_factory=list)
     unread: set[Path] = field(default_factory=set)
     count: int = 0
+    aliases: bool = False  # whether any node was built twice
+    _built: set[int] = field(default_factory=set)  # ids of nodes
 
     def _line(self, node: yaml.Node) -> int:
         return int(node.start_mark.line) + 1 if self.line is None else self.line
@@ -139,16 +141,22 @@ class _Builder:
             self.unread.add(path)
 
     def charge(self, node: yaml.Node, values: int, depth: int) -> None:
-        """Count what is built; only aliases, of themselves or of one another, go past the limits."""
+        """Count what is built. Aliases, of themselves or of one another, could go on for ever."""
         self.count += values
         if depth > MAX_DEPTH or self.count > MAX_VALUES:
-            self.wrong(
-                node, f"aliases expand to more than {MAX_VALUES} values or {MAX_DEPTH} levels; write out what is meant"
-            )
+            if self.aliases:
+                message = (
+                    f"aliases expand to more than {MAX_VALUES} values or {MAX_DEPTH} levels; write out what is meant"
+                )
+            else:
+                message = f"more than {MAX_VALUES} values; shorten the file, or split it"
+            self.wrong(node, message)
             raise Findings(self.findings)
 
     def build(self, node: yaml.Node, path: Path, depth: int, at: yaml.Node | None = None) -> Value:
         """The plain value of `node`, which stands where `at` (its key) stands."""
+        self.aliases |= id(node) in self._built
+        self._built.add(id(node))
         self.charge(node, 1, depth)
         self.places[path] = (self.source, self._line(at or node))
         if isinstance(node, yaml.MappingNode) and node.tag == _TAG + "map":
@@ -178,6 +186,7 @@ class _Builder:
         return merged | own
 
     def merged(self, node: yaml.Node, depth: int) -> dict[str, tuple[yaml.Node, yaml.Node]]:
+        self.aliases = True
         parts = node.value if isinstance(node, yaml.SequenceNode) else [node]
         result: dict[str, tuple[yaml.Node, yaml.Node]] = {}
         for part in reversed(parts):  # the first of several wins

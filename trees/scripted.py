@@ -193,6 +193,14 @@ class ScriptedTree:
         """Paths of the leaves that are RUNNING, in tree order."""
         return [path for path, leaf in self.leaves.items() if leaf.status is Status.RUNNING]
 
+    @property
+    def unfinished(self) -> str:
+        """What keeps the tree RUNNING, in words: leaves, or nodes above leaves that have ended."""
+        paths = node_paths(self.tree.root)
+        nodes = [node for node in in_tree_order(self.tree.root) if node.status is Status.RUNNING]
+        lowest = [n for n in nodes if not any(child.status is Status.RUNNING for child in n.children)]
+        return ", ".join(f"{type(node).__name__} {paths[node.id]}" for node in lowest)
+
     def now(self) -> float:
         """Simulated seconds at the latest tick, 0 before the first."""
         return TICK * max(self.ticks - 1, 0)
@@ -216,8 +224,9 @@ class ScriptedTree:
         while self.ticks < (until or MOST_TICKS) and self.tick() is Status.RUNNING:
             pass
         if until is None and self.status is Status.RUNNING:
-            where = ", ".join(self.running)
-            raise RuntimeError(f"the tree still runs after {self.ticks} ticks, in {where}; script how that ends")
+            raise RuntimeError(
+                f"the tree still runs after {self.ticks} ticks, in {self.unfinished}; script how that ends"
+            )
         return self.status
 
     def cancel_at(self, tick: int) -> None:

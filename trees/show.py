@@ -30,7 +30,7 @@ def _below(parent: Node, indent: str) -> Iterator[str]:
 
 
 def _label(node: Node) -> str:
-    memory = {True: "with memory", False: "reactive", None: ""}[node.memory]
+    memory = {True: "with memory", False: "without memory", None: ""}[node.memory]
     words = [f"{node.name} ", node.type, memory, node.policy, node.subtree, *(port.text for port in node.given)]
     words += [f" ({node.note})"] * bool(node.note) + [f" +{node.hidden} nodes"] * bool(node.hidden)
     words += [f" [{node.stats.text}]"] if node.stats else []

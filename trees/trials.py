@@ -64,7 +64,7 @@ def never_ends(path: Path, leaves: Mapping[str, type] | None = None) -> Iterator
     for trial in trials(path, leaves):
         tree = trial.tree()
         if tree.run(MOST_TICKS) is Status.RUNNING:
-            yield f"{trial.name}: the tree still runs after {MOST_TICKS} ticks, in {', '.join(tree.running)}"
+            yield f"{trial.name}: the tree still runs after {MOST_TICKS} ticks, in {tree.unfinished}"
         elif tree.running:
             yield f"{trial.name}: the tree ended, but {', '.join(tree.running)} still runs\n{tree.table()}"
 

@@ -23,7 +23,8 @@ Accepts = Any  # a type, or the words that may stand there as a tuple of strings
 # why it cannot be used here; "" means that it can.
 Names = Mapping[str, Collection[str]]
 ANY_STATUS = frozenset({Status.SUCCESS, Status.FAILURE, Status.RUNNING})
-MOST_LISTED = 50  # known words among which the nearest is looked for, and which are listed when none is near
+MOST_LISTED = 12  # known words that are listed when none is near
+MOST_COMPARED = 200  # known words among which the nearest is looked for
 _EXAMPLES = {int: "a whole number such as 3", float: "a number such as 0.5", bool: "true or false"}
 
 
@@ -121,21 +122,24 @@ BUILT_IN = {
     **{tag: Kind({}, 1, 1, about) for tag, about in _DECORATORS.items()},
 }
 
-COUNTERPARTS = {  # of BehaviorTree.CPP's words
+COUNTERPARTS = {  # of BehaviorTree.CPP's words, and of py_trees' that are left out
     "ForceFailure": "<SuccessIsFailure>",
     "ForceSuccess": "<FailureIsSuccess>",
     "ReactiveFallback": '<Fallback memory="false">',
     "ReactiveSequence": '<Sequence memory="false">',
     "RetryUntilSuccessful": '<Retry num_failures="...">',
+    "Timeout": "a leaf with a time limit of its own, such as <SpiralSearch>, in simulated seconds",
 }
 
 
 def nearest(word: str, known: Collection[str]) -> str:
     """The words that help after an unknown one: the nearest known one, else all that there are."""
-    listed = sorted(known)[:MOST_LISTED]
-    if near := get_close_matches(word[:MOST], listed, 1, 0.5):
+    words = sorted(known)
+    alike = [known for known in words if known.casefold() == word.casefold()]
+    if near := alike or get_close_matches(word[:MOST], words[:MOST_COMPARED], 1):
         return f"did you mean {cut(near[0])}?"
-    return f"there are {', '.join(map(cut, listed))}" if listed else "there are none, remove it"
+    more = f" and {len(words) - MOST_LISTED} more" if words[MOST_LISTED:] else ""
+    return f"there are {', '.join(map(cut, words[:MOST_LISTED]))}{more}" if words else "there are none, remove it"
 
 
 def kinds(leaves: Mapping[str, type], names: Names | None = None) -> dict[str, Kind]:

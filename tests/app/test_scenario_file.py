@@ -347,3 +347,15 @@ def test_of_a_cell_that_is_no_mapping_that_alone_is_told(tmp_path: Path) -> None
         load_cell(tmp_path / "cell.yaml", assignments)
     assert len(caught.value.items) == 1
     assert "expected a mapping" in caught.value.items[0].message
+
+
+def test_of_an_empty_file_one_thing_is_told(scenario: Path) -> None:
+    scenario.write_text("")
+    assert len(findings()) == 1
+
+
+def test_after_an_unknown_name_a_few_are_named_and_how_to_see_all(scenario: Path) -> None:
+    [told] = findings(name="xyzzy")
+    assert told.startswith("xyzzy: no scenario named 'xyzzy'; the shipped ones are no_obstacle, short_obstacle, tall")
+    assert "regrasp scenarios list shows" in told
+    assert len(told) < 250

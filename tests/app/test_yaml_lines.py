@@ -112,3 +112,8 @@ def test_values_without_a_pitfall_read_as_yaml_reads_them(value: object) -> None
     text = yaml.safe_dump(value)
     if "e" not in text.replace("false", "").replace("true", ""):  # a bare 1e3 is refused
         assert parse(text, "f.yaml").value == yaml.safe_load(text)
+
+
+def test_many_values_without_an_alias_are_not_blamed_on_one() -> None:
+    told = findings("a:\n" + "".join("  - [1, 2, 3, 4, 5, 6, 7, 8, 9]\n" for _ in range(2500)))
+    assert "more than 20000 values; shorten the file, or split it" in told

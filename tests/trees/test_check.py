@@ -124,6 +124,12 @@ CASES = {
     "tree without ID": ('ID="Search" camera', 'ID="" camera', 12, 'BehaviorTree has no ID; write ID="..."'),
     "subtree without ID": ('ID="Search" name', "name", 4, "SubTree 'search' has no ID; write ID=\"...\" of the Behav"),
     "empty main tree": ('execute="Main"', 'execute=""', 1, "does not state main_tree_to_execute"),
+    "py_trees' own Timeout": (
+        "<Go ",
+        '<Timeout name="t" duration="1.0"><Fail name="f"/></Timeout><Go ',
+        9,
+        "unknown element 'Timeout'; write a leaf with a time limit of its own",
+    ),
     "reactive fallback of BehaviorTree.CPP": (
         "<Go ",
         '<ReactiveFallback name="r"><Fail name="f"/></ReactiveFallback><Go ',

@@ -164,7 +164,7 @@ def test_a_foreign_tree_runs_on_the_names_that_it_gives(scripted_tree: Make, tmp
 
 def test_a_run_that_does_not_end_names_what_still_runs(scripted_tree: Make) -> None:
     tree = scripted_tree("recovery", {"StartUp": "failure"})  # the safe stop never succeeds, as by default it should
-    with pytest.raises(RuntimeError, match="still runs after 10000 ticks, in recovery/safe_stop; script how that ends"):
+    with pytest.raises(RuntimeError, match="still runs after 10000 ticks, in SafeStop recovery/safe_stop; script how that ends"):
         tree.run()
 
 
@@ -189,3 +189,12 @@ def test_any_script_is_carried_out_to_the_letter(tmp_path_factory: pytest.TempPa
         assert tree.status is act.status
     expected = "".join("R" * (act.ticks - 1) + act.status.value[0] for act in acts)
     assert tree.table().splitlines()[1] == f"one   {expected}"
+
+
+def test_a_loop_over_leaves_that_end_is_named_itself(tmp_path: Path) -> None:
+    (tmp_path / "tree.xml").write_text(
+        '<root main_tree_to_execute="M"><BehaviorTree ID="M">'
+        '<Repeat name="loop" num_success="1000000"><StartUp name="start"/></Repeat></BehaviorTree></root>'
+    )
+    with pytest.raises(RuntimeError, match="still runs after 10000 ticks, in Repeat loop; script how"):
+        ScriptedTree(tmp_path / "tree.xml").run()

@@ -11,7 +11,7 @@ def test_a_tree_is_drawn_with_names_types_memory_and_ports(tmp_path: Path) -> No
         "root  Sequence with memory",
         "├─ search  SubTree Search place={place} tries=2",
         "│  └─ again  Retry num_failures={tries}=2",
-        "│     └─ either  Fallback reactive",
+        "│     └─ either  Fallback without memory",
         "│        ├─ not_yet  Inverter",
         "│        │  └─ blink  Wait ticks=1",
         "│        └─ look  Look angle=0.25 camera={camera}=rear place={place}",
