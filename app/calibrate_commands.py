@@ -37,7 +37,9 @@ def calibrate(
     views: Annotated[int, typer.Option(min=5, max=200, help="Rendered: how many.")] = 20,
     seed: Annotated[int, typer.Option(min=0, max=MOST_SEED, help="Rendered: draws where the board is held.")] = 0,
 ) -> None:
-    """Find a camera's intrinsics from pictures of a checkerboard, and say how well they are known.
+    """Find a camera's intrinsics with a checkerboard.
+
+    From your own pictures or rendered ones; says how well they are known.
 
     \b
     Examples:

@@ -26,8 +26,28 @@ if TYPE_CHECKING:
 EXIT_UNMET, EXIT_BAD_INPUT, EXIT_INTERRUPTED = 1, 2, 130
 
 
+COMMANDS = (  # in the order of their use
+    "run",
+    "explain",
+    "replay",
+    "diff",
+    "scenarios",
+    "trees",
+    "study",
+    "doctor",
+    "snapshot",
+    "perceive",
+    "calibrate",
+    "evaluate-detector",
+    "train-detector",
+)
+
+
 class _Group(TyperGroup):
     """Tells findings one a line on stderr, and Ctrl-C by its exit code, whatever the command."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        return sorted(super().list_commands(ctx), key=COMMANDS.index)
 
     def invoke(self, ctx: Any) -> Any:
         try:
@@ -51,9 +71,7 @@ class _Group(TyperGroup):
 
 
 # Plain help: the same on a terminal and in a pipe.
-app = typer.Typer(
-    cls=_Group, no_args_is_help=True, add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False
-)
+app = typer.Typer(cls=_Group, no_args_is_help=True, rich_markup_mode=None, pretty_exceptions_enable=False)
 run_commands.add_to(app)
 record_commands.add_to(app)
 app.add_typer(scenario_commands.app, name="scenarios")
@@ -88,7 +106,10 @@ def _root(
 
 @app.command()
 def doctor() -> None:
-    """Say what a run needs from this machine, and whether it is there. Exit code 1 when something is missing."""
+    """Check that this machine has what a run needs.
+
+    Exit code 1 when something is missing.
+    """
     from app.doctor import checks
 
     wrong = False

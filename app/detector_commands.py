@@ -39,11 +39,11 @@ def train_detector(
     held_out: Annotated[int, typer.Option(min=1, help="Pictures of each class to evaluate on at the end.")] = 60,
     seed: _Seed = TRAINING_SEED,
 ) -> None:
-    """Train the network of the technique `detector` on random pictures of a cell, then evaluate it.
+    """Train the network of the technique `detector`.
 
-    Needs the extra `train` (torch, onnx), some 20 minutes to draw the pictures and 80 to learn, and 15 GB of free
-    memory (half with --pictures 16000). Ctrl-C keeps the best network so far. To use it, put its detector.onnx in the
-    place of perception/detector.onnx.
+    On random pictures of a cell; then it is evaluated. Needs the extra `train` (torch, onnx), some 20 minutes to draw
+    the pictures and 80 to learn, and 15 GB of free memory (half with --pictures 16000). Ctrl-C keeps the best network
+    so far. To use it, put its detector.onnx in the place of perception/detector.onnx.
 
     \b
     Examples:
@@ -87,10 +87,11 @@ def evaluate_detector(
     seed: _Seed = HELD_OUT_SEED,
     out: Annotated[Path | None, typer.Option(metavar="FILE", help="Write the figures as JSON, too.")] = None,
 ) -> None:
-    """Say how well the network finds the connector in pictures unlike those of its training.
+    """Measure how well the network finds the connector.
 
-    They show another layout of the cell, other light, things and look-alikes, drawn by PyBullet's renderer; the
-    connector is hidden by up to 70 %, and absent in as many pictures as each class of occlusion has.
+    In pictures unlike those of its training, some three minutes by default. They show another layout of the cell, other
+    light, things and look-alikes, drawn by PyBullet's renderer; the connector is hidden by up to 70 %, and absent in as
+    many pictures as each class of occlusion has.
 
     \b
     Example:

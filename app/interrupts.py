@@ -91,8 +91,8 @@ def held_back() -> Iterator[None]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
-    for number in came[:1]:
-        signal.raise_signal(number)
+    if came:
+        signal.raise_signal(came[0])
 
 
 late_imports = held_back  # in the middle of their import libraries in C++ swallow signals, or die of them

@@ -63,7 +63,9 @@ def perceive(
         typer.Option(metavar="FILE", help="Where the camera stood in the cell's world; once, or one a picture."),
     ] = None,
 ) -> None:
-    """Find the connector in your own pictures, and print its pose or the reason why there is none as JSON.
+    """Find the connector in your own pictures.
+
+    Prints its pose, or the reason why there is none, as JSON.
 
     \b
     Examples:
@@ -168,10 +170,10 @@ def snapshot(
     ] = None,
     sets: Sets = None,
 ) -> None:
-    """Write a scenario's first frames as files: rgb.png, depth.png (16 bit, millimetres), intrinsics.yaml.
+    """Write a scenario's first camera frames as files.
 
-    Of a camera that stands still camera_pose.yaml, too: where the robot believes it to be. Several frames are
-    rgb_001.png, depth_001.png, and so on.
+    rgb.png, depth.png (16 bit, millimetres) and intrinsics.yaml. Of a camera that stands still camera_pose.yaml, too:
+    where the robot believes it to be. Several frames are rgb_001.png, depth_001.png, and so on.
 
     \b
     Example:

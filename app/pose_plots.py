@@ -40,7 +40,9 @@ def _errors(trials: Sequence[Trial], techniques: Sequence[str]) -> Figure:
     if shown:
         axes.plot([names.index(c) for c in shown], [THESIS_RGBD[c] for c in shown], "k_", ms=20, label="thesis, RGB-D")
     axes.set_xticks(range(len(names)), [_label(name) for name in names])
-    axes.set(xlabel="configuration, share hidden", ylabel="position error, mm", ylim=(0, None))
+    axes.set(
+        xlabel="configuration, share hidden", ylabel="position error, mm", xlim=(-0.5, len(names) - 0.5), ylim=(0, None)
+    )
     axes.grid(axis="y", alpha=0.3)
     axes.legend()
     return figure
@@ -65,8 +67,8 @@ def _shares(trials: Sequence[Trial], techniques: Sequence[str], thesis: Mapping[
             if technique in thesis:
                 k, n = thesis[technique][what]
                 axes.plot(number, 100 * k / n, "k_", markersize=40, label="thesis" if technique == first else None)
-        axes.set_xticks(range(len(techniques)), techniques)
-        axes.set(title=what, ylim=(0, 105))
+        axes.set_xticks(range(len(techniques)), [name.replace(", ", "\n") for name in techniques])
+        axes.set(title=what, xlim=(-0.6, len(techniques) - 0.4), ylim=(0, 105))
         if first is not None:
             axes.legend(loc="lower right", markerscale=0.4)
     figure.axes[0].set_ylabel("share of trials, %")

@@ -30,7 +30,10 @@ def add_to(app: typer.Typer) -> None:
 def explain(
     folder: Folder, as_json: Annotated[bool, typer.Option("--json", help="Print it as JSON, for a program.")] = False
 ) -> None:
-    """Say what a run tried, when, how each attempt ended, why the run ended so, and what the robot knew.
+    """Say what a run tried and why it ended so.
+
+    Each attempt with when it began and how it ended, the chain of causes, the losses of the connector, and what the
+    robot knew at the end.
 
     \b
     Example:
@@ -52,7 +55,9 @@ def replay(
     end: Annotated[float | None, typer.Option("--to", metavar="SECONDS", help="End here.")] = None,
     part: Annotated[str, typer.Option("--filter", metavar="TEXT", help="Only nodes with this in their path.")] = "",
 ) -> None:
-    """Step through a run's changes on the terminal: the tree, what changed, what happened. In a pipe, print them.
+    """Step through a run on the terminal.
+
+    The tree, what changed in it, what happened. In a pipe the changes are printed.
 
     A change is a tick in which a node's status changed or something happened; ticks that went like the one before are
     left out.
@@ -79,7 +84,9 @@ def replay(
 
 
 def diff(folder: Folder, other: Annotated[Path, typer.Argument(metavar="DIR", help="Another run's folder.")]) -> None:
-    """Say where two runs part: their outcome, the first tick, the first event; and what was run differently.
+    """Say where two runs part.
+
+    Their outcome, the first tick and the first event that differ, and what was run differently.
 
     \b
     Example:

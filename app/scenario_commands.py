@@ -12,13 +12,13 @@ from app.resources import shipped
 from app.scenario_file import case_names, cases, description, load_scenario
 from app.schema_doc import markdown
 
-app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Look at scenarios.")
+app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="List, check and show scenarios.")
 Name = Annotated[str, typer.Argument(help="A shipped scenario's name, or a path to a .yaml file.")]
 
 
 @app.command("list")
 def list_scenarios() -> None:
-    """Names, numbers of cases and descriptions of the shipped scenarios."""
+    """List the shipped scenarios, with their cases."""
     known = shipped("scenario")
     width = max(map(len, known), default=0)
     for name, path in known.items():
@@ -34,7 +34,9 @@ def check(
     files: Annotated[list[str] | None, typer.Argument(help="Names or paths; default all that are shipped.")] = None,
     sets: Sets = None,
 ) -> None:
-    """Check scenarios in every case, with their cells and trees, and tell all that is wrong.
+    """Check scenarios, in every case, without a run.
+
+    With their cells and trees; tells all that is wrong.
 
     \b
     Examples:
@@ -63,7 +65,9 @@ def show(
     ] = None,
     sets: Sets = None,
 ) -> None:
-    """Print a scenario as a run takes it: one case's values, your changes and all defaults, as YAML.
+    """Print a scenario as a run takes it.
+
+    One case's values, your changes and all defaults, as YAML.
 
     Without --case the names of all cases come first, as comments.
 
@@ -89,7 +93,9 @@ def schema(
         bool, typer.Option("--markdown", help="A reference to read: each field, its meaning and an example.")
     ] = False,
 ) -> None:
-    """Print what a scenario file may say: JSON Schema (draft 2020-12), for editors.
+    """Print what a scenario file may say.
+
+    As JSON Schema (draft 2020-12), for editors.
 
     \b
     With the YAML language server (VS Code, Neovim, Emacs) an editor completes and checks scenario files:

@@ -14,7 +14,7 @@ from app.interrupts import late_imports
 from app.options import Renderer, Sets, WallLimit, parse_seeds
 from interfaces.quote import quoted
 
-app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Run many episodes or scenes and count.")
+app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Run many episodes or scenes, and count.")
 
 
 @app.command("demo")
@@ -26,7 +26,9 @@ def demo(
     renderer: Renderer = "auto",
     wall_limit: WallLimit = None,
 ) -> None:
-    """The whole demonstration: no, short and tall obstacle, each without and with gravity, over many seeds.
+    """Run the whole demonstration over many seeds.
+
+    No, short and tall obstacle, each without and with gravity: six runs a seed, about a minute each.
 
     \b
     Example:
@@ -65,7 +67,9 @@ def pose(
     jobs: Annotated[int, typer.Option(min=1, help="Scenes side by side.")] = os.cpu_count() or 1,
     out: Annotated[Path | None, typer.Option(help="Folder of pose.json, pose.csv and the plots.")] = None,
 ) -> None:
-    """The thesis's pose experiment: nine configurations, found, measured against the truth, and grasped.
+    """Repeat the thesis's pose experiment.
+
+    The connector in nine configurations: found, measured against the truth, and grasped.
 
     \b
     Examples:
@@ -73,8 +77,8 @@ def pose(
       regrasp study pose --techniques rgbd --configurations 3,6,7,8,9 --no-grasp
 
     \b
-    app/POSE.md shows the configurations and says how a trial goes. Exit code: 0 done, 1 a scene broke off,
-    2 bad input, 130 Ctrl-C.
+    POSE.md of the project shows the configurations and says how a trial goes. Exit code: 0 done, 1 a scene broke
+    off, 2 bad input, 130 Ctrl-C.
     """
     chosen, wrong = parse_seeds(seeds), _unfit(out, "pose.json")
     names = _techniques(techniques, wrong)
@@ -101,7 +105,9 @@ def coverage(
     jobs: Annotated[int, typer.Option(min=1, help="Scenes side by side.")] = os.cpu_count() or 1,
     out: Annotated[Path | None, typer.Option(help="Folder of coverage.json.")] = None,
 ) -> None:
-    """Whether covariances mean something: how often the truth lies in an estimate's 95 % region, ten frames a seed.
+    """Check that estimates are as sure as they say.
+
+    How often the truth lies in an estimate's 95 % region, by its covariance; ten frames a seed.
 
     \b
     Example:

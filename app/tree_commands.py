@@ -11,12 +11,12 @@ from app.scenario_file import check_tree_file
 from app.scenario_parts import names_of
 from interfaces.quote import quoted
 
-app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Look at behaviour trees.")
+app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="List, check, show and export behaviour trees.")
 
 
 @app.command("list")
 def list_trees() -> None:
-    """Names of the shipped trees."""
+    """List the shipped trees."""
     for name in shipped("tree"):
         typer.echo(name)
 
@@ -58,7 +58,7 @@ def export(
         Path | None, typer.Option(metavar="DIR", help="Show what this recorded run did at each node.")
     ] = None,
 ) -> None:
-    """Write a tree as a picture, as text, or for another program. Needs no other program.
+    """Write a tree as a picture, or for another program.
 
     \b
     Examples:
@@ -86,7 +86,9 @@ def check(
         list[str] | None, typer.Argument(help="Shipped trees' names or paths to .xml files; without any, all shipped.")
     ] = None,
 ) -> None:
-    """Find everything that is wrong in tree files, without a run. What a cell must have is checked with the scenario.
+    """Check tree files, without a run.
+
+    What a cell must have for them is checked with the scenario.
 
     \b
     Example:
@@ -109,7 +111,9 @@ def check(
 
 @app.command("leaves")
 def leaves(name: Annotated[str | None, typer.Argument(help="One element, in full.")] = None) -> None:
-    """The elements of a tree file: leaves and built-in ones, each with its attributes.
+    """List the elements that a tree file may hold.
+
+    Leaves and built-in ones, each with its attributes.
 
     \b
     Example:

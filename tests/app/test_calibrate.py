@@ -158,3 +158,9 @@ def test_a_picture_is_not_overwritten_by_the_calibration(tmp_path: Path, boards:
     result = invoke("--images", str(folder), *MINE, "--out", str(folder / "0.png"))
     assert (result.exit_code, (folder / "0.png").read_bytes()) == (2, before)
     assert "end it in .yaml" in result.output
+
+
+def test_a_calibration_is_not_overwritten(tmp_path: Path) -> None:
+    (tmp_path / "calibration.yaml").write_text("mine")
+    assert "calibration.yaml: exists already; name another file, or remove it" in finding("--camera", "rear")
+    assert (tmp_path / "calibration.yaml").read_text() == "mine"

@@ -271,5 +271,52 @@ def test_help_is_plain_and_shows_how(command: list[str]) -> None:
     assert "regrasp" in ran.stdout or command in (["scenarios", "list"], ["doctor"])
 
 
+@pytest.mark.parametrize("group", [[], ["scenarios"], ["trees"], ["study"]])
+def test_in_80_columns_no_summary_is_cut(group: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    told = invoke(*group, "--help").stdout
+    commands = told.partition("Commands:\n")[2].splitlines()
+    assert commands
+    assert "..." not in "".join(commands)
+    assert group or commands[0].split()[0] == "run"
+
+
+def test_the_shell_completes_names_of_scenarios(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("_REGRASP_COMPLETE", "complete_bash")
+    monkeypatch.setenv("COMP_WORDS", "regrasp run short")
+    monkeypatch.setenv("COMP_CWORD", "2")
+    assert CliRunner().invoke(app, [], prog_name="regrasp").stdout.split() == ["short_obstacle"]
+
+
+def test_a_dry_run_says_what_would_run_and_runs_nothing(calls: list[SimpleNamespace], scenario: Path) -> None:
+    scenario.write_text(scenario.read_text() + "vary: {seed: '4:6'}\n")
+    before = sorted(scenario.parent.rglob("*"))
+    ran = invoke("run", "mine.yaml", "--dry-run")
+    assert (ran.exit_code, calls) == (0, [])
+    assert ran.stdout.splitlines() == [
+        "mine.yaml: nothing wrong; tree tree.xml, cell thesis",
+        "  would run mine seed=4, seed 4",
+        "  record in a new folder of runs/",
+    ]
+    assert len(invoke("run", "mine.yaml", "--dry-run", "--all").stdout.splitlines()) == 4
+    assert invoke("run", "mine.yaml", "--dry-run", "--set", "limits.tris=1").exit_code == 2
+    assert sorted(scenario.parent.rglob("*")) == before
+
+
+def test_events_are_shown_from_a_level_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    def episode(*_: Any, on_event: Callable[[dict[str, Any]], None], **__: Any) -> Result:
+        on_event({"t": 1.0, "level": "info", "event": "grasped", "node": "root/unplug", "gap": 0.02})
+        on_event({"t": 2.0, "level": "warning", "event": "slipped"})
+        return result()
+
+    use_episode(monkeypatch, episode)
+    assert invoke("run", "mine.yaml", "--quiet").stderr == ""
+    warnings = invoke("run", "mine.yaml", "--quiet", "--log-level", "warning").stderr
+    assert warnings == "   2.00 s  warning  -  slipped\n"
+    assert invoke("run", "mine.yaml", "--log-level", "debug").stderr.splitlines()[0] == (
+        "   1.00 s  info     root/unplug  grasped: gap=0.02"
+    )
+
+
 def test_version() -> None:
     assert invoke("--version").stdout.startswith("regrasp ")

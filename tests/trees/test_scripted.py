@@ -164,7 +164,9 @@ def test_a_foreign_tree_runs_on_the_names_that_it_gives(scripted_tree: Make, tmp
 
 def test_a_run_that_does_not_end_names_what_still_runs(scripted_tree: Make) -> None:
     tree = scripted_tree("recovery", {"StartUp": "failure"})  # the safe stop never succeeds, as by default it should
-    with pytest.raises(RuntimeError, match="still runs after 10000 ticks, in SafeStop recovery/safe_stop; script how that ends"):
+    with pytest.raises(
+        RuntimeError, match="still runs after 10000 ticks, in SafeStop recovery/safe_stop; script how that ends"
+    ):
         tree.run()
 
 
