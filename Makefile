@@ -1,9 +1,9 @@
-# What a newcomer and CI run. PYTHON picks the interpreter (3.11 or newer) that makes .venv.
+# What a newcomer and CI run. PYTHON picks the interpreter (3.11 or newer) that makes .venv; TESTS narrows `make test`.
 PYTHON ?= python3
 BIN := .venv/bin
 STAMP := .venv/.installed
 
-.PHONY: setup run test lint bench fuzz
+.PHONY: setup run test lint bench fuzz readme
 .DEFAULT_GOAL := run
 
 setup: $(STAMP) ; @:
@@ -19,7 +19,7 @@ run: setup
 	$(BIN)/regrasp run short_obstacle --video
 
 test: setup
-	$(BIN)/pytest -n 2
+	$(BIN)/pytest -n 2 $(TESTS)
 
 lint: setup
 	$(BIN)/ruff check .
@@ -32,3 +32,6 @@ bench: setup
 
 fuzz: setup
 	$(BIN)/python tests/app/fuzz_readers.py --cases 2000
+
+readme: setup
+	$(BIN)/python tests/app/readme_commands.py

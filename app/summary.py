@@ -67,8 +67,12 @@ def slip_lines(result: "Result") -> Iterator[str]:
 
 def in_words(event: str, values: Mapping[str, Any]) -> str:
     """An event's name, and its values as name=value."""
-    told = ", ".join(f"{name}={value}" for name, value in values.items())
+    told = ", ".join(f"{name}={_short(value)}" for name, value in values.items())
     return f"{event}: {told}" if told else event
+
+
+def _short(value: object) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
 def marks() -> tuple[str, str]:

@@ -23,6 +23,7 @@ Mass = Annotated[float, Field(ge=1e-5, le=100)]  # kilograms, or kilograms a met
 Friction = Annotated[float, Field(ge=1e-3, le=10)]
 Seconds = Annotated[float, Field(ge=0, le=10)]
 Deviation = Annotated[float, Field(ge=0, le=1)]  # metres
+JointAngle = Annotated[float, Field(ge=-7, le=7)]  # radians
 Degrees = Annotated[float, Field(ge=-360, le=360)]
 Angle = Annotated[float, Field(ge=0, le=180)]  # degrees
 Coordinate = Annotated[float, Field(ge=-5, le=5, allow_inf_nan=False)]
@@ -119,7 +120,7 @@ class Clip(Model):
     seat: Vector  # the connector's centre when stowed
     axis: Direction  # the connector's x axis when stowed
     capture_distance: Length
-    capture_angle_deg: Angle
+    capture_angle_deg: Annotated[float, Field(ge=0.1, le=180)]
     hold_force: Force
     bracket: tuple[Box, ...]
     tag: Tag | None = None  # in the seat's frame
@@ -144,7 +145,7 @@ class ArmSpec(Model):
 
     name: Literal["left", "right"]
     base: Vector
-    sleep: tuple[Number, Number, Number, Number, Number, Number]
+    sleep: tuple[JointAngle, JointAngle, JointAngle, JointAngle, JointAngle, JointAngle]
 
 
 class FixedMount(Model):

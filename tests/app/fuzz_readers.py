@@ -1,4 +1,4 @@
-"""`make fuzz`: hostile scenarios, cells, trees and records against their readers.
+"""`make fuzz`: hostile scenarios, cells, trees and records, and symlink loops, against their readers.
 
 A worker process reads one file after another; each reading must come to an end within `SECONDS` and `MEMORY`, in
 success or with findings of a line each, and write nothing.
@@ -37,16 +37,25 @@ def read(case: Case, folder: Path) -> str:
 
     if case.kind in RECORDED:
         run = folder / "run"
-        shutil.copytree(RECORD, run, dirs_exist_ok=True)
-        (run / case.kind).write_bytes(case.data)
+        shutil.rmtree(run, ignore_errors=True)
+        shutil.copytree(RECORD, run)
+        _put(run / case.kind, case)
         verdict = look(run, random.Random(case.made).choice(FORMATS))
         again = _verdict(lambda: load_scenario(str(run / "scenario.yaml")))
         return next((one for one in (verdict, again) if one not in ("clean", "findings")), min(verdict, again))
     path = folder / ("case.xml" if case.kind == "tree" else "case.yaml")
-    path.write_bytes(case.data)
+    _put(path, case)
     if case.kind == "scenario":
         return _verdict(lambda: load_scenario(str(path)))
     return _verdict(lambda: load_cell(path) if case.kind == "cell" else check_tree_file(path))
+
+
+def _put(path: Path, case: Case) -> None:
+    path.unlink(missing_ok=True)
+    if case.is_loop:
+        path.symlink_to(path.name)
+    else:
+        path.write_bytes(case.data)
 
 
 def _verdict(reading: Callable[[], Any]) -> str:

@@ -50,6 +50,7 @@ class Case(NamedTuple):
     kind: str
     data: bytes
     made: str
+    is_loop: bool = False  # in its place stands a link that leads back to itself
 
 
 def cases(count: int, seed: int) -> Iterator[Case]:
@@ -67,6 +68,8 @@ def cases(count: int, seed: int) -> Iterator[Case]:
         kind = rng.choice((*SHIPPED, *KINDS))
         data = rng.choice(ours[kind])
         names = [rng.choice(list(MUTATIONS)) for _ in range(rng.randint(1, 4))]
+        if kind == "cell" and rng.random() < 0.5:
+            names = ["huge number"] * rng.randint(1, 3)
         for name in names:
             data = MUTATIONS[name](rng, data)
         yield Case(kind, data, f"seed {seed} number {number}: {', '.join(names)}")
@@ -115,6 +118,8 @@ def catalogue(rng: random.Random) -> Iterator[Case]:
         for kind in kinds:
             for encoding in ("utf-8", rng.choice(("utf-16", "utf-32", "latin-1", "utf-8-sig"))):
                 yield Case(kind, text.encode(encoding), f"{name} in {encoding}")
+    for kind in KINDS:
+        yield Case(kind, b"", "a link that leads back to itself", is_loop=True)
     for kind, tricks in record_tricks().items():
         for name, text in tricks.items():
             yield Case(kind, text.encode("utf-8", "surrogatepass"), name)
@@ -185,6 +190,14 @@ def _token(rng: random.Random, data: bytes) -> bytes:
     return data[:first] + rng.choice(HOSTILE).encode("utf-8", "surrogatepass") + data[last:]
 
 
+def _huge(rng: random.Random, data: bytes) -> bytes:
+    """One of the numbers, of whatever key, as large or as small as a float may be, or nearly so."""
+    spans = [m.span() for m in re.finditer(rb"(?<![\w.])-?\d+(\.\d+)?(?![\w.])", data)] or [(0, 0)]
+    first, last = rng.choice(spans)
+    word = rng.choice(("1.0e+300", "-1.0e+300", "1.0e+15", "-1.0e+9", "1.0e-300", "4294967296", "1.0e+5", "-0.0"))
+    return data[:first] + word.encode() + data[last:]
+
+
 def _value(rng: random.Random, data: bytes) -> bytes:
     spans = [m.span(1) for m in re.finditer(rb"(?:[:=] ?)(\"[^\"\n]*\"|\[[^\]\n]*\]|[^\s,}\]>]+)", data)] or [(0, 0)]
     first, last = rng.choice(spans)
@@ -237,6 +250,7 @@ def _encode(rng: random.Random, data: bytes) -> bytes:
 MUTATIONS: dict[str, Callable[[random.Random, bytes], bytes]] = {
     "token": _token,
     "value": _value,
+    "huge number": _huge,
     "line left out": _lines(_leave_out),
     "line twice": _lines(lambda _rng, lines, at: lines.insert(at, lines[at])),
     "line moved": _lines(_move),

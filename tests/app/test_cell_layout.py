@@ -1,12 +1,18 @@
 """Cells of which every value is right and that cannot work all the same."""
 
+from collections.abc import Iterator
+from typing import Any
+
 import numpy as np
 import pybullet as p
 import pytest
+import yaml
 
 from app.findings import Findings
+from app.overrides import read
 from app.placement import cable_at_start
-from app.scenario_file import load_scenario
+from app.resources import shipped
+from app.scenario_file import load_cell, load_scenario
 from interfaces.cell import Cell
 from interfaces.scene import GRAVITIES, Gravity
 from sim.world import World
@@ -26,7 +32,7 @@ def findings(*overrides: str, scenario: str = "no_obstacle") -> list[str]:
         ("known.plugged_into=back_3", "a cable 0.553 m long does not reach a connector in socket back_3, 0.582 m away"),
         ("hidden.cable.length=0.54", "a cable 0.54 m long does not reach a connector in socket back_4, 0.545 m away"),
         ("known.plugged_into=right_1", "'right_1', the last socket, holds the cable's other end; name another"),
-        ("known.arms.0.sleep.2=99", "99.0 rad is past the limits of joint 2 of the left arm; write one from -1.76 to"),
+        ("known.arms.0.sleep.2=3", "3.0 rad is past the limits of joint 2 of the left arm; write one from -1.76 to"),
         ("known.boxes.0.center.2=0.03", "floor reaches 0.050 m into the left arm's base; move one of them"),
         ("known.boxes.0.center.2=0.3", "no way to take hold of a connector in socket back_4: 1152 grasp candidates: "),
         ("known.boxes.0.center.2=0.48", "floor reaches 0.015 m into the stowed connector; move one of them"),
@@ -77,3 +83,24 @@ def test_the_cable_hangs_at_the_start_as_the_world_lays_it(cell: Cell, gravity: 
     states = p.getLinkStates(world.cable.body, range(cell.hidden.cable.links), 1, 1, physicsClientId=world.client)
     np.testing.assert_allclose(points[:-1], [state[4] for state in states], atol=0.003)
     world.close()
+
+
+def numbers(value: Any, path: str = "") -> Iterator[str]:
+    """Dotted keys of all numbers below `value`."""
+    if isinstance(value, dict | list):
+        items = value.items() if isinstance(value, dict) else enumerate(value)
+        for key, below in items:
+            yield from numbers(below, f"{path}.{key}" if path else str(key))
+    elif isinstance(value, float | int):
+        yield path
+
+
+def test_no_number_of_a_cell_may_be_huge() -> None:
+    """Each number at once: a bound that is missing lets one through."""
+    text = shipped("cell")["thesis"].read_text(encoding="utf-8")
+    keys = list(numbers(yaml.safe_load(text)))
+    for huge in ("1.0e+300", "-1.0e+300"):
+        assignments, _ = read([f"{key}={huge}" for key in keys])
+        with pytest.raises(Findings) as raised:
+            load_cell(shipped("cell")["thesis"], assignments)
+        assert {item.source.partition("=")[0].removeprefix("--set ") for item in raised.value.items} == set(keys)
