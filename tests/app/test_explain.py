@@ -210,3 +210,24 @@ def test_explain_prints_the_page_or_json(tmp_path: Path) -> None:
     bad = CliRunner().invoke(app, ["explain", str(tmp_path)])
     assert (bad.exit_code, bad.stdout) == (2, "")
     assert "holds no run" in bad.stderr
+
+
+def test_a_killed_run_s_clock_goes_on_to_its_last_event(tmp_path: Path) -> None:
+    folder = write_record(tmp_path / "run")
+    kill(folder)
+    with (folder / "events.jsonl").open("a") as events:
+        events.write('{"t": 5.25, "level": "info", "event": "looks", "node": "root/mission"}\n')
+    assert "What was running at 5.25 s, when the record ends\n  root/mission/tries\n" in page(folder)
+    (folder / "at_work.json").write_text('{"t": 5.3, "node": "root/mission/tries/one/try/held"}')
+    assert (
+        "What was running at 5.30 s, when the record ends\n"
+        "  root/mission/tries/one/try/held: its tick at 5.30 s has not ended\n"
+    ) in page(folder)
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", '{"t": "x", "node": "a"}', '{"t": 1, "node": ""}', '{"t": 1}', "\x00"])
+def test_a_broken_note_of_the_leaf_at_work_says_nothing(tmp_path: Path, text: str) -> None:
+    folder = write_record(tmp_path / "run")
+    kill(folder)
+    (folder / "at_work.json").write_text(text)
+    assert "has not ended" not in page(folder)

@@ -146,3 +146,15 @@ def test_a_link_is_written_through_and_a_mode_kept(tmp_path: Path) -> None:
 def test_a_device_stays_a_device() -> None:
     write_whole(Path("/dev/null"), "gone")
     assert Path("/dev/null").is_char_device()
+
+
+def test_of_two_runs_that_take_a_folder_at_once_the_second_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("app.record.output.findings", lambda _folder: [])  # as both saw it before either began
+    first = Record(tmp_path / "run", "s", 1)
+    with pytest.raises(Findings, match=r"run: holds a run already \(events.jsonl, ticks.jsonl\); name another folder"):
+        Record(tmp_path / "run", "s", 2)
+    with first:
+        pass
+    assert json.loads((tmp_path / "run/result.json").read_text())["seed"] == 1

@@ -92,3 +92,17 @@ def test_after_ctrl_c_the_film_plays(tmp_path: Path) -> None:
         os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to the whole group
         assert process.wait() == -signal.SIGINT  # the interrupt, and no error of ffmpeg's on top
     assert len(colors(tmp_path / "v.mp4")) > 20
+
+
+def test_after_a_kill_what_was_filmed_plays(tmp_path: Path) -> None:
+    """Also of ffmpeg itself, as by a container that is stopped."""
+    film = tmp_path / "v.mp4"
+    video = VideoWriter(film, 20, (64, 48))
+    for i in range(10_000):
+        video.write(image(64, 48, (i % 200, 99, 99)))
+        if film.exists() and film.read_bytes().count(b"moof") > 2:
+            break
+    os.kill(video._ffmpeg.pid, signal.SIGKILL)
+    with pytest.raises(OSError, match="ffmpeg could not write"):
+        video.close()
+    assert len(colors(film)) >= 20  # a second
