@@ -22,6 +22,16 @@ Episode = Callable[..., Result]
 
 
 @dataclass(frozen=True)
+class Settings:
+    """How runs are done: what is drawn and shown, and the seconds of wall time that each may take."""
+
+    video: bool = False
+    renderer: "RendererName" = "auto"
+    quiet: bool = False
+    wall_limit: float = math.inf
+
+
+@dataclass(frozen=True)
 class Run:
     """One run to do: a scenario's case with a seed, and the folder of its record."""
 
@@ -61,30 +71,33 @@ def run_all(
     runs: Sequence[Run],
     jobs: int,
     keep: Callable[[list[Row]], None] = lambda rows: None,
-    *,
-    video: bool = False,
-    quiet: bool = False,
-    renderer: "RendererName" = "auto",
-    wall_limit: float = math.inf,
+    settings: Settings = Settings(),
     episode: Episode | None = None,
 ) -> tuple[dict[int, Row], bool]:
     """Do all, `jobs` at a time; the rows by the runs' numbers, and whether Ctrl-C cut it short.
 
     After each run a line goes to stderr, unless `quiet`, and `keep` gets the rows so far. A run whose process died
-    counts as an internal error; one that takes longer than `wall_limit` seconds, by the clock on the wall, is stopped.
+    counts as an internal error; one that takes longer than the wall limit is stopped.
     `episode` stands in for `run_episode` in tests.
     """
     tasks = [
-        partial(episode or _run_episode, run.scenario, run.folder, seed=run.seed, video=video, renderer=renderer)
+        partial(
+            episode or _run_episode,
+            run.scenario,
+            run.folder,
+            seed=run.seed,
+            video=settings.video,
+            renderer=settings.renderer,
+        )
         for run in runs
     ]
     rows: dict[int, Row] = {}
     try:
-        with contextlib.closing(run_each(tasks, jobs, wall_limit)) as ended:
+        with contextlib.closing(run_each(tasks, jobs, settings.wall_limit)) as ended:
             for done in ended:
                 row = rows[done.number] = row_of(runs[done.number], done)
                 keep([rows[i] for i in sorted(rows)])
-                if not quiet:
+                if not settings.quiet:
                     told = f"[{len(rows)}/{len(runs)}] {runs[done.number]}: {_summary(row)}"
                     print(told, file=sys.stderr, flush=True)
     except KeyboardInterrupt:

@@ -4,7 +4,6 @@ import math
 import os
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -12,9 +11,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from app import output
+from app.batch import Run, Settings, result_of
 from app.findings import Finding, Findings, printable, shown
 from app.interrupts import late_imports
 from app.options import LogLevel, Renderer, ScenarioName, Seed, Sets, WallLimit
+from app.processes import run_each
 from app.progress import shown_progress
 from app.run_every import run_every
 from app.scenario_file import Scenario, cases, load_scenario
@@ -75,37 +76,23 @@ def run(
         if dry_run:
             _tell(_checked(partial(cases, scenario, overrides), wrong, out), out)
             return
-        jobs, limit = jobs or os.cpu_count() or 1, wall_limit or math.inf
-        raise typer.Exit(
-            run_every(scenario, overrides, jobs, out, junit, video, quiet, wrong, renderer=renderer, wall_limit=limit)
-        )
+        settings = Settings(video, renderer, quiet, wall_limit or math.inf)
+        raise typer.Exit(run_every(scenario, overrides, jobs or os.cpu_count() or 1, out, junit, settings, wrong))
     wrong += _given("is for many cases; write --all, too", jobs=jobs, junit=junit)
     [loaded] = _checked(lambda: [load_scenario(scenario, overrides, case)], wrong, out)
     if dry_run:
         _tell([loaded], out)
         return
     folder = out or output.new_folder(f"{loaded.name}-{loaded.file.seed}")
-    settings = _Settings(video, renderer, gui, quiet, log_level)
+    settings = Settings(video, renderer, quiet, wall_limit or math.inf)
+    here = partial(_run, loaded, folder, settings, gui, log_level)
     try:
-        result = (
-            _run(loaded, folder, settings) if wall_limit is None else _watched(loaded, folder, settings, wall_limit)
-        )
+        result = here() if wall_limit is None else _watched(Run(loaded, loaded.file.seed, folder), here, wall_limit)
     finally:
         if out is None:
             output.leave_if_empty(folder)
     typer.echo(summary(result, folder))
     raise typer.Exit(exit_code(result))
-
-
-@dataclass(frozen=True)
-class _Settings:
-    """How a run is drawn and shown."""
-
-    video: bool
-    renderer: Renderer
-    gui: bool
-    quiet: bool
-    log_level: LogLevel
 
 
 def _checked(load: Callable[[], list[Scenario]], wrong: list[Finding], out: Path | None) -> list[Scenario]:
@@ -120,37 +107,36 @@ def _checked(load: Callable[[], list[Scenario]], wrong: list[Finding], out: Path
     return loaded
 
 
-def _run(scenario: Scenario, folder: Path, settings: _Settings) -> "Result":
+def _run(scenario: Scenario, folder: Path, settings: Settings, gui: bool, log_level: LogLevel) -> "Result":
     """Run in this process, with progress on stderr."""
     with late_imports():
         from app.episode import run_episode  # brings the planner, the compiler and the physics: seconds
 
-    with shown_progress(settings.quiet, settings.log_level) as show:
+    with shown_progress(settings.quiet, log_level) as show:
         return run_episode(
             scenario,
             folder,
             seed=scenario.file.seed,
             video=settings.video,
-            gui=settings.gui,
+            gui=gui,
             renderer=settings.renderer,
             progress=show.tick,
             on_event=show.event,
         )
 
 
-def _watched(scenario: Scenario, folder: Path, settings: _Settings, wall_limit: float) -> "Result":
-    """Run in a process of its own, which is stopped after `wall_limit` seconds."""
-    from app.batch import Run, result_of
-    from app.processes import run_each
-    from app.record_reader import read_record
+def _watched(run: Run, task: Callable[[], "Result"], wall_limit: float) -> "Result":
+    """Do it in a process of its own, which is stopped after `wall_limit` seconds."""
+    from app.record_reader import read_record  # late: it brings py_trees
 
+    assert run.folder is not None
     try:
-        [done] = run_each([partial(_run, scenario, folder, settings)], 1, wall_limit)
+        [done] = run_each([task], 1, wall_limit)
     except KeyboardInterrupt:
-        if (kept := read_record(folder).result) is None:
+        if (kept := read_record(run.folder).result) is None:
             raise
         return kept
-    return result_of(Run(scenario, scenario.file.seed, folder), done)
+    return result_of(run, done)
 
 
 def _tell(loaded: list[Scenario], out: Path | None) -> None:

@@ -1,19 +1,14 @@
 """Every case of a scenario, and what to tell of them."""
 
-import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from app import output
-from app.batch import Episode, Row, Run, run_all
+from app.batch import Episode, Row, Run, Settings, run_all
 from app.findings import Finding, Findings, printable
 from app.junit import write_junit
 from app.scenario_file import cases
 from app.table import print_table
-
-if TYPE_CHECKING:
-    from sim.renderer import RendererName
 
 
 def run_every(
@@ -22,19 +17,14 @@ def run_every(
     jobs: int,
     out: Path | None = None,
     junit: Path | None = None,
-    video: bool = False,
-    quiet: bool = False,
+    settings: Settings = Settings(),  # noqa: B008 - it does not change
     wrong: Sequence[Finding] = (),
-    *,
-    renderer: "RendererName" = "auto",
-    wall_limit: float = math.inf,
     episode: Episode | None = None,
 ) -> int:
     """Run every case, each in its own process, its record in a folder of `out` with its name.
 
     Progress goes to stderr, a table to stdout, JUnit XML to `junit`. Returns the exit code: 0 when all came out as
-    expected, 1 when not, 130 after Ctrl-C, which keeps what was done. A run that takes longer than `wall_limit` s of
-    wall time is stopped. `episode` stands in for `run_episode` in tests.
+    expected, 1 when not, 130 after Ctrl-C, which keeps what was done. `episode` stands in for `run_episode` in tests.
 
     Raises:
         app.findings.Findings: bad input; `wrong` holds what the caller found.
@@ -51,9 +41,7 @@ def run_every(
         raise Findings(found)
     into = out or output.new_folder(f"{loaded[0].name}-all")
     runs = [Run(case, case.file.seed, into / name) for case, name in zip(loaded, folders, strict=True)]
-    rows, interrupted = run_all(
-        runs, jobs, video=video, quiet=quiet, renderer=renderer, wall_limit=wall_limit, episode=episode
-    )
+    rows, interrupted = run_all(runs, jobs, settings=settings, episode=episode)
     if junit:
         junit.parent.mkdir(parents=True, exist_ok=True)
         write_junit(junit, loaded[0].name, runs, rows)

@@ -7,16 +7,12 @@ import sys
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from app.batch import Episode, Row, Run, run_all
+from app.batch import Episode, Row, Run, Settings, run_all
 from app.output import folder_name
 from app.record import plain, versions, write_whole
 from app.scenario_file import Scenario, cases
 from app.table import print_table
-
-if TYPE_CHECKING:
-    from sim.renderer import RendererName
 
 SCENARIOS = ("no_obstacle", "short_obstacle", "tall_obstacle")
 _Z = 1.959964  # of the normal distribution, for 95 %
@@ -27,17 +23,14 @@ def run_demo(
     jobs: int,
     out: Path | None,
     overrides: Sequence[str] = (),
-    *,
-    renderer: "RendererName" = "auto",
-    wall_limit: float = math.inf,
+    settings: Settings = Settings(),  # noqa: B008 - it does not change
     episode: Episode | None = None,
 ) -> int:
     """The whole demonstration: every case of three scenarios with every seed, each run in its own process.
 
     Progress goes to stderr, a table to stdout; with `out`, runs go to out/runs/ and the figures to out/demo.json, which
-    is whole after every run. A run that takes longer than `wall_limit` s, by the clock on the wall, is stopped. Returns
-    the exit code: 0 when all runs came to an end, however they went, 130 after Ctrl-C, 2 when `out` holds a study.
-    `episode` stands in for `run_episode` in tests.
+    is whole after every run. Returns the exit code: 0 when all runs came to an end, however they went, 130 after
+    Ctrl-C, 2 when `out` holds a study. `episode` stands in for `run_episode` in tests.
 
     Raises:
         app.findings.Findings: a scenario with these overrides is wrong.
@@ -48,14 +41,7 @@ def run_demo(
         return 2
     chosen = [case for name in SCENARIOS for case in cases(name, overrides)]
     runs = [Run(case, seed, _folder(out, case, seed)) for case in chosen for seed in seeds]
-    done, interrupted = run_all(
-        runs,
-        jobs,
-        lambda rows: _write(out, rows, runs, overrides),
-        renderer=renderer,
-        wall_limit=wall_limit,
-        episode=episode,
-    )
+    done, interrupted = run_all(runs, jobs, lambda rows: _write(out, rows, runs, overrides), settings, episode)
     rows = list(done.values())
     _write(out, rows, runs, overrides)
     print_table(_HEADER, table(rows))

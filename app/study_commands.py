@@ -38,10 +38,11 @@ def demo(
     if wrong := _unfit(out, "demo.json"):
         raise Findings(wrong)
     with late_imports():
+        from app.batch import Settings
         from app.study import run_demo
 
-    limit = math.inf if wall_limit is None else wall_limit
-    raise typer.Exit(run_demo(chosen, jobs, out, sets or [], renderer=renderer, wall_limit=limit))
+    settings = Settings(renderer=renderer, wall_limit=math.inf if wall_limit is None else wall_limit)
+    raise typer.Exit(run_demo(chosen, jobs, out, sets or [], settings))
 
 
 Techniques = Annotated[str | None, typer.Option(metavar="A,B", help="Techniques to try; default all.")]

@@ -1,4 +1,3 @@
-import math
 import os
 import re
 import signal
@@ -12,6 +11,7 @@ import pytest
 from toy_scenario import write_scenario
 from typer.testing import CliRunner
 
+from app.batch import Settings
 from app.cli import app
 from app.findings import Findings
 from app.options import parse_seeds
@@ -231,15 +231,14 @@ def test_trees_leaves_says_what_a_tree_may_hold() -> None:
 def test_study_demo_hands_on_seeds_jobs_and_overrides(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[Any] = []
 
-    def run_demo(*args: Any, **options: Any) -> int:
-        asked.extend([*args, options])
+    def run_demo(*args: Any) -> int:
+        asked.extend(args)
         return 130
 
     monkeypatch.setattr("app.study.run_demo", run_demo)
     ran = invoke("study", "demo", "--seeds", "2:5", "--jobs", "3", "--out", "study", "--set", "inputs.tries=1")
     assert ran.exit_code == 130
-    options = {"renderer": "auto", "wall_limit": math.inf}
-    assert asked == [range(2, 5), 3, Path("study"), ["inputs.tries=1"], options]
+    assert asked == [range(2, 5), 3, Path("study"), ["inputs.tries=1"], Settings()]
 
 
 @pytest.mark.parametrize("text", ["5", "5:", ":5", "5:5", "6:5", "a:b", "-1:3", "1:2:3", ""])

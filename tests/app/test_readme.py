@@ -24,6 +24,7 @@ def test_a_command_of_the_readme_is_one_of_ours(command: str) -> None:
     while hasattr(group, "resolve_command"):
         name, group, words = group.resolve_command(context, words)
         context = group.make_context(name, list(words), parent=context)
+    assert context.command is group
 
 
 def test_runs_are_made_before_they_are_looked_at() -> None:

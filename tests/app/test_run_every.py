@@ -7,7 +7,7 @@ import pytest
 from toy_scenario import SCENARIO, write_scenario
 from typer.testing import CliRunner
 
-from app.batch import Row, Run, row_of
+from app.batch import Row, Run, Settings, row_of
 from app.cli import app
 from app.findings import Findings
 from app.junit import write_junit
@@ -96,7 +96,7 @@ def test_every_case_leaves_a_line_a_record_and_a_testcase(
 
 
 def test_all_as_expected_exits_0_and_a_set_value_narrows(capfd: pytest.CaptureFixture[str]) -> None:
-    assert run_every("mine.yaml", ["seed=0"], 1, episode=good, quiet=True) == 0
+    assert run_every("mine.yaml", ["seed=0"], 1, settings=Settings(quiet=True), episode=good) == 0
     out, err = capfd.readouterr()
     assert out.splitlines()[-1] == "mine: 1 of 1 cases as expected; records in runs/mine-all-1"
     assert err == ""
