@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 STAMP := .venv/.installed
 
-.PHONY: setup run test lint bench fuzz readme
+.PHONY: setup run test lint bench fuzz readme guard
 .DEFAULT_GOAL := run
 
 setup: $(STAMP) ; @:
@@ -35,3 +35,6 @@ fuzz: setup
 
 readme: setup
 	$(BIN)/python tests/app/readme_commands.py
+
+guard: setup
+	$(BIN)/python tests/guard/run_guard.py check
