@@ -57,7 +57,11 @@ def train_detector(
         import onnx  # noqa: F401 - torch exports through it
         import torch  # noqa: F401
     except ImportError as error:
-        wrong.append(Finding("train-detector", 0, f"{error.name} is not installed; pip install 'regrasp[train]'"))
+        wrong.append(
+            Finding(
+                "train-detector", 0, f"{error.name} is not installed; pip install -e '.[train]' in the project's folder"
+            )
+        )
     if start is not None and not start.is_file():
         wrong.append(Finding(shown(start), 0, "is no file; name an ONNX file that `regrasp train-detector` made"))
     if wrong:

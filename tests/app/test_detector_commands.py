@@ -18,7 +18,7 @@ def test_without_torch_it_says_what_to_install(tmp_path: Path, monkeypatch: pyte
     monkeypatch.setitem(sys.modules, "onnx", None)
     result = invoke("train-detector", "--out", str(tmp_path / "out"))
     assert result.exit_code == 2
-    assert "pip install 'regrasp[train]'" in result.output
+    assert "pip install -e '.[train]' in the project's folder" in result.output
     assert not (tmp_path / "out").exists()
 
 
