@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from functools import lru_cache
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -13,16 +14,22 @@ from app.placement import (
     arm_base,
     asleep,
     box_halves,
+    cable_at_start,
+    cable_error,
     cube_depths,
     fixed_cameras,
+    line_depth,
     penetration,
     socket_block,
 )
 from app.yaml_lines import Document, Path
-from interfaces.cell import PLUGGED_INTO, Cell, KnownCell
+from interfaces.cell import PLUGGED_INTO, Cell, FixedMount, KnownCell
+from interfaces.fault import JOINT_NAMES
 from interfaces.quote import cut, quoted
+from interfaces.scene import GRAVITIES
 
 MOST_OVERLAP = 0.005  # metres: the spheres that fill an arm stand out of it by less
+ENDS = 0.05  # metres of the cable at its sockets, which are built in
 
 
 class Part(NamedTuple):
@@ -37,8 +44,14 @@ class Part(NamedTuple):
 def impossible(document: Document, cell: Cell) -> list[Finding]:
     """What is wrong with a cell although each of its values is right."""
     known = cell.known
-    found = [*_joints(document, known), *_overlaps(document, known), *_cable(document, cell), *_clip(document, known)]
-    return found or [*_plug(document, known)]  # which takes a moment
+    found = [
+        *_joints(document, known),
+        *_overlaps(document, known),
+        *_cable(document, cell),
+        *_clip(document, known),
+        *_sight(document, known),
+    ]
+    return found or [*_in_the_way(document, cell), *_plug(document, known)]  # which take a moment
 
 
 def _joints(document: Document, known: KnownCell) -> Iterator[Finding]:
@@ -47,9 +60,9 @@ def _joints(document: Document, known: KnownCell) -> Iterator[Finding]:
     for i, arm in enumerate(known.arms):
         for j, (angle, low, high) in enumerate(zip(arm.sleep, LOWER, UPPER, strict=True)):
             if not low <= angle <= high:
-                message = f"{cut(str(angle))} rad is past the limits of joint {j} of the {arm.name} arm; "
-                right = f"write one from {low:.2f} to {high:.2f}"
-                yield Finding(*document.place(("known", "arms", i, "sleep", j)), message + right)
+                told = f"{angle:g} rad is past the limits of the {arm.name} arm's {JOINT_NAMES[j]}; "
+                inside = f"write one from {np.ceil(100 * low) / 100:.2f} to {np.floor(100 * high) / 100:.2f}"
+                yield Finding(*document.place(("known", "arms", i, "sleep", j)), told + inside)
 
 
 def _overlaps(document: Document, known: KnownCell) -> Iterator[Finding]:
@@ -61,12 +74,29 @@ def _overlaps(document: Document, known: KnownCell) -> Iterator[Finding]:
             if depth > MOST_OVERLAP:
                 message = f"{cut(part.name)} reaches {depth:.3f} m into {name}; move one of them"
                 yield Finding(*document.place(part.path), message)
+    if (depth := _between_the_arms(known)) > MOST_OVERLAP:
+        message = f"the arms asleep reach {depth:.3f} m into each other; change their sleep or their bases"
+        yield Finding(*document.place(("known", "arms")), message)
     for name, place in fixed_cameras(known):
-        for part in parts:
+        for part in [*parts, *bases]:
             if penetration(part.halves, place - part.center) > 0:
                 yield Finding(
                     *document.place(part.path), f"the {name} camera is inside {cut(part.name)}; move one of them"
                 )
+
+
+def _between_the_arms(known: KnownCell) -> float:
+    """How deep (m) the arms asleep reach into each other, by the spheres that fill their moving links."""
+    from motion.spheres import LINKS, SPHERES  # late: they bring the compiler
+
+    moving = LINKS > 0
+    radii = SPHERES[moving, 3]
+    bodies = [asleep(arm)[0][moving] for arm in known.arms]
+    deepest = [
+        float((radii[:, None] + radii[None] - np.linalg.norm(a[:, None] - b[None], axis=2)).max())
+        for a, b in combinations(bodies, 2)
+    ]
+    return max(deepest, default=0.0)
 
 
 def _inside(known: KnownCell, part: Part, bases: list[Part]) -> Iterator[tuple[str, float]]:
@@ -105,6 +135,42 @@ def _parts(known: KnownCell) -> Iterator[Part]:
         yield Part(("known", "sockets", i), *socket_block(socket))
 
 
+def _in_the_way(document: Document, cell: Cell) -> Iterator[Finding]:
+    """Boxes through which the cable hangs at the start, in one gravity or the other, but at its ends."""
+    for part in _parts(cell.known):
+        if part.path[1] == "sockets":
+            continue
+        for gravity in GRAVITIES:
+            points = np.array(cable_at_start(cell, gravity))
+            points = points[(along := np.linspace(0.0, cell.hidden.cable.length, len(points))) > ENDS]
+            points = points[: -np.count_nonzero(along > cell.hidden.cable.length - ENDS)]
+            depth = line_depth(part.halves, part.center, points, cell.hidden.cable.radius) if len(points) > 1 else 0.0
+            if depth > max(MOST_OVERLAP, cable_error(cell, gravity)):
+                told = (
+                    f"{cut(part.name)} reaches {depth:.3f} m into the cable at the start ({gravity} gravity); move it"
+                )
+                yield Finding(*document.place(part.path), told)
+                break
+
+
+def _sight(document: Document, known: KnownCell) -> Iterator[Finding]:
+    """The rear camera, which watches the carrying, must see where it begins or ends."""
+    camera = known.camera("rear")
+    if not isinstance(camera.mount, FixedMount):
+        return
+    pose, k = camera.mount.world_from_camera, camera.intrinsics
+    plug = known.socket(PLUGGED_INTO).world_from_plug(known.connector.length).translation
+    for target in (plug, np.asarray(known.clip.seat)):
+        x, y, z = pose.inv().apply(target)
+        in_view = z > 0 and 0 <= k.fx * x / z + k.cx < k.width and 0 <= k.fy * y / z + k.cy < k.height
+        half, middle = 0.5 * (target - pose.translation) * 0.9, pose.translation + 0.45 * (target - pose.translation)
+        boxes = [part for part in _parts(known) if part.path[1] == "boxes"]
+        if in_view and all(penetration(np.vstack([b.halves, half]), b.center - middle) <= 0 for b in boxes):
+            return
+    where = document.place(("known", "cameras", known.cameras.index(camera), "mount"))
+    yield Finding(*where, "the rear camera sees neither the plugged connector nor the clip; turn or move it")
+
+
 def _cable(document: Document, cell: Cell) -> Iterator[Finding]:
     known, cable = cell.known, cell.hidden.cable
     plugged = known.socket(PLUGGED_INTO)
@@ -140,6 +206,14 @@ def _clip(document: Document, known: KnownCell) -> Iterator[Finding]:
 
 
 def _plug(document: Document, known: KnownCell) -> Iterator[Finding]:
+    from motion.service import JAW_SLACK, OPEN_GAP  # late: it brings the planner and the compiler
+
+    thick = 2 * known.connector.radius
+    if thick + 2 * JAW_SLACK > OPEN_GAP:
+        message = f"a connector {1e3 * thick:.0f} mm thick does not fit the jaw, which opens {1e3 * OPEN_GAP:.0f} mm"
+        right = f"write a radius up to {0.5 * OPEN_GAP - JAW_SLACK:.3f}"
+        yield Finding(*document.place(("known", "connector", "radius")), f"{message} and needs some room; {right}")
+        return
     if trouble := _no_grasp(known):
         message = f"no way to take hold of a connector in socket {cut(known.plugged_into)}: {trouble}"
         yield Finding(*document.place(("known", "plugged_into")), f"{message}; plug it in elsewhere, or make room")

@@ -57,7 +57,7 @@ class _Group(TyperGroup):
                 typer.echo(str(finding), err=True)
             raise typer.Exit(EXIT_BAD_INPUT) from None
         except typer.BadParameter as error:  # quotes all that was typed
-            error.message = cut(error.message, 3 * MOST)
+            error.message = cut(error.message.removeprefix("Value error, "), 3 * MOST)
             raise
         except OSError as error:  # a disk that is full, a name that is too long
             if error.errno == errno.EPIPE:

@@ -1,10 +1,13 @@
 """Ctrl-C, SIGTERM, SIGHUP and the wall limit: each ends a run by a KeyboardInterrupt, and its record is kept."""
 
+import multiprocessing
+import os
 import signal
 import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from multiprocessing.connection import wait
 from types import FrameType
 from typing import NoReturn
 
@@ -60,7 +63,7 @@ def stoppable() -> Iterator[None]:
 
 
 def listen_to_parent() -> None:
-    """In a child process: SIGTERM, by which the parent passes on that it was stopped, and the wall limit."""
+    """In a child process: SIGTERM, by which the parent passes on that it was stopped, its death, and the wall limit."""
 
     def stop(_number: int, _frame: FrameType | None) -> NoReturn:
         raise KeyboardInterrupt
@@ -70,6 +73,14 @@ def listen_to_parent() -> None:
 
     signal.signal(signal.SIGTERM, stop)
     signal.signal(WALL_LIMIT_SIGNAL, too_long)
+    if (parent := multiprocessing.parent_process()) is not None:
+        threading.Thread(target=_follow, args=(parent.sentinel,), daemon=True).start()
+
+
+def _follow(sentinel: int) -> None:
+    """Wait for the parent's death, of which it could not tell, and end as if it had."""
+    wait([sentinel])
+    os.kill(os.getpid(), signal.SIGTERM)
 
 
 @contextmanager

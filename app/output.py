@@ -12,7 +12,8 @@ from app.findings import Finding, real, shown
 from interfaces.quote import quoted
 
 RUNS = Path("runs")  # where records go by default
-FILES = ("result.json", "events.jsonl", "ticks.jsonl", "scenario.yaml", "cell.yaml", "tree.xml")  # of a run's folder
+RUN_FILES = ("result.json", "events.jsonl", "ticks.jsonl")  # by which a run's folder is known
+FILES = (*RUN_FILES, "scenario.yaml", "cell.yaml", "tree.xml")  # of a run's folder
 
 
 def new_folder(name: str, within: Path = RUNS) -> Path:
@@ -36,6 +37,8 @@ def leave_if_empty(folder: Path) -> None:
     """Take a folder away in which nothing was written."""
     with contextlib.suppress(OSError):
         folder.rmdir()
+        if folder.parent == RUNS:
+            RUNS.rmdir()
 
 
 def folder_name(case: str) -> str:
@@ -51,8 +54,11 @@ def taken(out: Path) -> list[str]:
 
 def holds_a_run(out: Path) -> list[Finding]:
     """The finding of a folder that another run has taken, [] of one that is free."""
-    if there := taken(out):
+    there = taken(out)
+    if set(there) & set(RUN_FILES):
         return [Finding(shown(out), 0, f"holds a run already ({', '.join(there)}); name another folder")]
+    if there:
+        return [Finding(shown(out), 0, f"holds {', '.join(there)}, which a run would overwrite; name another folder")]
     return []
 
 

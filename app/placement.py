@@ -26,7 +26,9 @@ FloatArray = NDArray[np.float64]
 _BASE_CENTER = np.array([-0.0475, 0.0, 0.0394])
 _BASE_SIZE = (0.300, 0.204, 0.0787)
 TOUCHING = 1e-6  # metres of overlap that are rounding
-CABLE_ERROR = 0.003  # metres by which the cable's computed shape may be off
+CABLE_ERROR = 0.003  # metres by which the computed shape of a taut cable may be off
+SLACK_ERROR = 0.05  # metres, of a slack one: it gives way, and may rest in another shape
+TAUT = 0.95  # share of its length that lies between the ends of a taut cable
 _LIST, _TEXT, _YAW = TypeAdapter(list[Any]), TypeAdapter(str), TypeAdapter[float](Yaw)
 _SIZE, _JITTER, _POINT = TypeAdapter[Size](ObstacleSize), TypeAdapter[Vector](Jitter), TypeAdapter[Vector](Vector)
 
@@ -96,31 +98,55 @@ def _entered(
 def _in_the_cable(
     cell: Cell, gravity: Gravity, center: FloatArray, size: Size, yaw_deg: float, jitter: Vector
 ) -> list[tuple[str, float]]:
-    """As `overlaps`, of the cable as it hangs at the start, and of the connector in its socket."""
+    """As `overlaps`, of the cable as it hangs at the start, and of the connector in its socket and in the clip."""
     turn = Rotation.from_euler("z", yaw_deg, degrees=True).as_matrix()
     moving = np.vstack([box_halves(turn, size), np.diag(jitter)])
     found = []
-    for name, radius, points in cable_at_start(cell, gravity):
-        ends = np.asarray(points)
-        depth = radius + max(
-            penetration(np.vstack([moving, 0.5 * (b - a)]), center - 0.5 * (a + b)) for a, b in pairwise(ends)
-        )
-        if depth > CABLE_ERROR:
+    for name, radius, points in lines(cell, gravity):
+        depth = line_depth(moving, center, points, radius)
+        if depth > (cable_error(cell, gravity) if name.startswith("the cable") else TOUCHING):
             found.append((name, depth))
     return found
 
 
+def cable_error(cell: Cell, gravity: Gravity) -> float:
+    """By how much (m) the cable may hang elsewhere than `cable_at_start` says."""
+    points = cable_at_start(cell, gravity)
+    way = float(np.linalg.norm(np.subtract(points[-1], points[0])))
+    return CABLE_ERROR if way > TAUT * cell.hidden.cable.length else SLACK_ERROR
+
+
+def line_depth(generators: FloatArray, center: FloatArray, points: FloatArray, radius: float) -> float:
+    """How far (m) a round line through `points` (n, 3) reaches into a box; at most 0 when apart.
+
+    `generators` (m, 3) are the box's half edges, and those of the places of its `center` (3,), metres.
+    """
+    links = ((0.5 * (b - a), center - 0.5 * (a + b)) for a, b in pairwise(points))
+    return radius + max(penetration(np.vstack([generators, half]), offset) for half, offset in links)
+
+
+def lines(cell: Cell, gravity: Gravity) -> list[tuple[str, float, FloatArray]]:
+    """Name, radius and middle line (n, 3), m, of the cable at the start, the plugged and the stowed connector."""
+    known = cell.known
+    ends = [[-0.5 * known.connector.length, 0.0, 0.0], [0.5 * known.connector.length, 0.0, 0.0]]
+    plug = known.socket(PLUGGED_INTO).world_from_plug(known.connector.length)
+    return [
+        (
+            f"the cable at the start ({gravity} gravity)",
+            cell.hidden.cable.radius,
+            np.array(cable_at_start(cell, gravity)),
+        ),
+        ("the plugged connector", known.connector.radius, plug.apply(ends)),
+        ("the stowed connector", known.connector.radius, known.clip.world_from_seat.apply(ends)),
+    ]
+
+
 @lru_cache(maxsize=16)
-def cable_at_start(cell: Cell, gravity: Gravity) -> tuple[tuple[str, float, tuple[Vector, ...]], ...]:
-    """Name, radius and middle line (points, m) of the cable as it hangs at the start, and of the plugged connector."""
-    length, cable = cell.known.connector.length, cell.hidden.cable
+def cable_at_start(cell: Cell, gravity: Gravity) -> tuple[Vector, ...]:
+    """Points (m) of the cable's middle line as it hangs at the start, from its fixed end to the connector."""
+    length = cell.known.connector.length
     plug = cell.known.socket(PLUGGED_INTO).world_from_plug(length)
-    hanging = tuple(map(tuple, rest_shape(cable, plug, length, gravity).tolist()))
-    connector = tuple(map(tuple, plug.apply([[-0.5 * length, 0.0, 0.0], [0.5 * length, 0.0, 0.0]]).tolist()))
-    return (
-        ("the cable at the start", cable.radius, hanging),
-        ("the plugged connector", cell.known.connector.radius, connector),
-    )
+    return tuple(map(tuple, rest_shape(cell.hidden.cable, plug, length, gravity).tolist()))
 
 
 def overlaps(

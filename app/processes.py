@@ -127,7 +127,7 @@ def _stop(processes: Sequence[Any]) -> None:
 
 def _child(writer: "Connection[Any, Any]", task: Callable[[], Any]) -> None:
     listen_to_parent()
-    with contextlib.suppress(KeyboardInterrupt):
+    with contextlib.suppress(KeyboardInterrupt, BrokenPipeError):  # nobody waits for the answer any more
         try:
             value, error = task(), ""
         except Exception as problem:

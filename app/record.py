@@ -235,6 +235,7 @@ class Record:
         self.events: TextIO = io.StringIO()
         self.ticks: TextIO = io.StringIO()
         self._at_work: BinaryIO = io.BytesIO()
+        self._longest = 0
         if folder is not None:
             folder.mkdir(parents=True, exist_ok=True)
             if found := output.findings(folder):
@@ -244,6 +245,7 @@ class Record:
             except FileExistsError:  # another run took the folder this very moment
                 raise Findings(output.holds_a_run(folder)) from None
             self._at_work = (folder / AT_WORK).open("wb", buffering=0)
+            self.at_work(0.0, "")
             self.ticks = (folder / "ticks.jsonl").open("x", encoding="utf-8", newline="\n")
             for name, text in (copies or {}).items():
                 (folder / name).write_text(text, encoding="utf-8", newline="\n")
@@ -271,10 +273,10 @@ class Record:
 
         Should the process die or hang in the middle of it, this is all that names the leaf.
         """
-        line = json.dumps({"t": round(t, 6), "node": node}).encode() + b"\n"
+        line = json.dumps({"t": round(t, 6), "node": node}).ljust(self._longest)
+        self._longest = len(line)  # a shorter line leaves nothing of a longer one, in a single write
         self._at_work.seek(0)
-        self._at_work.write(line)
-        self._at_work.truncate()
+        self._at_work.write(line.encode() + b"\n")
 
     def finish(self, result: Result) -> None:
         """The run's result, written when the record closes; a later one replaces it."""

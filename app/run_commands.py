@@ -70,10 +70,13 @@ def run(
     Exit code: 0 all that the scenario expects came out, 1 something did not, 2 bad input, 130 Ctrl-C.
     """
     overrides = [*(sets or []), *([] if seed is None else [f"seed={seed}"])]
-    wrong = [] if not gui or _display() else [_NO_DISPLAY]
+    twice = seed is not None and any(text.partition("=")[0].strip() == "seed" for text in sets or [])
+    wrong = [Finding("--seed", 0, "the seed is given by --set, too; leave one out")] if twice else []
+    wrong += [] if not gui or _display() else [_NO_DISPLAY]
     if every:
         wrong += _given("is for a single case; leave --all out", case=case, gui=gui, log_level=log_level)
         if dry_run:
+            wrong += output.unwritable_file(junit) if junit else []
             _tell(_checked(partial(cases, scenario, overrides), wrong, out), out)
             return
         settings = Settings(video, renderer, quiet, wall_limit or math.inf)
@@ -91,6 +94,9 @@ def run(
     finally:
         if out is None:
             output.leave_if_empty(folder)
+    if wall_limit is not None and result.cause and not folder.exists():  # it was stopped before that
+        typer.echo(f"{result.cause.code}: {result.cause.message}, before the run began; there is no record", err=True)
+        raise typer.Exit(EXIT_UNMET)
     typer.echo(summary(result, folder))
     raise typer.Exit(exit_code(result))
 

@@ -61,7 +61,8 @@ def _tell(name: str, runs: Sequence[Run], rows: Mapping[int, Row], into: Path) -
         )
         for row in rows.values()
     ]
-    print_table(header, lines)
+    if lines:
+        print_table(header, lines)
     for row in rows.values():
         if not row.succeeded:
             print(f"{printable(row.case)}: {printable(row.why)}")

@@ -1,5 +1,6 @@
 """Scenario files: which cell, which tree, what goes wrong, and what must come out."""
 
+from collections import Counter
 from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, replace
@@ -72,7 +73,9 @@ def load_scenario(name_or_path: str, overrides: Sequence[str] = (), case: str | 
     source = _Source(name_or_path, overrides)
     names = [name for name, _ in source.cases]
     if case is not None and case not in names and not source.found:
-        source.note([Finding("--case", 0, f"no case {quoted(case)}; {nearest(case, names)}")])
+        fixed = bool(overrides) and case in (name for name, _ in _Source(name_or_path, ()).cases)
+        right = "--set fixes what makes this case; leave one of them out" if fixed else nearest(case, names)
+        source.note([Finding("--case", 0, f"no case {quoted(case)}; {right}")])
     wanted = names.index(case) if case in names else 0
     return source.checked(source.cases[wanted : wanted + 1])[0]
 
@@ -282,6 +285,10 @@ def _on_base(top: Document, folder: Path) -> Document:
 def _misnamed(document: Document, cell: Cell) -> Iterator[Finding]:
     """Names in a cell that do not go together."""
     known = cell.known
+    boxes = [*known.boxes, *known.clip.bracket]
+    for name, count in Counter(box.name for box in boxes).items():
+        if count > 1:
+            yield Finding(*document.place(("known", "boxes")), f"{count} boxes are named {quoted(name)}; rename them")
     sockets = [s.name for s in known.sockets]
     if known.plugged_into not in sockets:
         message = f"no socket {quoted(known.plugged_into)}; {nearest(known.plugged_into, sockets)}"

@@ -11,7 +11,7 @@ from interfaces.cell import Color, Direction, Fraction, Model, NotNegative, Vect
 from interfaces.scene import Gravity
 
 Outcome = Literal["stowed", "safe_stop"]
-Edge = Annotated[float, Field(gt=0, le=3)]  # metres
+Edge = Annotated[float, Field(ge=1e-3, le=3)]  # metres
 ObstacleSize = tuple[Edge, Edge, Edge]
 Reach = Annotated[float, Field(ge=0, le=1)]  # metres
 Jitter = tuple[Reach, Reach, Reach]

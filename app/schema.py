@@ -39,6 +39,8 @@ _UNITS = dict.fromkeys(_LENGTHS.split(), _METRES) | {  # by the name of the key 
     "speed": "metres a second, such as 0.25",
     "impulse": "newton seconds, such as 0.1",
     "stiffness": "newtons a metre, such as 100.0",
+    "stiffness.zero": "newton square metres, such as 0.05",
+    "stiffness.earth": "newton square metres, such as 0.16",
     "angle": "radians, such as 0.3",
 }
 
@@ -153,7 +155,8 @@ def _short(document: Document, path: Path) -> str:
 
 def _expected(document: Document, root: Schema, path: Path) -> str:
     """What would be right at `path`, in words."""
-    key = next((step for step in reversed(path) if isinstance(step, str)), "")
+    keys = [step for step in path if isinstance(step, str)]
+    key = "" if not keys else ".".join(keys[-2:]) if ".".join(keys[-2:]) in _UNITS else keys[-1]
     nodes = nodes_at(root, path, document.value)
     kinds = [node["properties"]["type"]["const"] for node in nodes if "type" in node.get("properties", {})]
     if kinds:

@@ -19,6 +19,7 @@ Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Length = Annotated[float, Field(ge=1e-4, le=10)]  # metres
 Force = Annotated[float, Field(ge=1e-3, le=1e4)]  # newtons
+Near = Annotated[float, Field(ge=-0.3, le=0.3)]  # metres
 Mass = Annotated[float, Field(ge=1e-5, le=100)]  # kilograms, or kilograms a metre
 Friction = Annotated[float, Field(ge=1e-3, le=10)]
 Seconds = Annotated[float, Field(ge=0, le=10)]
@@ -166,7 +167,7 @@ class WristMount(Model):
     """A camera on an arm's wrist link (before the last joint), looking along the link's x axis."""
 
     arm: Literal["left", "right"]
-    offset: Vector  # metres, in the wrist link's frame
+    offset: tuple[Near, Near, Near]  # metres, in the wrist link's frame
 
     @property
     def wrist_from_camera(self) -> RigidTransform:
@@ -259,7 +260,7 @@ class Cable(Model):
     """The flexible part of the cable, clamped at `anchor`, at rest straight along `anchor_axis`."""
 
     length: Length
-    radius: Length
+    radius: Annotated[float, Field(ge=1e-4, le=0.03)]
     mass_per_length: Mass  # kg/m
     links: Annotated[int, Field(ge=4, le=30)]  # PyBullet reads at most 31 spherical joints
     stiffness: Stiffness
@@ -297,7 +298,7 @@ class Light(Model):
 class GripperSpec(Model):
     """The jaw: pads on the fingers, and how hard it presses."""
 
-    pad_thickness: Length
+    pad_thickness: Annotated[float, Field(ge=1e-4, le=0.02)]
     max_force: Force  # newtons a finger
     speed: Annotated[float, Field(ge=1e-3, le=10)]  # m/s a finger
     friction: Friction

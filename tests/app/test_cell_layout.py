@@ -32,7 +32,7 @@ def findings(*overrides: str, scenario: str = "no_obstacle") -> list[str]:
         ("known.plugged_into=back_3", "a cable 0.553 m long does not reach a connector in socket back_3, 0.582 m away"),
         ("hidden.cable.length=0.54", "a cable 0.54 m long does not reach a connector in socket back_4, 0.545 m away"),
         ("known.plugged_into=right_1", "'right_1', the last socket, holds the cable's other end; name another"),
-        ("known.arms.0.sleep.2=3", "3.0 rad is past the limits of joint 2 of the left arm; write one from -1.76 to"),
+        ("known.arms.0.sleep.2=3", "3 rad is past the limits of the left arm's elbow; write one"),
         ("known.boxes.0.center.2=0.03", "floor reaches 0.050 m into the left arm's base; move one of them"),
         ("known.boxes.0.center.2=0.3", "no way to take hold of a connector in socket back_4: 1152 grasp candidates: "),
         ("known.boxes.0.center.2=0.48", "floor reaches 0.015 m into the stowed connector; move one of them"),
@@ -40,11 +40,28 @@ def findings(*overrides: str, scenario: str = "no_obstacle") -> list[str]:
         ("known.arms.1.base=[0, 0.1, 0]", "the right arm's base reaches 0.079 m into the left arm's base; move one"),
         ("known.clip.seat=[0.2, 0.9, 0.4]", "the clip is 1.13 m from the right arm's shoulder, which reaches 0.80 m"),
         ("known.connector={length: 0.09, radius: 0.05, color: [1, 0, 0]}", "back_panel reaches 0.015 m into the plug"),
+        ("known.connector.radius=0.022", "a connector 44 mm thick does not fit the jaw, which opens"),
+        ("known.boxes.0.name=back_panel", "2 boxes are named 'back_panel'; rename them"),
+        ("known.cameras.0.mount.position=[-0.3, 0, -0.5]", "the rear camera sees neither the plugged connector"),
+        ("known.boxes.0={name: a, center: [0.42, -0.2, 0.15], size: [0.05, 0.05, 0.3]}", "a reaches 0.029 m into"),
+        ("hidden.gripper.pad_thickness=0.1", "hidden.gripper.pad_thickness is 0.1; expected a number (at least"),
+        ("hidden.cable.stiffness.zero=50", "hidden.cable.stiffness.zero is 50; expected a number in newton square"),
         ("known.latencies.image=1.0e+300", "known.latencies.image is 1e+300; expected a number (at least 0, at"),
     ],
 )  # fmt: skip
 def test_a_cell_that_cannot_work_is_told_before_a_run(override: str, expected: str) -> None:
     assert [message for message in findings(f"cell.{override}") if message.startswith(expected)]
+
+
+def test_arms_that_sleep_in_each_other_are_told() -> None:
+    sleeps = [f"cell.known.arms.{i}.sleep=[{waist}, 0.3, 0, 0, 0.8, 0]" for i, waist in enumerate((-1.57, 1.57))]
+    [told] = findings(*sleeps)
+    assert told.startswith("the arms asleep reach 0.051 m into each other")
+
+
+def test_an_obstacle_where_the_connector_is_to_be_stowed_is_told() -> None:
+    [told] = findings("obstacles=[{name: o, position: [0.265, 0.065, 0.4], size: [0.05, 0.05, 0.1]}]")
+    assert told.startswith("obstacle 'o' reaches 0.042 m into the stowed connector")
 
 
 @pytest.mark.parametrize("socket", ["back_1", "back_2"])
@@ -78,7 +95,7 @@ def test_a_position_may_be_one_vector_or_one_for_each_gravity() -> None:
 
 @pytest.mark.parametrize("gravity", GRAVITIES)
 def test_the_cable_hangs_at_the_start_as_the_world_lays_it(cell: Cell, gravity: Gravity) -> None:
-    [(_, _, points), _] = cable_at_start(cell, gravity)
+    points = cable_at_start(cell, gravity)
     world = World(cell, gravity, seed=0, renderer="tiny")
     states = p.getLinkStates(world.cable.body, range(cell.hidden.cable.links), 1, 1, physicsClientId=world.client)
     np.testing.assert_allclose(points[:-1], [state[4] for state in states], atol=0.003)

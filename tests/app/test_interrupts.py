@@ -136,6 +136,27 @@ def test_nohup_is_respected(start: Started) -> None:
     assert process.poll() is None
 
 
+@pytest.mark.parametrize("options", [("--wall-limit", "100"), ("--all", "--jobs", "1")])
+def test_a_run_whose_parent_is_killed_ends_with_its_record(start: Started, options: tuple[str, ...]) -> None:
+    process = start("Goes", *options)
+    folder = Path("run") if "--all" not in options else Path("run/default")
+    until(lambda: (folder / "ticks.jsonl").exists() and (folder / "ticks.jsonl").stat().st_size > 0, process)
+    process.kill()
+    _, told = process.communicate(timeout=PATIENCE)  # the child has its streams, too: it has ended
+    assert "Traceback" not in told
+    assert json.loads((folder / "result.json").read_text())["outcome"] == "interrupted"
+
+
+def test_a_run_stopped_before_it_began_has_no_record_and_says_so(start: Started, tmp_path: Path) -> None:
+    write(tmp_path, "Goes")
+    command = [sys.executable, str(ROOT / "tests/app/hanging.py"), "run", "mine.yaml", "--wall-limit", "1"]
+    ran = subprocess.run(command, capture_output=True, text=True, env={**os.environ, "PYTHONPATH": str(ROOT)})
+    assert ran.returncode == 1
+    if "before the run began" in ran.stderr:  # a very quick machine may come further in a second
+        assert ran.stderr == "wall_limit: stopped after 1 s of wall time, before the run began; there is no record\n"
+        assert not (tmp_path / "runs").exists()
+
+
 def hang() -> None:
     while True:
         time.sleep(0.01)

@@ -119,7 +119,7 @@ def test_copies_of_what_is_run_are_there_from_the_beginning(tmp_path: Path) -> N
 @pytest.mark.parametrize("name", ["result.json", "events.jsonl", "ticks.jsonl", "tree.xml"])
 def test_a_folder_that_holds_a_run_is_refused_and_left_alone(tmp_path: Path, name: str) -> None:
     (tmp_path / name).write_text("mine")
-    with pytest.raises(Findings, match=f"holds a run already .*{name}"):
+    with pytest.raises(Findings, match=f"holds .*{name}.*; name another folder"):
         Record(tmp_path, "s", 1)
     assert [(p.name, p.read_text()) for p in tmp_path.iterdir()] == [(name, "mine")]
 
