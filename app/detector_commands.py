@@ -99,7 +99,7 @@ def evaluate_detector(
 
     \b
     Example:
-      regrasp evaluate-detector results/detector/detector.onnx --out evaluation.json
+      regrasp evaluate-detector perception/detector.onnx --out evaluation.json
     """
     wrong = output.unwritable_file(out, new=True) if out else []
     if out is not None and out.suffix.lower() == ".onnx":

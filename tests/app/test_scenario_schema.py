@@ -83,7 +83,7 @@ def test_the_command_prints_the_schema_and_a_reference_with_every_field() -> Non
     for name, info in FIELDS.items():
         assert f"| `{info.alias or name.split('.')[1]}` |" in text
         assert str(info.description) in text
-    assert "| `size` | 3 x number (above 0, at most 3) | metres | required |" in text
+    assert "| `size` | 3 x number (at least 0.001, at most 3) | metres | required |" in text
 
 
 def test_the_reference_that_ships_is_what_the_command_prints() -> None:
