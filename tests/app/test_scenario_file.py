@@ -106,7 +106,7 @@ def test_shipped_cells_are_right(name: str) -> None:
         ("0.12, 0.18", "30 cm, 0.18", "mine.yaml:8: obstacles.0.size.1 is '30 cm'; " + METRES),
         ("0.12, 0.18", "true, 0.18", "mine.yaml:8: obstacles.0.size.1 is True; expected a number in metres"),
         ("0.12, 0.18", "'0.12', 0.18", "mine.yaml:8: obstacles.0.size.1 is '0.12'; expected a number in metres"),
-        ("0.12, 0.18", "0, 0.18", "mine.yaml:8: obstacles.0.size.1 is 0; " + METRES + " (above 0, at most 3)"),
+        ("0.12, 0.18", "0, 0.18", "mine.yaml:8: obstacles.0.size.1 is 0; " + METRES + " (at least 0.001, at most 3)"),
         ("0.12, 0.18]", "0.12]", "mine.yaml:8: obstacles.0.size is [0.08, 0.12]; expected 3 values, each"),
         ("0.12, 0.18]", "0.12, 0.18, 1]", "mine.yaml:8: obstacles.0.size is [0.08, 0.12, 0.18, 1]; expected 3 values"),
         ("slips: 1", "slips: 1.5", "mine.yaml:18: expect.slips is 1.5; expected a whole number (at least 0"),
