@@ -104,7 +104,7 @@ def _inside(known: KnownCell, part: Part, bases: list[Part]) -> Iterator[tuple[s
     for arm, base in zip(known.arms, bases, strict=True):
         if part.path == base.path:
             continue
-        if part not in bases or part.path > base.path:  # a pair of bases once
+        if part.path[1] != "arms" or part.path > base.path:  # a pair of bases once
             yield base.name, penetration(np.vstack([part.halves, base.halves]), part.center - base.center)
         centers, halves = asleep(arm)
         yield f"the {arm.name} arm asleep", float(cube_depths(part.halves, part.center - centers, halves).max())
@@ -160,12 +160,12 @@ def _sight(document: Document, known: KnownCell) -> Iterator[Finding]:
         return
     pose, k = camera.mount.world_from_camera, camera.intrinsics
     plug = known.socket(PLUGGED_INTO).world_from_plug(known.connector.length).translation
+    boxes = [part for part in _parts(known) if part.path[1] == "boxes"]
     for target in (plug, np.asarray(known.clip.seat)):
         x, y, z = pose.inv().apply(target)
         in_view = z > 0 and 0 <= k.fx * x / z + k.cx < k.width and 0 <= k.fy * y / z + k.cy < k.height
-        half, middle = 0.5 * (target - pose.translation) * 0.9, pose.translation + 0.45 * (target - pose.translation)
-        boxes = [part for part in _parts(known) if part.path[1] == "boxes"]
-        if in_view and all(penetration(np.vstack([b.halves, half]), b.center - middle) <= 0 for b in boxes):
+        ray = np.array([pose.translation, pose.translation + 0.9 * (target - pose.translation)])  # not into its socket
+        if in_view and all(line_depth(box.halves, box.center, ray, 0.0) <= 0 for box in boxes):
             return
     where = document.place(("known", "cameras", known.cameras.index(camera), "mount"))
     yield Finding(*where, "the rear camera sees neither the plugged connector nor the clip; turn or move it")
