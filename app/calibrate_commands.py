@@ -43,8 +43,8 @@ def calibrate(
 
     \b
     Examples:
-      regrasp calibrate --draw calibration/           # in our own cell, against what is true there
-      regrasp calibrate --images photos/ --columns 9 --rows 6 --square 0.025 --out my_camera.yaml
+      regrasp calibrate --draw calibration/    # rendered, against what is true
+      regrasp calibrate --images photos/ --columns 9 --rows 6 --square 0.025
 
     Take ten or more sharp pictures, the board tilted in many ways and in every corner of the picture. The file, YAML,
     holds width, height, fx, fy, cx, cy (pixels; 0, 0 is the middle of the first), OpenCV's distortion k1, k2, p1, p2,

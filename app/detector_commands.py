@@ -48,7 +48,7 @@ def train_detector(
     \b
     Examples:
       regrasp train-detector --out results/detector
-      regrasp train-detector --out results/better --start results/detector/detector.onnx --steps 20000
+      regrasp train-detector --out results/more --start perception/detector.onnx
     """
     wrong = output.unwritable(out)
     if (out / "detector.onnx").exists():

@@ -23,9 +23,7 @@ def _scenarios(incomplete: str) -> Iterator[str]:
 
 ScenarioName = Annotated[
     str,
-    typer.Argument(
-        metavar="SCENARIO", help="A shipped scenario's name, or a path to a .yaml file.", autocompletion=_scenarios
-    ),
+    typer.Argument(help="A shipped scenario's name, or a path to a .yaml file.", autocompletion=_scenarios),
 ]
 Seed = Annotated[
     int | None, typer.Option(min=0, max=MOST_SEED, help="Draws every error, noise and jitter; default the scenario's.")

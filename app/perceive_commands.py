@@ -69,10 +69,12 @@ def perceive(
 
     \b
     Examples:
-      regrasp snapshot no_obstacle --out frames        # pictures of ours, to try it on
-      regrasp perceive --rgb frames/rgb.png --depth frames/depth.png --intrinsics frames/intrinsics.yaml --draw seen.png
-      regrasp perceive --rgb a.png --depth a.npy --rgb b.png --depth b.npy --intrinsics my_camera.yaml
-      regrasp perceive --technique fiducial --cell thesis_tags --rgb photo.jpg --intrinsics my_camera.yaml
+      regrasp snapshot no_obstacle --out frames    # pictures to try it on
+      cd frames
+      regrasp perceive --rgb rgb.png --depth depth.png \\
+        --intrinsics intrinsics.yaml
+      regrasp perceive --technique fiducial --cell thesis_tags --rgb photo.jpg \\
+        --intrinsics my_camera.yaml --draw seen.png
 
     Metres, radians; quaternions x, y, z, w. The connector's x axis leads from the cable to the tip; sign_seen says
     that the picture tells which end is which; without it the axis may as well lead the other way. covariance is that

@@ -63,11 +63,12 @@ def replay(
     left out.
 
     \b
-    Keys: right/left step, PgDn/PgUp ten changes, Home/End, n next failure, g go to a time, / filter, q quit.
+    Keys: right/left step, PgDn/PgUp ten changes, Home/End, n next failure,
+    g go to a time, / filter, q quit.
     \b
     Examples:
       regrasp replay runs/short_obstacle-0-1
-      regrasp replay runs/short_obstacle-0-1 --from 8 --to 12 --filter delivery | less
+      regrasp replay runs/short_obstacle-0-1 --from 8 --to 12 --filter deliver
     """
     from app.replay import Replay, check_span
 

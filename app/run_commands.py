@@ -63,11 +63,11 @@ def run(
     Examples:
       regrasp run short_obstacle --video
       regrasp run tall_obstacle --seed 7 --case gravity=earth --out runs/tall-7
-      regrasp run my/scenario.yaml --set obstacles.0.size=[0.08,0.12,0.3] --set cell.hidden.errors.arm_tool=0
-      regrasp run short_obstacle --all --set 'vary.seed="0:5"' --jobs 2 --junit short.xml
+      regrasp run mine.yaml --set obstacles.0.size=[0.08,0.12,0.3] --dry-run
+      regrasp run mine.yaml --all --set 'vary.seed="0:5"' --junit mine.xml
 
     \b
-    Exit code: 0 all that the scenario expects came out, 1 something did not, 2 bad input, 130 Ctrl-C.
+    Exit code: 0 every expectation met, 1 not, 2 bad input, 130 Ctrl-C.
     """
     overrides = [*(sets or []), *([] if seed is None else [f"seed={seed}"])]
     twice = seed is not None and any(text.partition("=")[0].strip() == "seed" for text in sets or [])

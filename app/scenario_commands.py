@@ -74,7 +74,7 @@ def show(
     \b
     Examples:
       regrasp scenarios show short_obstacle
-      regrasp scenarios show short_obstacle --case gravity=earth > my_scenario.yaml
+      regrasp scenarios show short_obstacle --case gravity=earth > mine.yaml
     """
     loaded = load_scenario(scenario, sets or [], case)
     names = case_names(scenario, sets or []) if case is None else [loaded.case]
@@ -98,7 +98,8 @@ def schema(
     As JSON Schema (draft 2020-12), for editors.
 
     \b
-    With the YAML language server (VS Code, Neovim, Emacs) an editor completes and checks scenario files:
+    With the YAML language server (VS Code, Neovim, Emacs) an editor completes
+    and checks scenario files:
       regrasp scenarios schema > scenario.schema.json
     and as the first line of your scenario, with the path from it to that file:
       # yaml-language-server: $schema=scenario.schema.json

@@ -78,8 +78,8 @@ def pose(
       regrasp study pose --techniques rgbd --configurations 3,6,7,8,9 --no-grasp
 
     \b
-    app/POSE.md of the project shows the configurations and says how a trial goes. Exit code: 0 done, 1 a scene broke
-    off, 2 bad input, 130 Ctrl-C.
+    app/POSE.md of the project shows the configurations and how a trial goes.
+    Exit code: 0 done, 1 a scene broke off, 2 bad input, 130 Ctrl-C.
     """
     chosen, wrong = parse_seeds(seeds), _unfit(out, "pose.json")
     names = _techniques(techniques, wrong)

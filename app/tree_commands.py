@@ -95,7 +95,8 @@ def check(
       regrasp trees check my/tree.xml
 
     \b
-    Exit code: 0 no findings, 2 findings, one a line: file:line: what is wrong; what would be right.
+    Exit code: 0 no findings, 2 findings, one a line:
+      file:line: what is wrong; what would be right
     """
     found: list[Finding] = []
     names = trees or list(shipped("tree"))

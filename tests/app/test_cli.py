@@ -277,12 +277,23 @@ def test_a_wrong_range_of_seeds_is_a_finding(text: str) -> None:
         ["scenarios", "schema"],
         ["doctor"],
         ["study", "demo"],
+        ["study", "pose"],
+        ["explain"],
+        ["replay"],
+        ["diff"],
+        ["perceive"],
+        ["snapshot"],
+        ["calibrate"],
+        ["train-detector"],
+        ["evaluate-detector"],
     ],
 )
-def test_help_is_plain_and_shows_how(command: list[str]) -> None:
+def test_help_is_plain_and_shows_how(command: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
     ran = invoke(*command, "--help")
     assert ran.exit_code == 0
     assert "\x1b" not in ran.stdout
+    assert max(map(len, ran.stdout.splitlines())) <= 80
     assert "regrasp" in ran.stdout or command in (["scenarios", "list"], ["doctor"])
 
 
