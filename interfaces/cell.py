@@ -84,12 +84,21 @@ class Socket(Model):
         centre = np.asarray(self.center) - axis * (0.5 * self.size[1] + 0.5 * connector_length - self.depth)
         return pose_along((float(centre[0]), float(centre[1]), float(centre[2])), self.axis)
 
+    @property
+    def world_from_block(self) -> Rotation:
+        """Rotation of the block: its x edge is level, its y edge lies on the plug axis and points towards +y."""
+        along = np.asarray(self.axis, float) / np.linalg.norm(self.axis)
+        if along[1] < 0:
+            along = -along  # the same block
+        level = float(np.hypot(along[0], along[1]))
+        across = np.array([along[1], -along[0], 0.0]) / level if level > 0 else np.array([1.0, 0.0, 0.0])
+        return Rotation.from_matrix(np.column_stack([across, along, np.cross(across, along)]))
+
     def upright_box(self) -> Box:
-        """The smallest box along the world's axes around the block, which is turned so that its y edge is the axis."""
-        axis = np.abs(self.axis) / np.linalg.norm(self.axis)
-        across, along, high = self.size
-        size = (across, along * axis[1] + high * axis[2], along * axis[2] + high * axis[1])
-        return Box(name=self.name, center=self.center, size=size, color=self.color)
+        """The smallest box along the world's axes that holds the block."""
+        size = (np.abs(self.world_from_block.as_matrix()) * self.size).sum(axis=1)
+        # Not checked again: the bounds are for what a file says, and a turned block of the largest size needs more.
+        return Box.model_construct(name=self.name, center=self.center, size=tuple(size.tolist()), color=self.color)
 
 
 PLUGGED_INTO = "plugged_into"  # in place of a socket's name: the one that the cell names under this key

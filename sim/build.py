@@ -109,7 +109,5 @@ def _prop(client: int, prop: Prop) -> int:
 
 
 def _socket_block(client: int, socket: Socket) -> int:
-    # The block's y edge is the plug's axis, which may rise or fall; a block for an axis along -y is the same box.
-    axis = np.asarray(socket.axis) / np.linalg.norm(socket.axis)
-    tilt = Rotation.from_euler("x", float(np.arctan2(axis[2], abs(axis[1]))) * float(np.sign(axis[1])))
-    return _box(client, Box(name=socket.name, center=socket.center, size=socket.size, color=socket.color), tilt)
+    box = Box(name=socket.name, center=socket.center, size=socket.size, color=socket.color)
+    return _box(client, box, socket.world_from_block)

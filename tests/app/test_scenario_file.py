@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 import yaml
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from toy_scenario import write_scenario
 
@@ -299,6 +299,10 @@ tree cell.known cell.known.clip cell.known.cameras.0.mount cell.known.sockets.0.
 
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(path=st.sampled_from(_PATHS.split()), value=_values)
+@example(path="cell.known.sockets.0.axis", value=[1.0, 0, 0])
+@example(path="cell.known.sockets.0.axis", value=[0, 0, -1.0])
+@example(path="cell.known.clip.axis", value=[0, 0, 1.0])
+@example(path="cell.hidden.cable.anchor_axis", value=[0, 0, 1.0])
 def test_any_value_anywhere_gives_findings_or_loads(scenario: Path, path: str, value: object) -> None:
     for text in (json.dumps(value), yaml.safe_dump(value)):
         assert all(f.line >= 0 and str(f).isprintable() for f in findings_if_any(f"{path}={text}"))

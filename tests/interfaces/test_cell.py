@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from hypothesis import assume, given
+from hypothesis import assume, example, given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
@@ -56,6 +56,21 @@ def test_an_upright_box_just_holds_a_tilted_block() -> None:
     turn = np.array([[1, 0, 0], [0, np.cos(angle), -np.sin(angle)], [0, np.sin(angle), np.cos(angle)]])
     corners = np.array([[x, y, z] for x in (-0.02, 0.02) for y in (-0.03, 0.03) for z in (-0.04, 0.04)])
     np.testing.assert_allclose(socket.upright_box().size, 2 * (corners @ turn.T).max(axis=0), atol=LENGTH)
+
+
+_part = st.floats(-1.0, 1.0)
+
+
+@given(axis=st.tuples(_part, _part, _part).filter(lambda axis: np.linalg.norm(axis) > 1e-3))
+@example(axis=(1.0, 0.0, 0.0))
+@example(axis=(0.0, 0.0, -1.0))
+def test_a_block_is_turned_so_that_its_y_edge_lies_on_the_plug_axis(axis: tuple[float, float, float]) -> None:
+    socket = Socket(name="s", center=(0, 0, 0), size=(0.04, 10.0, 0.08), axis=axis, depth=0.01, pull_out_force=10.0)
+    unit = np.asarray(axis) / np.linalg.norm(axis)
+    matrix = socket.world_from_block.as_matrix()
+    assert abs(float(matrix[:, 1] @ unit)) == pytest.approx(1.0)
+    assert matrix[2, 0] == pytest.approx(0.0, abs=LENGTH)  # the x edge is level
+    assert np.all(np.asarray(socket.upright_box().size) > np.abs(unit) * socket.size[1] - LENGTH)
 
 
 def test_a_fixed_camera_looks_forward_and_down() -> None:
