@@ -24,11 +24,11 @@ test: setup
 lint: setup
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/mypy conftest.py app behaviors interfaces motion perception sim trees tests
+	$(BIN)/mypy conftest.py regrasp tests
 	$(BIN)/lint-imports
 
 bench: setup
-	$(BIN)/python -m app.bench
+	$(BIN)/python -m regrasp.app.bench
 
 fuzz: setup
 	$(BIN)/python tests/app/fuzz_readers.py --cases 2000

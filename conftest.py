@@ -1,6 +1,7 @@
 """Fixtures of all tests: the thesis's cell, arms, bare PyBullet clients. One file: mypy takes two for one module."""
 
 import signal
+import sys
 from collections.abc import Iterator
 from importlib.resources import files
 from typing import Any
@@ -11,11 +12,25 @@ import yaml
 from hypothesis import settings
 from scipy.spatial.transform import RigidTransform
 
-from interfaces.cell import Box, Cell, KnownCell
-from motion.collision import CollisionModel
-from motion.kinematics import ArmKinematics
+from regrasp.interfaces.cell import Box, Cell, KnownCell
+from regrasp.motion.collision import CollisionModel
+from regrasp.motion.kinematics import ArmKinematics
 
-pytest_plugins = ["pytester", "app.pytest_plugin"]
+pytest_plugins = ["pytester", "regrasp.app.pytest_plugin"]
+
+ROOMS = {"app", "behaviors", "interfaces", "motion", "perception", "scenarios", "sim", "trees"}
+
+
+class _NoBareRoom:
+    """Refuses `import sim`: the checkout's root lies on the path here, and a module would exist twice."""
+
+    def find_spec(self, name: str, path: object = None, target: object = None) -> None:
+        """As `importlib.abc.MetaPathFinder`."""
+        if name.partition(".")[0] in ROOMS:
+            raise ModuleNotFoundError(f"no module {name}: import regrasp.{name}", name=name)
+
+
+sys.meta_path.insert(0, _NoBareRoom())
 
 # A shell starts background jobs with Ctrl-C ignored, and what tests start would inherit that.
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -25,7 +40,7 @@ settings.load_profile("without deadline")
 
 def thesis() -> Any:
     """The cell file's content."""
-    text = (files("scenarios") / "cells/thesis.yaml").read_text(encoding="utf-8")
+    text = (files("regrasp.scenarios") / "cells/thesis.yaml").read_text(encoding="utf-8")
     return yaml.safe_load(text)
 
 

@@ -1,10 +1,10 @@
-"""Entry point of `regrasp` and of `python -m app`."""
+"""Entry point of `regrasp` and of `python -m regrasp`."""
 
 import io
 import os
 import sys
 
-from app.interrupts import stoppable
+from regrasp.app.interrupts import stoppable
 
 # What a shell reports of cat or git when the reader of their pipe has gone. Not 0, for not all was told; not 1, which
 # says that a run did not come out. SIGPIPE itself stays ignored: it would kill us, too, when a child process dies.
@@ -21,7 +21,7 @@ def main() -> None:
 def _run() -> None:
     try:
         try:
-            from app.cli import app  # takes a moment, in which Ctrl-C may come
+            from regrasp.app.cli import app  # takes a moment, in which Ctrl-C may come
 
             app()
         finally:

@@ -9,9 +9,9 @@ from py_trees.common import Status
 from py_trees.composites import Selector
 from py_trees.decorators import Decorator, Retry
 
-from app.record import Attempt, Link, NodeStatus
-from interfaces.cause import Cause
-from trees import in_tree_order, node_paths
+from regrasp.app.record import Attempt, Link, NodeStatus
+from regrasp.interfaces.cause import Cause
+from regrasp.trees import in_tree_order, node_paths
 
 
 @dataclass(frozen=True)

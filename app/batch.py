@@ -9,14 +9,14 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from app.processes import Done, run_each
-from app.record import Outcome, Result, finish_killed
-from app.scenario_file import Scenario
-from app.summary import asked
-from interfaces.cause import Cause, CauseCode
+from regrasp.app.processes import Done, run_each
+from regrasp.app.record import Outcome, Result, finish_killed
+from regrasp.app.scenario_file import Scenario
+from regrasp.app.summary import asked
+from regrasp.interfaces.cause import Cause, CauseCode
 
 if TYPE_CHECKING:
-    from sim.renderer import RendererName
+    from regrasp.sim.renderer import RendererName
 
 Episode = Callable[..., Result]
 
@@ -108,7 +108,7 @@ def run_all(
 
 def _run_episode(*args: Any, **kwargs: Any) -> Result:
     """`run_episode`, which brings the physics into the process of its own and not into ours."""
-    from app.episode import run_episode
+    from regrasp.app.episode import run_episode
 
     return run_episode(*args, **kwargs)
 

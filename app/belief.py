@@ -2,9 +2,9 @@
 
 from scipy.spatial.transform import RigidTransform
 
-from app.record import ArmState, BeliefState, Pose, Sighting
-from behaviors.services import Services
-from perception.estimate import Estimate
+from regrasp.app.record import ArmState, BeliefState, Pose, Sighting
+from regrasp.behaviors.services import Services
+from regrasp.perception.estimate import Estimate
 
 
 def belief_state(services: Services) -> BeliefState:

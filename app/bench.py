@@ -13,26 +13,26 @@ from numpy.typing import NDArray
 from py_trees.parsers.behaviour_tree_xml import parse_behaviour_tree_xml
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from app.attempts import Attempts
-from app.resources import shipped
-from app.scenario_file import load_cell, load_scenario
-from app.table import print_table
-from app.tick_log import TickLog
-from behaviors import LEAVES
-from interfaces.cell import TAG_DICTIONARY, Cell
-from interfaces.frame import RgbdFrame
-from perception.detector import Detector, fitted, network_input, pixel_sizes, shipped_network
-from perception.estimate import NoEstimate
-from perception.fused import Fused
-from perception.registration import FIXED, register
-from perception.rgbd_pose import Rgbd
-from perception.segmentation import SegmentationParameters, color_mask
-from perception.technique import make_technique
-from sim.cable import spring_torques
-from sim.renderer import make_renderer
-from sim.world import World
-from trees import check_tree
-from trees.scripted import ScriptedTree
+from regrasp.app.attempts import Attempts
+from regrasp.app.resources import shipped
+from regrasp.app.scenario_file import load_cell, load_scenario
+from regrasp.app.table import print_table
+from regrasp.app.tick_log import TickLog
+from regrasp.behaviors import LEAVES
+from regrasp.interfaces.cell import TAG_DICTIONARY, Cell
+from regrasp.interfaces.frame import RgbdFrame
+from regrasp.perception.detector import Detector, fitted, network_input, pixel_sizes, shipped_network
+from regrasp.perception.estimate import NoEstimate
+from regrasp.perception.fused import Fused
+from regrasp.perception.registration import FIXED, register
+from regrasp.perception.rgbd_pose import Rgbd
+from regrasp.perception.segmentation import SegmentationParameters, color_mask
+from regrasp.perception.technique import make_technique
+from regrasp.sim.cable import spring_torques
+from regrasp.sim.renderer import make_renderer
+from regrasp.sim.world import World
+from regrasp.trees import check_tree
+from regrasp.trees.scripted import ScriptedTree
 
 Call = Callable[[], Any]
 

@@ -5,8 +5,8 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.spatial.transform import RigidTransform
 
-from interfaces.cell import Cable
-from interfaces.scene import EARTH_GRAVITY, Gravity
+from regrasp.interfaces.cell import Cable
+from regrasp.interfaces.scene import EARTH_GRAVITY, Gravity
 
 FloatArray = NDArray[np.float64]
 STRETCHING = 1e4  # stiffness of a link against stretching, in units of k / l^2: it then gives way by less than 0.1 mm

@@ -10,16 +10,16 @@ import numpy as np
 import typer
 from numpy.typing import NDArray
 
-from app.calibration_file import CalibrationFile, write_calibration
-from app.findings import Finding, Findings, shown
-from app.image_files import read_rgb
-from app.options import IMAGE_SUFFIXES
-from app.record import write_whole
-from app.table import print_table
-from interfaces.cell import CameraSpec
-from interfaces.frame import Intrinsics
-from perception.calibration import Calibration, calibrate, find_board
-from sim.board import board_pictures, board_poses
+from regrasp.app.calibration_file import CalibrationFile, write_calibration
+from regrasp.app.findings import Finding, Findings, shown
+from regrasp.app.image_files import read_rgb
+from regrasp.app.options import IMAGE_SUFFIXES
+from regrasp.app.record import write_whole
+from regrasp.app.table import print_table
+from regrasp.interfaces.cell import CameraSpec
+from regrasp.interfaces.frame import Intrinsics
+from regrasp.perception.calibration import Calibration, calibrate, find_board
+from regrasp.sim.board import board_pictures, board_poses
 
 FloatArray = NDArray[np.float64]
 Picture = tuple[str, Callable[[], NDArray[np.uint8]]]  # a name, and what gives the RGB image

@@ -5,13 +5,13 @@ from typing import Annotated
 
 import typer
 
-from app import output
-from app.findings import Finding, Findings, nearest, real, shown
-from app.interrupts import late_imports
-from app.options import IMAGE_SUFFIXES, MOST_SEED
-from app.resources import resolve
-from app.scenario_file import load_cell
-from interfaces.quote import quoted
+from regrasp.app import output
+from regrasp.app.findings import Finding, Findings, nearest, real, shown
+from regrasp.app.interrupts import late_imports
+from regrasp.app.options import IMAGE_SUFFIXES, MOST_SEED
+from regrasp.app.resources import resolve
+from regrasp.app.scenario_file import load_cell
+from regrasp.interfaces.quote import quoted
 
 
 def add_to(app: typer.Typer) -> None:
@@ -58,7 +58,7 @@ def calibrate(
     if wrong:
         raise Findings(wrong)
     with late_imports():
-        from app import calibrate as steps  # brings OpenCV and the physics
+        from regrasp.app import calibrate as steps  # brings OpenCV and the physics
 
     board = steps.Board(columns, rows, square)
     if images is not None:

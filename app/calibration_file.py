@@ -6,13 +6,13 @@ from typing import Annotated
 import yaml
 from pydantic import Field
 
-from app.findings import shown
-from app.record import write_whole
-from app.resources import read_text
-from app.schema import validated
-from app.yaml_lines import parse
-from interfaces.cell import Model, NotNegative, Number, Positive
-from interfaces.frame import Intrinsics
+from regrasp.app.findings import shown
+from regrasp.app.record import write_whole
+from regrasp.app.resources import read_text
+from regrasp.app.schema import validated
+from regrasp.app.yaml_lines import parse
+from regrasp.interfaces.cell import Model, NotNegative, Number, Positive
+from regrasp.interfaces.frame import Intrinsics
 
 Pixels = Annotated[int, Field(ge=16, le=16384)]
 
@@ -31,7 +31,7 @@ class CalibrationFile(Model):
 
     @property
     def intrinsics(self) -> Intrinsics:
-        """The camera without its distortion: `perception.calibration.undistorted` makes its pictures fit."""
+        """The camera without its distortion: `regrasp.perception.calibration.undistorted` makes its pictures fit."""
         return Intrinsics(self.width, self.height, self.fx, self.fy, self.cx, self.cy)
 
 

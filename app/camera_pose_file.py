@@ -8,12 +8,12 @@ import yaml
 from pydantic import AfterValidator
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from app.findings import shown
-from app.record import write_whole
-from app.resources import read_text
-from app.schema import validated
-from app.yaml_lines import parse
-from interfaces.cell import Model, Number, Vector
+from regrasp.app.findings import shown
+from regrasp.app.record import write_whole
+from regrasp.app.resources import read_text
+from regrasp.app.schema import validated
+from regrasp.app.yaml_lines import parse
+from regrasp.interfaces.cell import Model, Number, Vector
 
 ROUNDED = 0.01  # that a quaternion's length may be off 1
 

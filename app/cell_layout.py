@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial.transform import RigidTransform
 
-from app.findings import Finding
-from app.placement import (
+from regrasp.app.findings import Finding
+from regrasp.app.placement import (
     FloatArray,
     arm_base,
     asleep,
@@ -22,11 +22,11 @@ from app.placement import (
     penetration,
     socket_block,
 )
-from app.yaml_lines import Document, Path
-from interfaces.cell import PLUGGED_INTO, Cell, FixedMount, KnownCell
-from interfaces.fault import JOINT_NAMES
-from interfaces.quote import cut, quoted
-from interfaces.scene import GRAVITIES
+from regrasp.app.yaml_lines import Document, Path
+from regrasp.interfaces.cell import PLUGGED_INTO, Cell, FixedMount, KnownCell
+from regrasp.interfaces.fault import JOINT_NAMES
+from regrasp.interfaces.quote import cut, quoted
+from regrasp.interfaces.scene import GRAVITIES
 
 MOST_OVERLAP = 0.005  # metres: the spheres that fill an arm stand out of it by less
 ENDS = 0.05  # metres of the cable at its sockets, which are built in
@@ -55,7 +55,7 @@ def impossible(document: Document, cell: Cell) -> list[Finding]:
 
 
 def _joints(document: Document, known: KnownCell) -> Iterator[Finding]:
-    from motion.kinematics import LOWER, UPPER  # late: it brings the compiler
+    from regrasp.motion.kinematics import LOWER, UPPER  # late: it brings the compiler
 
     for i, arm in enumerate(known.arms):
         for j, (angle, low, high) in enumerate(zip(arm.sleep, LOWER, UPPER, strict=True)):
@@ -87,7 +87,7 @@ def _overlaps(document: Document, known: KnownCell) -> Iterator[Finding]:
 
 def _between_the_arms(known: KnownCell) -> float:
     """How deep (m) the arms asleep reach into each other, by the spheres that fill their moving links."""
-    from motion.spheres import LINKS, SPHERES  # late: they bring the compiler
+    from regrasp.motion.spheres import LINKS, SPHERES  # late: they bring the compiler
 
     moving = LINKS > 0
     radii = SPHERES[moving, 3]
@@ -194,8 +194,8 @@ def _cable(document: Document, cell: Cell) -> Iterator[Finding]:
 
 
 def _clip(document: Document, known: KnownCell) -> Iterator[Finding]:
-    from behaviors.hand import HAND  # late: it brings the planner and the compiler
-    from motion.kinematics import ORIGINS, TOOL_OFFSET
+    from regrasp.behaviors.hand import HAND  # late: it brings the planner and the compiler
+    from regrasp.motion.kinematics import ORIGINS, TOOL_OFFSET
 
     shoulder = np.asarray(known.arm(HAND).base) + ORIGINS[0] + ORIGINS[1]
     reach = float(np.linalg.norm(ORIGINS[2:], axis=1).sum() + np.linalg.norm(TOOL_OFFSET))
@@ -206,7 +206,7 @@ def _clip(document: Document, known: KnownCell) -> Iterator[Finding]:
 
 
 def _plug(document: Document, known: KnownCell) -> Iterator[Finding]:
-    from motion.service import JAW_SLACK, OPEN_GAP  # late: it brings the planner and the compiler
+    from regrasp.motion.service import JAW_SLACK, OPEN_GAP  # late: it brings the planner and the compiler
 
     thick = 2 * known.connector.radius
     if thick + 2 * JAW_SLACK > OPEN_GAP:
@@ -222,13 +222,13 @@ def _plug(document: Document, known: KnownCell) -> Iterator[Finding]:
 @lru_cache(maxsize=64)
 def _no_grasp(known: KnownCell) -> str | None:
     """Why the hand cannot take hold of the plugged connector among the known boxes; None when it can."""
-    from behaviors.hand import HAND  # late: they bring the planner and the compiler
-    from behaviors.unplug import SHALLOW
-    from motion.collision import CollisionModel
-    from motion.failure import PlanningError
-    from motion.grasps import choose_grasp, grasp_candidates
-    from motion.kinematics import ArmKinematics
-    from motion.service import GRIP_OFFSETS, NEAR_MARGINS, OPEN_GAP, TIGHT_MARGIN
+    from regrasp.behaviors.hand import HAND  # late: they bring the planner and the compiler
+    from regrasp.behaviors.unplug import SHALLOW
+    from regrasp.motion.collision import CollisionModel
+    from regrasp.motion.failure import PlanningError
+    from regrasp.motion.grasps import choose_grasp, grasp_candidates
+    from regrasp.motion.kinematics import ArmKinematics
+    from regrasp.motion.service import GRIP_OFFSETS, NEAR_MARGINS, OPEN_GAP, TIGHT_MARGIN
 
     arms: dict[str, ArmKinematics] = {
         arm.name: ArmKinematics(RigidTransform.from_translation(arm.base)) for arm in known.arms

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from app import (
+from regrasp.app import (
     calibrate_commands,
     detector_commands,
     perceive_commands,
@@ -17,8 +17,8 @@ from app import (
     study_commands,
     tree_commands,
 )
-from app.findings import Findings, printable
-from interfaces.quote import MOST, cut
+from regrasp.app.findings import Findings, printable
+from regrasp.interfaces.quote import MOST, cut
 
 if TYPE_CHECKING:
     pass
@@ -110,7 +110,7 @@ def doctor() -> None:
 
     Exit code 1 when something is missing.
     """
-    from app.doctor import checks
+    from regrasp.app.doctor import checks
 
     wrong = False
     for check in checks():

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from app import output
-from app.findings import Finding, Findings, shown
-from app.options import MOST_SEED
-from app.record import write_whole
-from app.resources import resolve
+from regrasp.app import output
+from regrasp.app.findings import Finding, Findings, shown
+from regrasp.app.options import MOST_SEED
+from regrasp.app.record import write_whole
+from regrasp.app.resources import resolve
 
 if TYPE_CHECKING:
-    from interfaces.cell import Cell
+    from regrasp.interfaces.cell import Cell
 
 TRAINING_SEED, HELD_OUT_SEED = 0, 1_000_000  # choice: far apart, so that no one trains on what is held out
 _Cell = Annotated[str, typer.Option("--cell", help="A shipped cell's name, or a path to a .yaml file.")]
@@ -67,8 +67,8 @@ def train_detector(
     if wrong:
         raise Findings(wrong)
     loaded = _load(cell)
-    from app.detector_data import make_pictures
-    from app.detector_train import read_weights, train
+    from regrasp.app.detector_data import make_pictures
+    from regrasp.app.detector_train import read_weights, train
 
     weights = None
     if start is not None:
@@ -109,7 +109,7 @@ def evaluate_detector(
     if wrong:
         raise Findings(wrong)
     loaded = _load(cell)
-    from app.detector_score import answer, held_out_shots, summary
+    from regrasp.app.detector_score import answer, held_out_shots, summary
 
     detector = _detector(loaded, model)
     with _progress("drawing held-out pictures", 5 * held_out) as tell:
@@ -122,7 +122,7 @@ def evaluate_detector(
 
 
 def _load(cell: str) -> "Cell":
-    from app.scenario_file import load_cell
+    from regrasp.app.scenario_file import load_cell
 
     return load_cell(resolve("cell", cell, Path()))
 
@@ -132,8 +132,8 @@ def _detector(cell: "Cell", model: Path | None) -> Any:
     import cv2
     import numpy as np
 
-    from interfaces.frame import Intrinsics, RgbdFrame
-    from perception.detector import HEIGHT, WIDTH, Detector
+    from regrasp.interfaces.frame import Intrinsics, RgbdFrame
+    from regrasp.perception.detector import HEIGHT, WIDTH, Detector
 
     cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)  # what is wrong we say ourselves
     try:
@@ -148,8 +148,8 @@ def _detector(cell: "Cell", model: Path | None) -> Any:
 
 
 def _print(figures: dict[str, Any]) -> None:
-    from app.study import wilson
-    from app.table import print_table
+    from regrasp.app.study import wilson
+    from regrasp.app.table import print_table
 
     lines = [
         (name, f"{right}/{all_}", "{:.1f} to {:.1f} %".format(*(100 * x for x in wilson(right, all_))))

@@ -11,12 +11,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from interfaces.cell import Cell
-from perception.camera_model import project
-from perception.detector import HEIGHT, STRIDE, WIDTH, fitted, pixel_sizes
-from perception.segmentation import SegmentationParameters, color_mask
-from sim.depth_noise import DepthNoise
-from sim.random_scene import RandomScene, Shot
+from regrasp.interfaces.cell import Cell
+from regrasp.perception.camera_model import project
+from regrasp.perception.detector import HEIGHT, STRIDE, WIDTH, fitted, pixel_sizes
+from regrasp.perception.segmentation import SegmentationParameters, color_mask
+from regrasp.sim.depth_noise import DepthNoise
+from regrasp.sim.random_scene import RandomScene, Shot
 
 FloatArray = NDArray[np.float64]
 
@@ -212,8 +212,8 @@ def _recolored(image: NDArray[np.uint8], rng: np.random.Generator) -> NDArray[np
 def target_maps(targets: list[Target], size: int = PATCH) -> NDArray[np.float32]:
     """What the network shall answer for a patch: (9, n, n) for n cells an edge.
 
-    The seven maps of `perception.detector.decode`; then the weight of the last six, and that of the first: 0 around a
-    connector that shows too little to count.
+    The seven maps of `regrasp.perception.detector.decode`; then the weight of the last six, and that of the first: 0
+    around a connector that shows too little to count.
     """
     n = size // STRIDE
     maps = np.zeros((9, n, n), np.float32)

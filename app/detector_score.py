@@ -12,14 +12,14 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from app.detector_data import axis_in_image
-from interfaces.cell import Cell
-from interfaces.frame import RgbdFrame
-from perception.detector import MIN_SCORE, Box, Detection, Detector, overlap
-from perception.estimate import Estimate
-from sim.depth_noise import DepthNoise
-from sim.random_scene import RandomScene, Shot
-from sim.renderer import RendererName
+from regrasp.app.detector_data import axis_in_image
+from regrasp.interfaces.cell import Cell
+from regrasp.interfaces.frame import RgbdFrame
+from regrasp.perception.detector import MIN_SCORE, Box, Detection, Detector, overlap
+from regrasp.perception.estimate import Estimate
+from regrasp.sim.depth_noise import DepthNoise
+from regrasp.sim.random_scene import RandomScene, Shot
+from regrasp.sim.renderer import RendererName
 
 MATCH = 0.5  # intersection over union from which a box counts as right: that of AP50
 LEAST_SCORE = 0.01  # of the boxes that enter the average precision; choice: far below any that counts

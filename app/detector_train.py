@@ -15,9 +15,9 @@ import onnx.numpy_helper
 import torch
 from torch import nn
 
-from app.detector_data import CLEAR, Pictures, draw_patch, target_maps
-from app.detector_score import LEAST_SCORE, Answer, average_precision, true_box
-from perception.detector import HEIGHT, INPUT, WIDTH, decode, network_input
+from regrasp.app.detector_data import CLEAR, Pictures, draw_patch, target_maps
+from regrasp.app.detector_score import LEAST_SCORE, Answer, average_precision, true_box
+from regrasp.perception.detector import HEIGHT, INPUT, WIDTH, decode, network_input
 
 CHANNELS = (16, 32, 64, 96)  # at strides 4 to 32
 DEPTHS = (1, 3, 3)  # convolutions at strides 8 to 32, after the one that shrinks

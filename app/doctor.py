@@ -10,9 +10,9 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Literal
 
-from app import output
-from app.resources import shipped
-from app.scenario_file import load_cell
+from regrasp.app import output
+from regrasp.app.resources import shipped
+from regrasp.app.scenario_file import load_cell
 
 PACKAGES = ("regrasp", "numpy", "scipy", "pybullet", "py_trees", "ompl", "eaik", "toppra", "numba", "moderngl")
 EGL = {"EGL": "libegl1", "EGL_mesa": "libegl-mesa0"}  # library to Debian package; another maker's driver needs no Mesa
@@ -71,7 +71,7 @@ def egl(find: Callable[[str], str | None]) -> Check:
 def renderer() -> Check:
     """Build the shipped cell's world, which takes all of the above, and say which renderer it got and why."""
     try:
-        from sim.world import World
+        from regrasp.sim.world import World
 
         world = World(load_cell(shipped("cell")["thesis"]), "zero", seed=0)
         seen = world.renderer

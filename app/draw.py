@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from app.scenario_schema import ScenarioFile
-from interfaces.cell import Box
-from interfaces.fault import AnyFault
-from interfaces.scene import Obstacle
+from regrasp.app.scenario_schema import ScenarioFile
+from regrasp.interfaces.cell import Box
+from regrasp.interfaces.fault import AnyFault
+from regrasp.interfaces.scene import Obstacle
 
 LEAST_STAND = 1e-3  # m: a piece that is lower stands on the floor
 STAND = 0.02  # m: the edge of the post that holds a foam piece off the floor

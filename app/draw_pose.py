@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
-from app.video import PAPER, write_text
-from interfaces.frame import Intrinsics
-from perception.camera_model import project
-from perception.estimate import Estimate
+from regrasp.app.video import PAPER, write_text
+from regrasp.interfaces.frame import Intrinsics
+from regrasp.perception.camera_model import project
+from regrasp.perception.estimate import Estimate
 
 FloatArray = NDArray[np.float64]
 

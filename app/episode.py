@@ -10,27 +10,27 @@ import numpy as np
 import py_trees
 from py_trees.common import Status
 
-from app.attempts import Attempts
-from app.belief import belief_state
-from app.draw import draw_faults, draw_obstacles
-from app.fault_service import EnteredNodes, FaultLog, break_services
-from app.film import Film
-from app.interrupts import WallLimit
-from app.judge import Judge
-from app.progress import OnEvent, Progress
-from app.record import Link, Outcome, Record, Result
-from app.rerun import copies
-from app.scenario_file import Scenario
-from app.tick_log import TickLog, active_leaf, note_leaf_at_work, running_leaf
-from behaviors import LEAVES
-from behaviors.services import Services
-from interfaces.cause import Cause, CauseCode
-from motion.service import Motion
-from perception.service import Perception
-from sim.ground_truth import GroundTruth
-from sim.renderer import RendererName
-from sim.world import World
-from trees import in_tree_order, load_tree, node_paths, read_graph
+from regrasp.app.attempts import Attempts
+from regrasp.app.belief import belief_state
+from regrasp.app.draw import draw_faults, draw_obstacles
+from regrasp.app.fault_service import EnteredNodes, FaultLog, break_services
+from regrasp.app.film import Film
+from regrasp.app.interrupts import WallLimit
+from regrasp.app.judge import Judge
+from regrasp.app.progress import OnEvent, Progress
+from regrasp.app.record import Link, Outcome, Record, Result
+from regrasp.app.rerun import copies
+from regrasp.app.scenario_file import Scenario
+from regrasp.app.tick_log import TickLog, active_leaf, note_leaf_at_work, running_leaf
+from regrasp.behaviors import LEAVES
+from regrasp.behaviors.services import Services
+from regrasp.interfaces.cause import Cause, CauseCode
+from regrasp.motion.service import Motion
+from regrasp.perception.service import Perception
+from regrasp.sim.ground_truth import GroundTruth
+from regrasp.sim.renderer import RendererName
+from regrasp.sim.world import World
+from regrasp.trees import in_tree_order, load_tree, node_paths, read_graph
 
 TICK = 0.05  # simulated seconds
 

@@ -2,13 +2,13 @@
 
 from collections.abc import Iterator
 
-from app.findings import printable
-from app.record import BeliefState, Link, Pose, Result
-from app.record_reader import RunRecord
-from app.summary import expectation_lines, headline, slip_lines, what_ran
-from app.timeline import event_text, timeline, wrapped
-from app.tried import attempts, course
-from app.vary import DEFAULT
+from regrasp.app.findings import printable
+from regrasp.app.record import BeliefState, Link, Pose, Result
+from regrasp.app.record_reader import RunRecord
+from regrasp.app.summary import expectation_lines, headline, slip_lines, what_ran
+from regrasp.app.timeline import event_text, timeline, wrapped
+from regrasp.app.tried import attempts, course
+from regrasp.app.vary import DEFAULT
 
 REPORT_WIDTH = 100  # columns of a page in a test report
 LAST_EVENTS = 8  # shown of a run without a result

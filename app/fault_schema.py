@@ -4,7 +4,7 @@ from typing import Annotated, get_args
 
 from pydantic import Field
 
-from interfaces.fault import AnyFault
+from regrasp.interfaces.fault import AnyFault
 
 FaultSpec = Annotated[AnyFault, Field(discriminator="type")]
 FAULT_TYPES: dict[str, type] = {get_args(f.model_fields["type"].annotation)[0]: f for f in get_args(AnyFault)}

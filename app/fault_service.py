@@ -5,12 +5,12 @@ from typing import Any
 
 import py_trees
 
-from behaviors.services import Services
-from interfaces.cause import CauseCode, ServiceError
-from interfaces.fault import PlanningFindsNothing, ServiceFault, ServiceRaises
-from motion.failure import PlanningError
-from sim.faults import Fault
-from trees import node_paths
+from regrasp.behaviors.services import Services
+from regrasp.interfaces.cause import CauseCode, ServiceError
+from regrasp.interfaces.fault import PlanningFindsNothing, ServiceFault, ServiceRaises
+from regrasp.motion.failure import PlanningError
+from regrasp.sim.faults import Fault
+from regrasp.trees import node_paths
 
 
 class EnteredNodes(py_trees.visitors.VisitorBase):

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
-from app.video import OVERVIEW_SIZE, VideoWriter, compose
-from interfaces.cell import FixedMount
-from interfaces.frame import Intrinsics
-from sim.world import World
+from regrasp.app.video import OVERVIEW_SIZE, VideoWriter, compose
+from regrasp.interfaces.cell import FixedMount
+from regrasp.interfaces.frame import Intrinsics
+from regrasp.sim.world import World
 
 RATE = 10  # frames a simulated second
 OVERVIEW = FixedMount(position=(-0.55, -0.75, 0.85), pitch_down_deg=30.0, yaw_deg=38.0)

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from interfaces.quote import MOST, cut, quoted
+from regrasp.interfaces.quote import MOST, cut, quoted
 
 MOST_LISTED = 12  # known names after an unknown one
 

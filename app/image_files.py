@@ -7,8 +7,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from app.findings import Finding, Findings, shown, why_no_file
-from interfaces.quote import quoted
+from regrasp.app.findings import Finding, Findings, shown, why_no_file
+from regrasp.interfaces.quote import quoted
 
 NEAREST, FARTHEST = 0.05, 20.0  # m; choice: a median depth beyond these is one in another unit
 

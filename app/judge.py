@@ -7,11 +7,11 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from app.record import Expectation, Slip
-from app.scenario_schema import Expect
-from behaviors.services import Belief
-from sim.ground_truth import GroundTruth
-from sim.phase import LOST_SECONDS, STILL_SECONDS, STILL_SPEED
+from regrasp.app.record import Expectation, Slip
+from regrasp.app.scenario_schema import Expect
+from regrasp.behaviors.services import Belief
+from regrasp.sim.ground_truth import GroundTruth
+from regrasp.sim.phase import LOST_SECONDS, STILL_SECONDS, STILL_SPEED
 
 HOLD_SECONDS = 0.5  # of both pads' touch: a hand that closes beside its middle may touch it and push it away
 SLIDE = 0.003  # m in the jaw ...

@@ -4,9 +4,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
-from app.batch import Row, Run
-from app.findings import Findings, printable
-from app.record import write_whole
+from regrasp.app.batch import Row, Run
+from regrasp.app.findings import Findings, printable
+from regrasp.app.record import write_whole
 
 ERRORS = ("internal_error", "wall_limit")  # outcomes that say nothing of the robot
 
@@ -54,8 +54,8 @@ def _testcase(suite: ET.Element, run: Run, row: Row | None) -> None:
 
 def _in_full(folder: Path | None) -> str:
     """The page that `regrasp explain` shows of a record; '' where the run did not come to have one."""
-    from app.explain import REPORT_WIDTH, explanation  # late: the command line starts with this module
-    from app.record_reader import read_record
+    from regrasp.app.explain import REPORT_WIDTH, explanation  # late: the command line starts with this module
+    from regrasp.app.record_reader import read_record
 
     try:
         return explanation(read_record(folder), REPORT_WIDTH) if folder else ""

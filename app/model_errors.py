@@ -14,9 +14,9 @@ from typing import NamedTuple
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from app.findings import closest
-from app.schema_nodes import Schema, at, child, nodes_at
-from app.yaml_lines import Path, Value
+from regrasp.app.findings import closest
+from regrasp.app.schema_nodes import Schema, at, child, nodes_at
+from regrasp.app.yaml_lines import Path, Value
 
 TAG_ERRORS = ("union_tag_invalid", "union_tag_not_found")
 MOST_LOOKED_INTO = 100  # a value with more errors was not written by hand

@@ -6,8 +6,8 @@ from typing import Annotated, Literal
 
 import typer
 
-from app.findings import Finding, Findings
-from interfaces.quote import quoted
+from regrasp.app.findings import Finding, Findings
+from regrasp.interfaces.quote import quoted
 
 MOST_SEED = 2**31 - 1
 MOST_SEEDS = 10_000  # of one study
@@ -16,7 +16,7 @@ IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
 
 def _scenarios(incomplete: str) -> Iterator[str]:
     """Names for the shell's completion; it completes paths by itself."""
-    from app.resources import shipped
+    from regrasp.app.resources import shipped
 
     return (name for name in shipped("scenario") if name.startswith(incomplete))
 

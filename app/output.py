@@ -8,8 +8,8 @@ import tempfile
 from itertools import count
 from pathlib import Path
 
-from app.findings import Finding, real, shown
-from interfaces.quote import quoted
+from regrasp.app.findings import Finding, real, shown
+from regrasp.interfaces.quote import quoted
 
 RUNS = Path("runs")  # where records go by default
 RUN_FILES = ("result.json", "events.jsonl", "ticks.jsonl")  # by which a run's folder is known

@@ -4,9 +4,9 @@ from collections.abc import Iterator, Sequence
 from copy import deepcopy
 from dataclasses import dataclass
 
-from app.findings import Finding, Findings
-from app.yaml_lines import Document, Path, Place, Value, parse
-from interfaces.quote import cut, quoted
+from regrasp.app.findings import Finding, Findings
+from regrasp.app.yaml_lines import Document, Path, Place, Value, parse
+from regrasp.interfaces.quote import cut, quoted
 
 OPTION = "--set"
 

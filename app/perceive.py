@@ -14,21 +14,21 @@ import typer
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
-from app.calibration_file import CalibrationFile, load_calibration
-from app.camera_pose_file import load_camera_pose
-from app.draw_pose import draw_pose
-from app.findings import Finding, Findings, nearest, real, shown
-from app.image_files import read_depth, read_rgb
-from app.record import write_whole
-from interfaces.cell import FixedMount, KnownCell
-from interfaces.frame import RgbdFrame
-from interfaces.quote import quoted
-from perception.calibration import undistorted
-from perception.estimate import Estimate, NoEstimate
-from perception.fiducial import Fiducial
-from perception.fusion import fuse
-from perception.registration import expected_errors, register
-from perception.technique import TECHNIQUES, Technique, TechniqueName, make_technique
+from regrasp.app.calibration_file import CalibrationFile, load_calibration
+from regrasp.app.camera_pose_file import load_camera_pose
+from regrasp.app.draw_pose import draw_pose
+from regrasp.app.findings import Finding, Findings, nearest, real, shown
+from regrasp.app.image_files import read_depth, read_rgb
+from regrasp.app.record import write_whole
+from regrasp.interfaces.cell import FixedMount, KnownCell
+from regrasp.interfaces.frame import RgbdFrame
+from regrasp.interfaces.quote import quoted
+from regrasp.perception.calibration import undistorted
+from regrasp.perception.estimate import Estimate, NoEstimate
+from regrasp.perception.fiducial import Fiducial
+from regrasp.perception.fusion import fuse
+from regrasp.perception.registration import expected_errors, register
+from regrasp.perception.technique import TECHNIQUES, Technique, TechniqueName, make_technique
 
 NEEDS_NO_DEPTH = ("fiducial",)
 TIP_NOT_TOLD = "the picture does not tell which end is the tip"

@@ -7,14 +7,14 @@ from typing import Annotated, TypeVar
 
 import typer
 
-from app import output
-from app.findings import Finding, Findings, nearest, real, shown
-from app.interrupts import late_imports
-from app.options import MOST_SEED, Sets
-from app.resources import resolve
-from app.scenario_file import load_cell, load_scenario
-from interfaces.cell import Color
-from interfaces.quote import quoted
+from regrasp.app import output
+from regrasp.app.findings import Finding, Findings, nearest, real, shown
+from regrasp.app.interrupts import late_imports
+from regrasp.app.options import MOST_SEED, Sets
+from regrasp.app.resources import resolve
+from regrasp.app.scenario_file import load_cell, load_scenario
+from regrasp.interfaces.cell import Color
+from regrasp.interfaces.quote import quoted
 
 T = TypeVar("T")
 
@@ -115,7 +115,7 @@ def perceive(
         raise Findings([Finding("--radius", 0, message)])
     known = known.model_copy(update={"connector": connector})
     with late_imports():
-        from app import perceive as steps  # brings OpenCV and the compiler
+        from regrasp.app import perceive as steps  # brings OpenCV and the compiler
 
     files = [steps.Files(*each) for each in zip(rgb, depths, models, cameras, poses, strict=True)]
     raise typer.Exit(0 if steps.run(technique, files, known, depth_unit, draw) else 1)
@@ -192,7 +192,7 @@ def snapshot(
     if wrong:
         raise Findings(wrong)
     with late_imports():
-        from app.snapshot import take  # brings the planner, the compiler and the physics: seconds
+        from regrasp.app.snapshot import take  # brings the planner, the compiler and the physics: seconds
 
     take(loaded, camera, frames, out)
     typer.echo(f"written to {shown(out)}")

@@ -10,16 +10,16 @@ from numpy.typing import NDArray
 from pydantic import TypeAdapter
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from app.cable_rest import rest_shape
-from app.draw import LEAST_STAND, STAND
-from app.findings import Finding, Findings
-from app.scenario_schema import Jitter, ObstacleSize, Yaw
-from app.schema import part
-from app.schema_nodes import at
-from app.yaml_lines import Document, Path
-from interfaces.cell import PLUGGED_INTO, ArmSpec, Cell, FixedMount, KnownCell, Size, Socket, Vector, pose_along
-from interfaces.quote import cut, quoted
-from interfaces.scene import GRAVITIES, Gravity
+from regrasp.app.cable_rest import rest_shape
+from regrasp.app.draw import LEAST_STAND, STAND
+from regrasp.app.findings import Finding, Findings
+from regrasp.app.scenario_schema import Jitter, ObstacleSize, Yaw
+from regrasp.app.schema import part
+from regrasp.app.schema_nodes import at
+from regrasp.app.yaml_lines import Document, Path
+from regrasp.interfaces.cell import PLUGGED_INTO, ArmSpec, Cell, FixedMount, KnownCell, Size, Socket, Vector, pose_along
+from regrasp.interfaces.quote import cut, quoted
+from regrasp.interfaces.scene import GRAVITIES, Gravity
 
 FloatArray = NDArray[np.float64]
 # The ViperX 300 S's base, rtb-data's mesh VXSA-300-M-1-Base: centre from the arm's base, and full size, metres.
@@ -233,8 +233,8 @@ def _camera_points(cell: KnownCell) -> list[tuple[str, FloatArray, FloatArray]]:
 
 def asleep(arm: ArmSpec) -> tuple[FloatArray, FloatArray]:
     """Centres (n, 3) and half edges (n,), m, of the cubes inside the spheres that fill an arm in its sleep pose."""
-    from motion.kinematics import ArmKinematics  # late: it brings the compiler
-    from motion.spheres import LINKS, SPHERES
+    from regrasp.motion.kinematics import ArmKinematics  # late: it brings the compiler
+    from regrasp.motion.spheres import LINKS, SPHERES
 
     frames = ArmKinematics(RigidTransform.from_translation(arm.base)).link_frames(np.array(arm.sleep))[LINKS]
     centers = np.einsum("nij,nj->ni", frames[:, :3, :3], SPHERES[:, :3]) + frames[:, :3, 3]

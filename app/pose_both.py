@@ -4,16 +4,16 @@ from dataclasses import replace
 
 from scipy.spatial.transform import RigidTransform
 
-from app.pose_grasp import done, grasp, services_of
-from app.pose_scenes import Scene
-from app.pose_trial import MEAN_SECONDS, Looked, Setup, Trial, look, looked, measured
-from behaviors.hand import EYE
-from behaviors.leaf import Steps
-from behaviors.look import LOOK_MARGIN, LookLeaf
-from behaviors.services import Services
-from behaviors.start_up import StartUp
-from perception.fusion import fuse
-from perception.technique import Technique
+from regrasp.app.pose_grasp import done, grasp, services_of
+from regrasp.app.pose_scenes import Scene
+from regrasp.app.pose_trial import MEAN_SECONDS, Looked, Setup, Trial, look, looked, measured
+from regrasp.behaviors.hand import EYE
+from regrasp.behaviors.leaf import Steps
+from regrasp.behaviors.look import LOOK_MARGIN, LookLeaf
+from regrasp.behaviors.services import Services
+from regrasp.behaviors.start_up import StartUp
+from regrasp.perception.fusion import fuse
+from regrasp.perception.technique import Technique
 
 BOTH = "both cameras"  # what stands behind the technique's name
 SETTLE_SECONDS = 0.5  # until the arm swings no more

@@ -13,13 +13,13 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform
 from scipy.stats import chi2
 
-from app.pose_scenes import HEADLINE
-from app.pose_tasks import run_tasks
-from app.pose_trial import Setup
-from app.record import plain, versions, write_whole
-from app.study import wilson
-from app.table import print_table
-from perception.estimate import Estimate
+from regrasp.app.pose_scenes import HEADLINE
+from regrasp.app.pose_tasks import run_tasks
+from regrasp.app.pose_trial import Setup
+from regrasp.app.record import plain, versions, write_whole
+from regrasp.app.study import wilson
+from regrasp.app.table import print_table
+from regrasp.perception.estimate import Estimate
 
 FRAMES = 10  # of a seed: 200 seeds give 2,000
 LEVEL = 0.95

@@ -6,15 +6,15 @@ import structlog
 from py_trees.common import Status
 from scipy.spatial.transform import RigidTransform
 
-from app.pose_scenes import Scene
-from behaviors.hand import HAND
-from behaviors.leaf import Leaf
-from behaviors.regrasp import Regrasp
-from behaviors.services import Services
-from behaviors.start_up import StartUp
-from motion.failure import PlanningError
-from motion.service import Motion
-from perception.service import Perception
+from regrasp.app.pose_scenes import Scene
+from regrasp.behaviors.hand import HAND
+from regrasp.behaviors.leaf import Leaf
+from regrasp.behaviors.regrasp import Regrasp
+from regrasp.behaviors.services import Services
+from regrasp.behaviors.start_up import StartUp
+from regrasp.motion.failure import PlanningError
+from regrasp.motion.service import Motion
+from regrasp.perception.service import Perception
 
 TICK = 0.05  # simulated seconds
 DRAWN = 0.05  # m straight back

@@ -6,14 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from app.pose_scenes import CAMERA
-from app.pose_trial import Setup
-from interfaces.cell import Cell, Color, FixedMount
-from interfaces.frame import RgbdFrame
-from interfaces.scene import Prop
-from perception.estimate import Estimate
-from sim.renderer import RendererName
-from sim.world import World
+from regrasp.app.pose_scenes import CAMERA
+from regrasp.app.pose_trial import Setup
+from regrasp.interfaces.cell import Cell, Color, FixedMount
+from regrasp.interfaces.frame import RgbdFrame
+from regrasp.interfaces.scene import Prop
+from regrasp.perception.estimate import Estimate
+from regrasp.sim.renderer import RendererName
+from regrasp.sim.world import World
 
 FRAMES = 10  # of a seed, each with other things in other places: 20 seeds give the 200
 LOW, HIGH = np.array([0.20, -0.30, 0.08]), np.array([0.46, 0.35, 0.50])  # m: in the rear camera's sight

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from app.pose_scenes import CONFIGURATIONS, HEADLINE
-from app.pose_trial import Trial
-from app.study import wilson
+from regrasp.app.pose_scenes import CONFIGURATIONS, HEADLINE
+from regrasp.app.pose_trial import Trial
+from regrasp.app.study import wilson
 
 # Hwang 2024, table 5: mean error in mm of the RGB-D technique by the share hidden, in its configurations 3 and 6 to 9.
 THESIS_RGBD = {"3": 4.4, "6": 8.8, "7": 13.6, "8": 17.0, "9": 35.7}

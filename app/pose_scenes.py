@@ -14,16 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from app.findings import Findings
-from app.overrides import read
-from app.resources import resolve
-from app.scenario_file import load_cell
-from interfaces.cell import Box, Cell, FixedMount
-from interfaces.frame import RgbdFrame
-from interfaces.scene import Obstacle
-from sim.ground_truth import GroundTruth
-from sim.renderer import RendererName
-from sim.world import World
+from regrasp.app.findings import Findings
+from regrasp.app.overrides import read
+from regrasp.app.resources import resolve
+from regrasp.app.scenario_file import load_cell
+from regrasp.interfaces.cell import Box, Cell, FixedMount
+from regrasp.interfaces.frame import RgbdFrame
+from regrasp.interfaces.scene import Obstacle
+from regrasp.sim.ground_truth import GroundTruth
+from regrasp.sim.renderer import RendererName
+from regrasp.sim.world import World
 
 FloatArray = NDArray[np.float64]
 

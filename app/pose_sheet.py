@@ -1,4 +1,4 @@
-"""`python -m app.pose_sheet FILE`: the pose study's configurations on one sheet, colour above depth."""
+"""`python -m regrasp.pose_sheet FILE`: the pose study's configurations on one sheet, colour above depth."""
 
 import sys
 
@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from app.pose_scenes import Scene, study_cell
-from interfaces.frame import RgbdFrame
+from regrasp.app.pose_scenes import Scene, study_cell
+from regrasp.interfaces.frame import RgbdFrame
 
 SHOWN = ("1", "2", "3", "4", "5", "6", "7", "8", "9", "9 shadow")
 ROWS, COLUMNS = slice(70, 400), slice(190, 660)  # of the rear camera's 848x480

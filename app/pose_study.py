@@ -12,14 +12,14 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-from app.pose_both import BOTH, run_both
-from app.pose_negatives import Negative, run_negatives
-from app.pose_scenes import CONFIGURATIONS, HEADLINE
-from app.pose_tasks import run_tasks
-from app.pose_trial import Setup, Trial, run_trials
-from app.record import plain, versions, write_whole
-from app.study import wilson
-from app.table import print_table
+from regrasp.app.pose_both import BOTH, run_both
+from regrasp.app.pose_negatives import Negative, run_negatives
+from regrasp.app.pose_scenes import CONFIGURATIONS, HEADLINE
+from regrasp.app.pose_tasks import run_tasks
+from regrasp.app.pose_trial import Setup, Trial, run_trials
+from regrasp.app.record import plain, versions, write_whole
+from regrasp.app.study import wilson
+from regrasp.app.table import print_table
 
 # Hwang 2024, table 3: of 27 trials identified and grasped, mean error and its standard deviation in m.
 THESIS: dict[str, dict[str, Any]] = {
@@ -61,7 +61,7 @@ def run_pose(
     _write(out, found, rows, seeds)
     trials = _trials(found)
     if out is not None and trials:
-        from app.pose_plots import draw  # late: it brings matplotlib
+        from regrasp.app.pose_plots import draw  # late: it brings matplotlib
 
         draw(out, trials, rows, THESIS)
     _print({name: of_technique(name, found) for name in rows})

@@ -4,7 +4,7 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from typing import TypeVar
 
-from app.processes import run_each
+from regrasp.app.processes import run_each
 
 T = TypeVar("T")
 

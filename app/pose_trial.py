@@ -6,14 +6,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import RigidTransform
 
-from app.findings import Finding, Findings
-from app.pose_grasp import grasp, services_of
-from app.pose_scenes import CAMERA, Scene, study_cell
-from interfaces.cell import Cell, KnownCell, pose_along
-from interfaces.frame import RgbdFrame
-from perception.estimate import Estimate
-from perception.technique import Technique, make_technique
-from sim.renderer import RendererName
+from regrasp.app.findings import Finding, Findings
+from regrasp.app.pose_grasp import grasp, services_of
+from regrasp.app.pose_scenes import CAMERA, Scene, study_cell
+from regrasp.interfaces.cell import Cell, KnownCell, pose_along
+from regrasp.interfaces.frame import RgbdFrame
+from regrasp.perception.estimate import Estimate
+from regrasp.perception.technique import Technique, make_technique
+from regrasp.sim.renderer import RendererName
 
 LOOK_SECONDS, MEAN_SECONDS = 5.0, 3.0  # to identify it, and then over which poses are averaged: the thesis's
 FAR = 0.10  # m from the truth; choice: what is seen further than a connector's length away is something else

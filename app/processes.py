@@ -11,7 +11,7 @@ from multiprocessing import get_context, resource_tracker
 from multiprocessing.connection import Connection, wait
 from typing import Any, Generic, NamedTuple, TypeVar
 
-from app.interrupts import WALL_LIMIT_SIGNAL, listen_to_parent
+from regrasp.app.interrupts import WALL_LIMIT_SIGNAL, listen_to_parent
 
 T = TypeVar("T")
 GRACE = 10.0  # seconds that a process has to put its things in order

@@ -7,10 +7,10 @@ from typing import Any, NamedTuple
 
 from rich.console import Console
 
-from app.findings import printable
-from app.interrupts import interruptible
-from app.options import LogLevel
-from app.summary import in_words
+from regrasp.app.findings import printable
+from regrasp.app.interrupts import interruptible
+from regrasp.app.options import LogLevel
+from regrasp.app.summary import in_words
 
 Progress = Callable[[float, str], None]  # simulated seconds, active leaf; called at each tick
 OnEvent = Callable[[Mapping[str, Any]], None]  # called with each event as events.jsonl has it

@@ -12,7 +12,8 @@ Try a tree out: put tree files into a folder `trees` beside pytest's configurati
 pytest; or name the files or their folder: `pytest my/tree.xml`, `pytest my`. Each gives two tests on scripted leaves:
 that the tree ends, and that a stop at any tick leaves nothing at work.
 
-Test a tree's logic: the fixture `scripted_tree` (see `trees.scripted`) takes a tree file, or a shipped tree's name.
+Test a tree's logic: the fixture `scripted_tree` (see `regrasp.trees.scripted`) takes a tree file, or a shipped tree's
+name.
 
     def test_a_slip_is_recovered(scripted_tree):
         tree = scripted_tree("recovery", {"DetectSlip": "3 failure, running", "Carry": "5 success"})
@@ -35,9 +36,9 @@ import pytest
 
 # Everything of Regrasp comes late: a pytest that collects nothing of ours must not wait for it.
 if TYPE_CHECKING:
-    from app.record import Result
-    from app.scenario_file import Scenario
-    from trees.scripted import ScriptedTree
+    from regrasp.app.record import Result
+    from regrasp.app.scenario_file import Scenario
+    from regrasp.trees.scripted import ScriptedTree
 
 SCENARIO, TREE = ".scenario.yaml", ".tree.xml"
 
@@ -60,7 +61,7 @@ def pytest_configure(config: pytest.Config) -> None:
     """Refuse wrong options before anything is collected."""
     seed, records = config.getoption("--scenario-seed"), config.getoption("--scenario-records")
     if seed is not None and not re.fullmatch(r"\d+(:\d+)?", seed):
-        from interfaces.quote import quoted
+        from regrasp.interfaces.quote import quoted
 
         raise pytest.UsageError(
             f"--scenario-seed {quoted(seed)} is no seed; write a whole number, or a range such as 0:5"
@@ -71,7 +72,7 @@ def pytest_configure(config: pytest.Config) -> None:
             f"--scenario-wall-limit {limit:g} is no limit; write seconds of at least 1, such as 600"
         )
     if records is not None:
-        from app.output import findings
+        from regrasp.app.output import findings
 
         for finding in findings(records):
             raise pytest.UsageError(f"--scenario-records: {finding}")
@@ -108,8 +109,8 @@ class ScenarioSuite(pytest.File):
 
     def collect(self) -> Iterator[pytest.Item]:
         """The cases. Raises `CollectError` with a line for each finding in the file."""
-        from app.findings import Findings
-        from app.scenario_file import cases
+        from regrasp.app.findings import Findings
+        from regrasp.app.scenario_file import cases
 
         try:
             found = cases(str(self.path), _overrides(self.config.getoption("--scenario-seed")))
@@ -152,8 +153,8 @@ class ScenarioCase(_Item):
 
     def runtest(self) -> None:
         """Run it in a process of its own. Raises `Failed` with the explanation when it did not come out as expected."""
-        from app.batch import Run, result_of
-        from app.processes import run_each
+        from regrasp.app.batch import Run, result_of
+        from regrasp.app.processes import run_each
 
         folder = self._folder()
         self.user_properties += [("seed", self.scenario.file.seed), ("record", str(folder))]
@@ -169,7 +170,7 @@ class ScenarioCase(_Item):
 
     def _folder(self) -> Path:
         """A new folder for the record."""
-        from app.output import new_folder
+        from regrasp.app.output import new_folder
 
         kept: Path | None = self.config.getoption("--scenario-records")
         name = f"{self.path.name.removesuffix(SCENARIO)}-{self.name}"
@@ -181,14 +182,14 @@ class ScenarioCase(_Item):
 
 def _run(scenario: Scenario, folder: Path) -> Result:
     """In the case's process, the only one that needs the physics."""
-    from app.episode import run_episode
+    from regrasp.app.episode import run_episode
 
     return run_episode(scenario, folder, seed=scenario.file.seed)
 
 
 def _explained(folder: Path) -> str:
-    from app.explain import REPORT_WIDTH, explanation
-    from app.record_reader import read_record
+    from regrasp.app.explain import REPORT_WIDTH, explanation
+    from regrasp.app.record_reader import read_record
 
     return f"{explanation(read_record(folder), REPORT_WIDTH)}\nrecord  {folder}"
 
@@ -198,9 +199,9 @@ class TreeFile(pytest.File):
 
     def collect(self) -> Iterator[pytest.Item]:
         """Its two tests. Raises `CollectError` with a line for each finding in the file."""
-        from app.findings import Findings
-        from app.scenario_file import check_tree_file
-        from trees.trials import left_by_a_stop, never_ends
+        from regrasp.app.findings import Findings
+        from regrasp.app.scenario_file import check_tree_file
+        from regrasp.trees.trials import left_by_a_stop, never_ends
 
         try:
             check_tree_file(self.path)
@@ -211,7 +212,7 @@ class TreeFile(pytest.File):
 
 
 class TreeTrial(_Item):
-    """One of the trials of `trees.trials`."""
+    """One of the trials of `regrasp.trees.trials`."""
 
     def __init__(self, *, trial: Callable[[Path], Iterator[str]], **kwargs: Any) -> None:
         super().__init__(**kwargs)
@@ -231,11 +232,11 @@ class TreeTrial(_Item):
 
 @pytest.fixture
 def scripted_tree() -> Iterator[Callable[..., ScriptedTree]]:
-    """Makes a tree of scripted leaves, by a tree file or a shipped tree's name; arguments as `trees.scripted` says."""
+    """Makes a tree of scripted leaves by a tree file or a shipped tree's name; arguments: `regrasp.trees.scripted`."""
     from py_trees.blackboard import Blackboard
 
-    from app.resources import resolve
-    from trees.scripted import ScriptedTree
+    from regrasp.app.resources import resolve
+    from regrasp.trees.scripted import ScriptedTree
 
     def make(tree: str | Path, script: dict[str, str] | None = None, **options: Any) -> ScriptedTree:
         return ScriptedTree(resolve("tree", str(tree), Path()), script, **options)

@@ -17,10 +17,10 @@ from typing import Any, BinaryIO, Literal, Self, TextIO
 
 import structlog
 
-from app import output
-from app.findings import Findings, real
-from app.interrupts import WallLimit, held_back
-from interfaces.cause import Cause, CauseCode
+from regrasp.app import output
+from regrasp.app.findings import Findings, real
+from regrasp.app.interrupts import WallLimit, held_back
+from regrasp.interfaces.cause import Cause, CauseCode
 
 Outcome = Literal["stowed", "safe_stop", "time_limit", "wall_limit", "interrupted", "internal_error"]
 NodeStatus = Literal["RUNNING", "SUCCESS", "FAILURE", "INVALID"]
@@ -224,7 +224,7 @@ class Record:
         """Create the folder, with `copies` (name to text) of what is run.
 
         Raises:
-            app.findings.Findings: it holds a run already, or cannot be written.
+            Findings: it holds a run already, or cannot be written.
             OSError: it cannot be created or written.
         """
         self.folder = folder

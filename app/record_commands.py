@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from app.findings import Finding, Findings, printable
+from regrasp.app.findings import Finding, Findings, printable
 
 if TYPE_CHECKING:
-    from app.record_reader import RunRecord
+    from regrasp.app.record_reader import RunRecord
 
 EXIT_DIFFERENT = 1
 WIDTHS = (80, 120)  # columns of a page
@@ -43,7 +43,7 @@ def explain(
     if as_json:
         typer.echo(_json(record))
         return
-    from app.explain import explanation
+    from regrasp.app.explain import explanation
 
     width = min(max(shutil.get_terminal_size((100, 24)).columns, WIDTHS[0]), WIDTHS[1])
     typer.echo(explanation(record, width), nl=False)
@@ -70,13 +70,13 @@ def replay(
       regrasp replay runs/short_obstacle-0-1
       regrasp replay runs/short_obstacle-0-1 --from 8 --to 12 --filter deliver
     """
-    from app.replay import Replay, check_span
+    from regrasp.app.replay import Replay, check_span
 
     check_span(begin, end)
     run = Replay(_read(folder), float("inf") if end is None else end)
     run.check(begin or 0.0, part)
     if sys.stdin.isatty() and sys.stdout.isatty() and os.environ.get("TERM") != "dumb":
-        from app.replay_screen import show
+        from regrasp.app.replay_screen import show
 
         show(run, part, begin or 0.0)
         return
@@ -95,7 +95,7 @@ def diff(folder: Folder, other: Annotated[Path, typer.Argument(metavar="DIR", he
     \b
     Exit code: 0 they went the same way, 1 they did not, 2 bad input.
     """
-    from app.record_diff import beginnings, differences
+    from regrasp.app.record_diff import beginnings, differences
 
     first, second = _read_both(folder, other)
     begun, parted = beginnings(first, second), differences(first, second)
@@ -107,7 +107,7 @@ def diff(folder: Folder, other: Annotated[Path, typer.Argument(metavar="DIR", he
 
 
 def _read(folder: Path) -> "RunRecord":
-    from app.record_reader import read_record  # late, like all that only these commands need
+    from regrasp.app.record_reader import read_record  # late, like all that only these commands need
 
     return read_record(folder)
 
@@ -127,8 +127,8 @@ def _read_both(*folders: Path) -> "list[RunRecord]":
 
 
 def _json(record: "RunRecord") -> str:
-    from app.record import plain
-    from app.tried import attempts
+    from regrasp.app.record import plain
+    from regrasp.app.tried import attempts
 
     result = asdict(record.result) if record.result else None
     value: dict[str, Any] = {"run": record.begin, "result": result, "remarks": record.remarks}

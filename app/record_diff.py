@@ -5,9 +5,9 @@ from dataclasses import asdict
 from itertools import zip_longest
 from typing import Any
 
-from app.findings import printable
-from app.record import plain
-from app.record_reader import Event, RunRecord, Tick
+from regrasp.app.findings import printable
+from regrasp.app.record import plain
+from regrasp.app.record_reader import Event, RunRecord, Tick
 
 RUN = (
     "scenario",

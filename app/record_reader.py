@@ -11,10 +11,10 @@ from typing import Annotated, Any, TypeVar
 from pydantic import AfterValidator, Field, TypeAdapter, ValidationError
 from pydantic_core import from_json
 
-from app import output
-from app.findings import Finding, Findings, shown
-from app.record import SCHEMA, NodeStatus, Result, leaf_at_work
-from trees.wiring import MAX_TREE_DEPTH
+from regrasp.app import output
+from regrasp.app.findings import Finding, Findings, shown
+from regrasp.app.record import SCHEMA, NodeStatus, Result, leaf_at_work
+from regrasp.trees.wiring import MAX_TREE_DEPTH
 
 MAX_RESULT, MAX_LINES = 16 << 20, 64 << 20  # bytes of result.json, of each of the others: hours of a run
 MOST_FINDINGS = 10  # of one file

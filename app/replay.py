@@ -5,13 +5,13 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from app.findings import Finding, Findings, nearest, printable, shown
-from app.record_reader import Event, RunRecord, Tick
-from app.resources import read_text
-from app.timeline import event_text
-from interfaces.quote import quoted
-from trees.element import TreeSyntaxError
-from trees.graph import Node, read_graph
+from regrasp.app.findings import Finding, Findings, nearest, printable, shown
+from regrasp.app.record_reader import Event, RunRecord, Tick
+from regrasp.app.resources import read_text
+from regrasp.app.timeline import event_text
+from regrasp.interfaces.quote import quoted
+from regrasp.trees.element import TreeSyntaxError
+from regrasp.trees.graph import Node, read_graph
 
 SLACK = 1e-9  # s, for a second that was typed
 

@@ -7,11 +7,11 @@ from rich.console import Console, Group
 from rich.live import Live
 from rich.text import Text
 
-from app.findings import printable
-from app.keys import keyboard
-from app.replay import Replay
-from app.timeline import event_text
-from interfaces.quote import quoted
+from regrasp.app.findings import printable
+from regrasp.app.keys import keyboard
+from regrasp.app.replay import Replay
+from regrasp.app.timeline import event_text
+from regrasp.interfaces.quote import quoted
 
 PAGE = 10  # changes
 HELP = (  # the first that fits is shown

@@ -7,7 +7,7 @@ from typing import Any
 
 import yaml
 
-from app.scenario_file import Scenario
+from regrasp.app.scenario_file import Scenario
 
 
 def copies(scenario: Scenario, seed: int) -> dict[str, str]:

@@ -5,8 +5,8 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Literal
 
-from app.findings import Finding, Findings, closest, shown, why_no_file
-from interfaces.quote import cut, quoted
+from regrasp.app.findings import Finding, Findings, closest, shown, why_no_file
+from regrasp.interfaces.quote import cut, quoted
 
 Kind = Literal["scenario", "cell", "tree"]
 _SUFFIX: dict[Kind, str] = {"scenario": ".yaml", "cell": ".yaml", "tree": ".xml"}
@@ -16,9 +16,8 @@ MAX_BYTES = 256 * 1024  # of a file that a person writes
 
 def shipped(kind: Kind) -> dict[str, Path]:
     """Name to file of everything of this kind that comes with Regrasp, sorted by name; scenarios of faults last."""
-    folders = {"scenario": ("scenarios",), "cell": ("scenarios", "cells"), "tree": ("trees",)}
-    package, *below = folders[kind]
-    folder = Path(str(files(package).joinpath(*below)))
+    folders = {"scenario": "scenarios", "cell": "scenarios/cells", "tree": "trees"}
+    folder = Path(str(files("regrasp"))) / folders[kind]
     names = {path.stem: path for path in sorted(folder.glob("*" + _SUFFIX[kind]))}
     if kind == "scenario":
         names |= {f"faults/{path.stem}": path for path in sorted((folder / "faults").glob("*" + _SUFFIX[kind]))}

@@ -10,19 +10,19 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from app import output
-from app.batch import Run, Settings, result_of
-from app.findings import Finding, Findings, printable, shown
-from app.interrupts import late_imports
-from app.options import LogLevel, Renderer, ScenarioName, Seed, Sets, WallLimit
-from app.processes import run_each
-from app.progress import shown_progress
-from app.run_every import run_every
-from app.scenario_file import Scenario, cases, load_scenario
-from app.summary import summary
+from regrasp.app import output
+from regrasp.app.batch import Run, Settings, result_of
+from regrasp.app.findings import Finding, Findings, printable, shown
+from regrasp.app.interrupts import late_imports
+from regrasp.app.options import LogLevel, Renderer, ScenarioName, Seed, Sets, WallLimit
+from regrasp.app.processes import run_each
+from regrasp.app.progress import shown_progress
+from regrasp.app.run_every import run_every
+from regrasp.app.scenario_file import Scenario, cases, load_scenario
+from regrasp.app.summary import summary
 
 if TYPE_CHECKING:
-    from app.record import Result
+    from regrasp.app.record import Result
 
 EXIT_UNMET, EXIT_INTERRUPTED = 1, 130
 
@@ -116,7 +116,7 @@ def _checked(load: Callable[[], list[Scenario]], wrong: list[Finding], out: Path
 def _run(scenario: Scenario, folder: Path, settings: Settings, gui: bool, log_level: LogLevel) -> "Result":
     """Run in this process, with progress on stderr."""
     with late_imports():
-        from app.episode import run_episode  # brings the planner, the compiler and the physics: seconds
+        from regrasp.app.episode import run_episode  # brings the planner, the compiler and the physics: seconds
 
     with shown_progress(settings.quiet, log_level) as show:
         return run_episode(
@@ -133,7 +133,7 @@ def _run(scenario: Scenario, folder: Path, settings: Settings, gui: bool, log_le
 
 def _watched(run: Run, task: Callable[[], "Result"], wall_limit: float) -> "Result":
     """Do it in a process of its own, which is stopped after `wall_limit` seconds."""
-    from app.record_reader import read_record  # late: it brings py_trees
+    from regrasp.app.record_reader import read_record  # late: it brings py_trees
 
     assert run.folder is not None
     try:

@@ -3,12 +3,12 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from app import output
-from app.batch import Episode, Row, Run, Settings, run_all
-from app.findings import Finding, Findings, printable
-from app.junit import write_junit
-from app.scenario_file import cases
-from app.table import print_table
+from regrasp.app import output
+from regrasp.app.batch import Episode, Row, Run, Settings, run_all
+from regrasp.app.findings import Finding, Findings, printable
+from regrasp.app.junit import write_junit
+from regrasp.app.scenario_file import cases
+from regrasp.app.table import print_table
 
 
 def run_every(
@@ -27,7 +27,7 @@ def run_every(
     expected, 1 when not, 130 after Ctrl-C, which keeps what was done. `episode` stands in for `run_episode` in tests.
 
     Raises:
-        app.findings.Findings: bad input; `wrong` holds what the caller found.
+        Findings: bad input; `wrong` holds what the caller found.
         OSError: the disk is full or the like.
     """
     found = [*wrong, *(output.unwritable_file(junit) if junit else [])]

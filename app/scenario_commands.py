@@ -6,11 +6,11 @@ from typing import Annotated
 import typer
 import yaml
 
-from app.findings import Finding, Findings, printable, shown
-from app.options import Sets
-from app.resources import shipped
-from app.scenario_file import case_names, cases, description, load_scenario
-from app.schema_doc import markdown
+from regrasp.app.findings import Finding, Findings, printable, shown
+from regrasp.app.options import Sets
+from regrasp.app.resources import shipped
+from regrasp.app.scenario_file import case_names, cases, description, load_scenario
+from regrasp.app.schema_doc import markdown
 
 app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="List, check and show scenarios.")
 Name = Annotated[str, typer.Argument(help="A shipped scenario's name, or a path to a .yaml file.")]
@@ -108,7 +108,7 @@ def schema(
     To read it yourself:
       regrasp scenarios schema --markdown
     """
-    from app.scenario_schema import ScenarioFile, json_schema
+    from regrasp.app.scenario_schema import ScenarioFile, json_schema
 
     if as_markdown:
         typer.echo(markdown(ScenarioFile.model_json_schema()))

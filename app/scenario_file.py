@@ -7,20 +7,20 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal, ParamSpec, TypeVar
 
-from app import vary
-from app.cell_layout import impossible
-from app.findings import Finding, Findings, nearest, shown
-from app.overrides import Assignment, apply, lay_over, path_of, read, was_typed
-from app.placement import misplaced
-from app.resources import read_text, resolve
-from app.scenario_parts import check_inputs, check_names, names_of, tree_text
-from app.scenario_schema import ScenarioFile
-from app.schema import Error, read_as, validated
-from app.schema_nodes import at
-from app.yaml_lines import Document, Place, parse
-from app.yaml_lines import Path as KeyPath
-from interfaces.cell import Cell
-from interfaces.quote import MOST, cut, quoted
+from regrasp.app import vary
+from regrasp.app.cell_layout import impossible
+from regrasp.app.findings import Finding, Findings, nearest, shown
+from regrasp.app.overrides import Assignment, apply, lay_over, path_of, read, was_typed
+from regrasp.app.placement import misplaced
+from regrasp.app.resources import read_text, resolve
+from regrasp.app.scenario_parts import check_inputs, check_names, names_of, tree_text
+from regrasp.app.scenario_schema import ScenarioFile
+from regrasp.app.schema import Error, read_as, validated
+from regrasp.app.schema_nodes import at
+from regrasp.app.yaml_lines import Document, Place, parse
+from regrasp.app.yaml_lines import Path as KeyPath
+from regrasp.interfaces.cell import Cell
+from regrasp.interfaces.quote import MOST, cut, quoted
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -308,7 +308,7 @@ def check_tree_file(path: Path, where: Place | None = None, names: Mapping[str, 
     `names` are those that the cell has, by kind; without them the tree's are not checked.
     """
     read_text(path, where)
-    from trees import check_tree  # the leaves bring the planner and the compiler with them: seconds
+    from regrasp.trees import check_tree  # the leaves bring the planner and the compiler with them: seconds
 
     found = [Finding(shown(path), line, message) for line, message in check_tree(path, names=names)]
     if found:

@@ -6,13 +6,13 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
-from app.findings import Finding, Findings, nearest
-from app.scenario_schema import TreeInput
-from app.schema import part
-from app.schema_nodes import at
-from app.yaml_lines import Document
-from interfaces.cell import PLUGGED_INTO, Cell
-from interfaces.quote import cut, quoted
+from regrasp.app.findings import Finding, Findings, nearest
+from regrasp.app.scenario_schema import TreeInput
+from regrasp.app.schema import part
+from regrasp.app.schema_nodes import at
+from regrasp.app.yaml_lines import Document
+from regrasp.interfaces.cell import PLUGGED_INTO, Cell
+from regrasp.interfaces.quote import cut, quoted
 
 _INPUT = TypeAdapter[TreeInput](TreeInput)
 
@@ -27,7 +27,7 @@ def names_of(cell: Cell | None) -> dict[str, dict[str, str]]:
 
     Without a cell, what it may name in any.
     """
-    from perception.technique import TECHNIQUES  # late: it brings the compiler with it
+    from regrasp.perception.technique import TECHNIQUES  # late: it brings the compiler with it
 
     techniques: dict[str, str] = dict.fromkeys(TECHNIQUES, "")
     if cell is None:
@@ -42,7 +42,9 @@ def names_of(cell: Cell | None) -> dict[str, dict[str, str]]:
 
 def check_inputs(document: Document, tree: Path | None, cell: Cell | None) -> None:
     """Raises `Findings` for inputs that the tree does not take, or not with these values."""
-    from trees import check_inputs as of_tree  # the leaves bring the planner and the compiler with them: seconds
+    from regrasp.trees import (
+        check_inputs as of_tree,  # the leaves bring the planner and the compiler with them: seconds
+    )
 
     written = at(document.value, ("inputs",))
     if tree is None or not isinstance(written, dict):
@@ -94,7 +96,7 @@ def _nodes(document: Document, tree: Path | None) -> Iterator[Finding]:
 
 def _node_names(tree: Path) -> set[str]:
     """Every way to name a node of the tree: its path, and the last names of it; none where the file is no tree."""
-    from trees import TreeSyntaxError, read_graph
+    from regrasp.trees import TreeSyntaxError, read_graph
 
     try:
         nodes = read_graph(tree).walk()

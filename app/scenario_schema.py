@@ -4,11 +4,11 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, Field, JsonValue, model_validator
 
-from app.fault_schema import FaultSpec
-from app.options import MOST_SEED
-from interfaces.cause import CauseCode
-from interfaces.cell import Color, Direction, Fraction, Model, NotNegative, Vector
-from interfaces.scene import Gravity
+from regrasp.app.fault_schema import FaultSpec
+from regrasp.app.options import MOST_SEED
+from regrasp.interfaces.cause import CauseCode
+from regrasp.interfaces.cell import Color, Direction, Fraction, Model, NotNegative, Vector
+from regrasp.interfaces.scene import Gravity
 
 Outcome = Literal["stowed", "safe_stop"]
 Edge = Annotated[float, Field(ge=1e-3, le=3)]  # metres

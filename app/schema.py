@@ -7,11 +7,11 @@ from typing import NamedTuple, TypeVar
 from pydantic import BaseModel, TypeAdapter, ValidationError
 from pydantic_core import ErrorDetails
 
-from app.findings import Finding, Findings, nearest
-from app.model_errors import TAG_ERRORS, misspelt, model_errors
-from app.schema_nodes import Schema, child, nodes_at
-from app.yaml_lines import Document, Path
-from interfaces.quote import cut, quoted
+from regrasp.app.findings import Finding, Findings, nearest
+from regrasp.app.model_errors import TAG_ERRORS, misspelt, model_errors
+from regrasp.app.schema_nodes import Schema, child, nodes_at
+from regrasp.app.yaml_lines import Document, Path
+from regrasp.interfaces.quote import cut, quoted
 
 M = TypeVar("M", bound=BaseModel)
 T = TypeVar("T")

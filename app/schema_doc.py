@@ -4,8 +4,8 @@ import json
 from collections.abc import Iterator
 from typing import Any
 
-from app.schema import range_words, unit
-from app.schema_nodes import Schema, alternatives
+from regrasp.app.schema import range_words, unit
+from regrasp.app.schema_nodes import Schema, alternatives
 
 _HEADER = "| field | type | unit | default | meaning | example |\n|---|---|---|---|---|---|"
 

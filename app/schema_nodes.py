@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from app.yaml_lines import Path, Value
+from regrasp.app.yaml_lines import Path, Value
 
 Schema = dict[str, Any]  # a node of the schema
 

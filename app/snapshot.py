@@ -5,13 +5,13 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from app.calibration_file import CalibrationFile, write_calibration
-from app.camera_pose_file import write_camera_pose
-from app.episode import build_world
-from app.record import write_whole
-from app.scenario_file import Scenario
-from interfaces.cell import FixedMount
-from interfaces.frame import RgbdFrame
+from regrasp.app.calibration_file import CalibrationFile, write_calibration
+from regrasp.app.camera_pose_file import write_camera_pose
+from regrasp.app.episode import build_world
+from regrasp.app.record import write_whole
+from regrasp.app.scenario_file import Scenario
+from regrasp.interfaces.cell import FixedMount
+from regrasp.interfaces.frame import RgbdFrame
 
 MILLIMETRES = 1000.0  # in a metre: the depth file's unit
 

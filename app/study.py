@@ -8,11 +8,11 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
-from app.batch import Episode, Row, Run, Settings, run_all
-from app.output import folder_name
-from app.record import plain, versions, write_whole
-from app.scenario_file import Scenario, cases
-from app.table import print_table
+from regrasp.app.batch import Episode, Row, Run, Settings, run_all
+from regrasp.app.output import folder_name
+from regrasp.app.record import plain, versions, write_whole
+from regrasp.app.scenario_file import Scenario, cases
+from regrasp.app.table import print_table
 
 SCENARIOS = ("no_obstacle", "short_obstacle", "tall_obstacle")
 _Z = 1.959964  # of the normal distribution, for 95 %
@@ -33,7 +33,7 @@ def run_demo(
     Ctrl-C, 2 when `out` holds a study. `episode` stands in for `run_episode` in tests.
 
     Raises:
-        app.findings.Findings: a scenario with these overrides is wrong.
+        Findings: a scenario with these overrides is wrong.
         OSError: `out` cannot be written.
     """
     if out is not None and (out / "demo.json").exists():

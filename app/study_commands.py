@@ -8,11 +8,11 @@ from typing import Annotated
 
 import typer
 
-from app import output
-from app.findings import Finding, Findings, nearest, shown
-from app.interrupts import late_imports
-from app.options import Renderer, Sets, WallLimit, parse_seeds
-from interfaces.quote import quoted
+from regrasp.app import output
+from regrasp.app.findings import Finding, Findings, nearest, shown
+from regrasp.app.interrupts import late_imports
+from regrasp.app.options import Renderer, Sets, WallLimit, parse_seeds
+from regrasp.interfaces.quote import quoted
 
 app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Run many episodes or scenes, and count.")
 
@@ -38,8 +38,8 @@ def demo(
     if wrong := _unfit(out, "demo.json"):
         raise Findings(wrong)
     with late_imports():
-        from app.batch import Settings
-        from app.study import run_demo
+        from regrasp.app.batch import Settings
+        from regrasp.app.study import run_demo
 
     settings = Settings(renderer=renderer, wall_limit=math.inf if wall_limit is None else wall_limit)
     raise typer.Exit(run_demo(chosen, jobs, out, sets or [], settings))
@@ -84,14 +84,14 @@ def pose(
     chosen, wrong = parse_seeds(seeds), _unfit(out, "pose.json")
     names = _techniques(techniques, wrong)
     with late_imports():
-        from app.pose_scenes import CONFIGURATIONS
+        from regrasp.app.pose_scenes import CONFIGURATIONS
 
     shown_ones = _listed("--configurations", configurations, tuple(CONFIGURATIONS), wrong)
     if wrong:
         raise Findings(wrong)
     with late_imports():
-        from app.pose_study import run_pose
-        from app.pose_trial import setups_of
+        from regrasp.app.pose_study import run_pose
+        from regrasp.app.pose_trial import setups_of
 
     setups = setups_of(names, cell, grasps=not no_grasp, renderer=renderer)
     raise typer.Exit(run_pose(setups, chosen, jobs, out, shown_ones, both_cameras))
@@ -119,8 +119,8 @@ def coverage(
     if wrong:
         raise Findings(wrong)
     with late_imports():
-        from app.pose_coverage import run_coverage
-        from app.pose_trial import setups_of
+        from regrasp.app.pose_coverage import run_coverage
+        from regrasp.app.pose_trial import setups_of
 
     raise typer.Exit(run_coverage(setups_of(names, cell, renderer=renderer), chosen, jobs, out))
 
@@ -135,7 +135,7 @@ def _unfit(out: Path | None, file: str) -> list[Finding]:
 
 def _techniques(text: str | None, wrong: list[Finding]) -> list[str]:
     with late_imports():
-        from perception.technique import TECHNIQUES  # it brings the arithmetic
+        from regrasp.perception.technique import TECHNIQUES  # it brings the arithmetic
 
     return _listed("--techniques", text, TECHNIQUES, wrong)
 

@@ -5,10 +5,10 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from app.vary import DEFAULT
+from regrasp.app.vary import DEFAULT
 
 if TYPE_CHECKING:
-    from app.record import Expectation, Result
+    from regrasp.app.record import Expectation, Result
 
 
 def summary(result: "Result", folder: Path) -> str:

@@ -7,7 +7,7 @@ from typing import TextIO
 import py_trees
 from py_trees.common import Status
 
-from trees import in_tree_order, node_paths
+from regrasp.trees import in_tree_order, node_paths
 
 
 class TickLog(py_trees.visitors.VisitorBase):

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from itertools import groupby
 from typing import Any
 
-from app.record import Attempt
-from app.record_reader import Event
-from app.summary import in_words
-from app.tried import Course
+from regrasp.app.record import Attempt
+from regrasp.app.record_reader import Event
+from regrasp.app.summary import in_words
+from regrasp.app.tried import Course
 
 Names = tuple[str, ...]  # a path's parts
 STATUS = {"INVALID": "stopped", "RUNNING": "still running"}

@@ -5,11 +5,11 @@ from typing import Annotated
 
 import typer
 
-from app.findings import Finding, Findings, nearest
-from app.resources import resolve, shipped
-from app.scenario_file import check_tree_file
-from app.scenario_parts import names_of
-from interfaces.quote import quoted
+from regrasp.app.findings import Finding, Findings, nearest
+from regrasp.app.resources import resolve, shipped
+from regrasp.app.scenario_file import check_tree_file
+from regrasp.app.scenario_parts import names_of
+from regrasp.interfaces.quote import quoted
 
 app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="List, check, show and export behaviour trees.")
 
@@ -31,7 +31,7 @@ def show(tree: Annotated[str, typer.Argument(help="A shipped tree's name, or a p
     """
     path = resolve("tree", tree, Path())
     check_tree_file(path)
-    from trees import show_tree
+    from regrasp.trees import show_tree
 
     typer.echo(show_tree(path))
 
@@ -72,7 +72,7 @@ def export(
     simulated seconds of each node, and in red the path that failed; as a run logs changes of status only, a node that
     ends in the same way at tick after tick counts as one visit.
     """
-    from app.tree_export import Request, exported  # late, like all that only this command needs
+    from regrasp.app.tree_export import Request, exported  # late, like all that only this command needs
 
     out = None if out == Path("-") else out
     content = exported(Request(tree, form, out, depth, theme, run))
@@ -120,8 +120,8 @@ def leaves(name: Annotated[str | None, typer.Argument(help="One element, in full
     Example:
       regrasp trees leaves SpiralSearch
     """
-    from behaviors import LEAVES  # brings the planner and the compiler: a second
-    from trees.catalogue import describe, words
+    from regrasp.behaviors import LEAVES  # brings the planner and the compiler: a second
+    from regrasp.trees.catalogue import describe, words
 
     known = words(LEAVES)
     if name is not None and name not in known:

@@ -5,16 +5,16 @@ from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from app.findings import Finding, Findings, nearest, shown
-from app.output import FILES, unwritable_file
-from app.record import write_whole
-from app.record_reader import RunRecord, read_record
-from app.resources import read_text, resolve
-from app.scenario_file import check_tree_file
-from app.scenario_parts import tree_text
-from interfaces.quote import quoted
-from trees import Node, TreeSyntaxError, collapsed, read_graph, recorded, run_stats
-from trees.export import FORMATS, SUFFIXES, THEMES, export_tree
+from regrasp.app.findings import Finding, Findings, nearest, shown
+from regrasp.app.output import FILES, unwritable_file
+from regrasp.app.record import write_whole
+from regrasp.app.record_reader import RunRecord, read_record
+from regrasp.app.resources import read_text, resolve
+from regrasp.app.scenario_file import check_tree_file
+from regrasp.app.scenario_parts import tree_text
+from regrasp.interfaces.quote import quoted
+from regrasp.trees import Node, TreeSyntaxError, collapsed, read_graph, recorded, run_stats
+from regrasp.trees.export import FORMATS, SUFFIXES, THEMES, export_tree
 
 MOST_MISSING = 3  # nodes that are named
 

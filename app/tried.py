@@ -4,10 +4,10 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from app.record import Attempt
-from app.record_reader import Event, RunRecord
-from interfaces.cause import Cause, CauseCode
-from trees import Execution, executions
+from regrasp.app.record import Attempt
+from regrasp.app.record_reader import Event, RunRecord
+from regrasp.interfaces.cause import Cause, CauseCode
+from regrasp.trees import Execution, executions
 
 
 class Course:

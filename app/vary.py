@@ -9,12 +9,12 @@ from itertools import product
 import numpy as np
 from pydantic import BaseModel
 
-from app.findings import Finding
-from app.overrides import Assignment
-from app.scenario_schema import Steps, Vary
-from app.schema import read_as
-from app.yaml_lines import Document, Path, Place, Value
-from interfaces.quote import cut
+from regrasp.app.findings import Finding
+from regrasp.app.overrides import Assignment
+from regrasp.app.scenario_schema import Steps, Vary
+from regrasp.app.schema import read_as
+from regrasp.app.yaml_lines import Document, Path, Place, Value
+from regrasp.interfaces.quote import cut
 
 MOST_CASES = 10_000
 DEFAULT = "default"  # the name of the only case where nothing varies

@@ -7,8 +7,8 @@ from typing import Any
 
 import yaml
 
-from app.findings import Finding, Findings
-from interfaces.quote import MOST, cut, quoted
+from regrasp.app.findings import Finding, Findings
+from regrasp.interfaces.quote import MOST, cut, quoted
 
 Value = None | bool | int | float | str | list["Value"] | dict[str, "Value"]
 Path = tuple[str | int, ...]

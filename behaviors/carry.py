@@ -4,15 +4,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from behaviors.hand import BACK, HAND, HandLeaf
-from behaviors.leaf import Failed, Steps
-from interfaces.cause import CauseCode
-from motion.collision import CollisionModel
-from motion.failure import PlanningError
-from motion.kinematics import ArmKinematics
-from motion.straight import straight_line
-from perception.estimate import Estimate
-from perception.fusion import fuse
+from regrasp.behaviors.hand import BACK, HAND, HandLeaf
+from regrasp.behaviors.leaf import Failed, Steps
+from regrasp.interfaces.cause import CauseCode
+from regrasp.motion.collision import CollisionModel
+from regrasp.motion.failure import PlanningError
+from regrasp.motion.kinematics import ArmKinematics
+from regrasp.motion.straight import straight_line
+from regrasp.perception.estimate import Estimate
+from regrasp.perception.fusion import fuse
 
 # m before the clip along the hand's own axis, from where it goes straight in; more would press the cable
 BEFORE = 0.025

@@ -2,10 +2,10 @@
 
 from typing import Any, ClassVar
 
-from behaviors.leaf import Failed, Port, Steps, StepsLeaf
-from interfaces.cause import CauseCode
-from perception.estimate import Estimate
-from perception.fusion import fuse
+from regrasp.behaviors.leaf import Failed, Port, Steps, StepsLeaf
+from regrasp.interfaces.cause import CauseCode
+from regrasp.perception.estimate import Estimate
+from regrasp.perception.fusion import fuse
 
 
 class CheckCameras(StepsLeaf):

@@ -4,12 +4,12 @@ from typing import Any, ClassVar
 
 from py_trees.common import Status
 
-from behaviors.hand import HAND
-from behaviors.leaf import Leaf
-from behaviors.services import Notice
-from interfaces.cause import CauseCode
-from perception.slip import GapTest, SlipEvidence, distance_slip
-from perception.track import TrackState
+from regrasp.behaviors.hand import HAND
+from regrasp.behaviors.leaf import Leaf
+from regrasp.behaviors.services import Notice
+from regrasp.interfaces.cause import CauseCode
+from regrasp.perception.slip import GapTest, SlipEvidence, distance_slip
+from regrasp.perception.track import TrackState
 
 
 class DetectSlip(Leaf):

@@ -4,10 +4,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
-from behaviors.leaf import Failed, Steps, StepsLeaf
-from interfaces.cause import CauseCode
-from motion.failure import PlanningError
-from perception.slip import GapTest
+from regrasp.behaviors.leaf import Failed, Steps, StepsLeaf
+from regrasp.interfaces.cause import CauseCode
+from regrasp.motion.failure import PlanningError
+from regrasp.perception.slip import GapTest
 
 HAND = "right"  # the thesis's fixed roles: the right arm handles the cable ...
 EYE = "left"  # ... and the left one carries the wrist camera
@@ -30,7 +30,7 @@ class HandLeaf(StepsLeaf):
         return held
 
     def seen(self, since: float) -> NDArray[np.float64] | None:
-        """What the rear camera sees of the hand and around it: `motion.service.Seen`."""
+        """What the rear camera sees of the hand and around it: `regrasp.motion.service.Seen`."""
         return self.services.perception.surface("rear", since)
 
     def grip(self, world_from_connector: RigidTransform) -> Steps:

@@ -4,8 +4,8 @@ from typing import Any, ClassVar
 
 from py_trees.common import Status
 
-from behaviors.leaf import Leaf
-from interfaces.cause import CauseCode
+from regrasp.behaviors.leaf import Leaf
+from regrasp.interfaces.cause import CauseCode
 
 
 class Holding(Leaf):

@@ -7,10 +7,10 @@ from typing import Any, ClassVar
 from py_trees.common import Status
 from py_trees.ports import BehaviourWithPorts, PortInformation
 
-from behaviors.services import Services
-from interfaces.cause import Cause, CauseCode, ServiceError
-from motion.failure import PlanningError
-from motion.task import Task
+from regrasp.behaviors.services import Services
+from regrasp.interfaces.cause import Cause, CauseCode, ServiceError
+from regrasp.motion.failure import PlanningError
+from regrasp.motion.task import Task
 
 Steps = Generator[Task | None, None, None]
 

@@ -6,13 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
-from behaviors.hand import EYE, HandLeaf
-from behaviors.leaf import Steps
-from interfaces.cause import CauseCode
-from interfaces.cell import WristMount
-from motion.failure import PlanningError
-from motion.viewpoints import closer_views
-from perception.estimate import Estimate
+from regrasp.behaviors.hand import EYE, HandLeaf
+from regrasp.behaviors.leaf import Steps
+from regrasp.interfaces.cause import CauseCode
+from regrasp.interfaces.cell import WristMount
+from regrasp.motion.failure import PlanningError
+from regrasp.motion.viewpoints import closer_views
+from regrasp.perception.estimate import Estimate
 
 LOOK_MARGIN = 0.02  # m: the searching arm moves among things that it has seen from one side only
 OTHER_SIDE = 0.77  # cosine of the 40 degrees between two lines of sight from different sides

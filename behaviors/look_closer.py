@@ -3,12 +3,12 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from behaviors.hand import EYE
-from behaviors.leaf import Steps
-from behaviors.look import LookLeaf
-from motion.failure import PlanningError
-from perception.estimate import Estimate
-from perception.fusion import fuse
+from regrasp.behaviors.hand import EYE
+from regrasp.behaviors.leaf import Steps
+from regrasp.behaviors.look import LookLeaf
+from regrasp.motion.failure import PlanningError
+from regrasp.perception.estimate import Estimate
+from regrasp.perception.fusion import fuse
 
 LOOK_SECONDS = 0.8
 LOOKS = 2  # from two sides: what one look takes for an obstacle's inside, the other looks through

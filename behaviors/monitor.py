@@ -4,8 +4,8 @@ from typing import Any, ClassVar
 
 from py_trees.common import Status
 
-from behaviors.hand import HAND
-from behaviors.leaf import Leaf, Port
+from regrasp.behaviors.hand import HAND
+from regrasp.behaviors.leaf import Leaf, Port
 
 
 class Monitor(Leaf):

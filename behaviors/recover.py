@@ -3,11 +3,11 @@
 from itertools import chain
 from typing import Any, ClassVar
 
-from behaviors.hand import HAND, HandLeaf
-from behaviors.leaf import Failed, Port, Steps
-from interfaces.cause import CauseCode
-from motion.service import OPEN_GAP
-from perception.stillness import Stillness
+from regrasp.behaviors.hand import HAND, HandLeaf
+from regrasp.behaviors.leaf import Failed, Port, Steps
+from regrasp.interfaces.cause import CauseCode
+from regrasp.motion.service import OPEN_GAP
+from regrasp.perception.stillness import Stillness
 
 LEAVE_SECONDS = 0.3  # for the end to swing out of the open jaw
 STILL = 0.25  # of the mean brightness: a cable that moves by about 1 mm; the jaw forgives 20

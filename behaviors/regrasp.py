@@ -4,10 +4,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
-from behaviors.hand import HAND, HandLeaf
-from behaviors.leaf import Failed, Steps
-from motion.service import OPEN_GAP
-from perception.cable_shape import cable_course
+from regrasp.behaviors.hand import HAND, HandLeaf
+from regrasp.behaviors.leaf import Failed, Steps
+from regrasp.motion.service import OPEN_GAP
+from regrasp.perception.cable_shape import cable_course
 
 CLEAR = 0.05  # m around the connector's axis
 

@@ -2,8 +2,8 @@
 
 from py_trees.common import Status
 
-from behaviors.leaf import Steps, StepsLeaf
-from interfaces.cause import CauseCode
+from regrasp.behaviors.leaf import Steps, StepsLeaf
+from regrasp.interfaces.cause import CauseCode
 
 REST = 0.3  # s within which the arms are at rest (spec)
 

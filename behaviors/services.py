@@ -5,11 +5,11 @@ from typing import Any
 
 from scipy.spatial.transform import RigidTransform
 
-from interfaces.cause import Cause
-from interfaces.cell import KnownCell
-from interfaces.devices import Clock
-from motion.service import Motion
-from perception.service import Perception
+from regrasp.interfaces.cause import Cause
+from regrasp.interfaces.cell import KnownCell
+from regrasp.interfaces.devices import Clock
+from regrasp.motion.service import Motion
+from regrasp.perception.service import Perception
 
 
 @dataclass

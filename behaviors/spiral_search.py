@@ -8,15 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from behaviors.hand import EYE
-from behaviors.leaf import Failed, Port, Steps
-from behaviors.look import LookLeaf
-from interfaces.cause import CauseCode
-from interfaces.cell import FixedMount
-from motion.failure import PlanningError
-from motion.viewpoints import Stop, spiral
-from perception.estimate import Estimate
-from perception.fusion import fuse
+from regrasp.behaviors.hand import EYE
+from regrasp.behaviors.leaf import Failed, Port, Steps
+from regrasp.behaviors.look import LookLeaf
+from regrasp.interfaces.cause import CauseCode
+from regrasp.interfaces.cell import FixedMount
+from regrasp.motion.failure import PlanningError
+from regrasp.motion.viewpoints import Stop, spiral
+from regrasp.perception.estimate import Estimate
+from regrasp.perception.fusion import fuse
 
 DISTANCE = (
     0.25  # m from the plane through the start: at 0.30 the left arm reaches fewer of the first stops (6 of 9, not 9)

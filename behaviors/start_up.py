@@ -1,7 +1,7 @@
 """Before the work: see what stands in the cell."""
 
-from behaviors.leaf import Failed, Steps, StepsLeaf
-from interfaces.cause import CauseCode
+from regrasp.behaviors.leaf import Failed, Steps, StepsLeaf
+from regrasp.interfaces.cause import CauseCode
 
 PATIENCE = 2.0  # s that the camera has to give sound frames
 

@@ -2,16 +2,16 @@
 
 import numpy as np
 
-from behaviors.hand import EYE, HAND, HandLeaf
-from behaviors.leaf import Failed, Steps
-from behaviors.look import LookLeaf
-from behaviors.services import Notice
-from interfaces.cause import CauseCode
-from motion.bodies import NO_POINTS
-from motion.failure import PlanningError
-from perception.cable_shape import cable_course
-from perception.estimate import Estimate
-from perception.slip import seen_at
+from regrasp.behaviors.hand import EYE, HAND, HandLeaf
+from regrasp.behaviors.leaf import Failed, Steps
+from regrasp.behaviors.look import LookLeaf
+from regrasp.behaviors.services import Notice
+from regrasp.interfaces.cause import CauseCode
+from regrasp.motion.bodies import NO_POINTS
+from regrasp.motion.failure import PlanningError
+from regrasp.perception.cable_shape import cable_course
+from regrasp.perception.estimate import Estimate
+from regrasp.perception.slip import seen_at
 
 OPEN_SECONDS = 0.6
 LOOK_SECONDS = 1.0

@@ -4,8 +4,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from behaviors.hand import HAND, HandLeaf
-from behaviors.leaf import Port, Steps
+from regrasp.behaviors.hand import HAND, HandLeaf
+from regrasp.behaviors.leaf import Port, Steps
 
 DRAW_OUT = 0.05  # m along the plug's axis: the plug sits 0.015 deep
 SHALLOW = (

@@ -4,11 +4,11 @@ from typing import Any, ClassVar
 
 from py_trees.common import Status
 
-from behaviors.leaf import Leaf, Port
+from regrasp.behaviors.leaf import Leaf, Port
 
 
 class UseTechnique(Leaf):
-    """From now on every look is by this technique of `perception.technique`."""
+    """From now on every look is by this technique of `regrasp.perception.technique`."""
 
     INPUT_PORTS: ClassVar[dict[str, Any]] = {
         "technique": Port(

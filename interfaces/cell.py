@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from interfaces.frame import Intrinsics
+from regrasp.interfaces.frame import Intrinsics
 
 # Numbers beyond these bounds are slips of the pen, and arithmetic overflows on some of them.
 Number = Annotated[float, Field(allow_inf_nan=False, strict=False)]

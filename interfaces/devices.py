@@ -2,9 +2,9 @@
 
 from typing import Protocol
 
-from interfaces.frame import RgbdFrame
-from interfaces.reading import GripperReading, JointReading
-from interfaces.trajectory import Trajectory
+from regrasp.interfaces.frame import RgbdFrame
+from regrasp.interfaces.reading import GripperReading, JointReading
+from regrasp.interfaces.trajectory import Trajectory
 
 
 class Clock(Protocol):

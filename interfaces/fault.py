@@ -8,7 +8,7 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import AfterValidator, Field, model_validator
 
-from interfaces.cell import Direction, Fraction, Model, Vector
+from regrasp.interfaces.cell import Direction, Fraction, Model, Vector
 
 Phase = Literal["unplugged", "carried", "lost", "settled", "regrasped"]
 ArmName = Literal["left", "right"]

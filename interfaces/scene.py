@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-from interfaces.cell import Box, Color
+from regrasp.interfaces.cell import Box, Color
 
 Gravity = Literal["zero", "earth"]
 GRAVITIES: tuple[Gravity, ...] = get_args(Gravity)

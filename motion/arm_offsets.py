@@ -6,8 +6,8 @@ Good for where the arm stands: many sets of six offsets explain one view, and it
 import numpy as np
 from numpy.typing import NDArray
 
-from motion.kinematics import AXES, ArmKinematics, FloatArray, world_spheres
-from motion.spheres import LINKS, spheres_at
+from regrasp.motion.kinematics import AXES, ArmKinematics, FloatArray, world_spheres
+from regrasp.motion.spheres import LINKS, spheres_at
 
 # The spheres enclose the arm: what a camera sees of it lies so far within them. This, and what follows, gave the least
 # error of the tool on 51 pictures of 11 arms: 2.7 mm (at most 5.4) where encoders alone were 10 mm off (22).

@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from interfaces.reading import JointReading
-from interfaces.trajectory import Trajectory
+from regrasp.interfaces.reading import JointReading
+from regrasp.interfaces.trajectory import Trajectory
 
 JOINTS = ("waist", "shoulder", "elbow", "forearm roll", "wrist angle", "wrist rotate")
 BEHIND = 0.08  # rad off the trajectory: without a fault or a contact it is 0.004

@@ -6,12 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
-from interfaces.cell import Connector, KnownCell, WristMount
-from interfaces.devices import Arm, Gripper
-from interfaces.frame import RgbdFrame
-from motion.collision import CollisionModel
-from motion.distance_grid import DistanceGrid
-from motion.kinematics import ArmKinematics
+from regrasp.interfaces.cell import Connector, KnownCell, WristMount
+from regrasp.interfaces.devices import Arm, Gripper
+from regrasp.interfaces.frame import RgbdFrame
+from regrasp.motion.collision import CollisionModel
+from regrasp.motion.distance_grid import DistanceGrid
+from regrasp.motion.kinematics import ArmKinematics
 
 FloatArray = NDArray[np.float64]
 

@@ -10,8 +10,8 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation, Slerp
 
-from interfaces.cell import KnownCell, pose_along
-from motion.kinematics import FloatArray
+from regrasp.interfaces.cell import KnownCell, pose_along
+from regrasp.motion.kinematics import FloatArray
 
 STEPS = 24
 # A way round an obstacle: how far (m) in x from where it began it first rises; None is the direct way.

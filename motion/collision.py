@@ -8,10 +8,10 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-from interfaces.cell import Box
-from motion.distance_grid import FAR, DistanceGrid
-from motion.kinematics import LOWER, TOOL_OFFSET, UPPER, ArmKinematics, FloatArray, world_spheres
-from motion.spheres import CAMERA_ACROSS, CAMERA_RADIUS, JAW_OPENING, LINKS, spheres_at
+from regrasp.interfaces.cell import Box
+from regrasp.motion.distance_grid import FAR, DistanceGrid
+from regrasp.motion.kinematics import LOWER, TOOL_OFFSET, UPPER, ArmKinematics, FloatArray, world_spheres
+from regrasp.motion.spheres import CAMERA_ACROSS, CAMERA_RADIUS, JAW_OPENING, LINKS, spheres_at
 
 IntArray = NDArray[np.int64]
 

@@ -1,6 +1,6 @@
 """The error of everything in this room that looks for a motion."""
 
-from interfaces.cause import CauseCode
+from regrasp.interfaces.cause import CauseCode
 
 
 class PlanningError(Exception):

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from interfaces.cause import CauseCode
-from motion.collision import CollisionModel
-from motion.failure import PlanningError
-from motion.kinematics import ArmKinematics, FloatArray
-from motion.spheres import JAW_OPENING
-from motion.straight import straight_line
+from regrasp.interfaces.cause import CauseCode
+from regrasp.motion.collision import CollisionModel
+from regrasp.motion.failure import PlanningError
+from regrasp.motion.kinematics import ArmKinematics, FloatArray
+from regrasp.motion.spheres import JAW_OPENING
+from regrasp.motion.straight import straight_line
 
 # The palm off the cross direction, on the cable's side, leaves the tip in sight; at 40 degrees, where most of it shows,
 # the cable touches the gripper's bar, 0.04 behind the pads, as soon as it bends that way.

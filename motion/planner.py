@@ -9,10 +9,10 @@ import ompl.geometric as og
 import ompl.util as ou
 from numpy.typing import NDArray
 
-from interfaces.cause import CauseCode
-from motion.collision import COARSE_STEP, CollisionModel
-from motion.failure import PlanningError
-from motion.kinematics import LOWER, UPPER, FloatArray
+from regrasp.interfaces.cause import CauseCode
+from regrasp.motion.collision import COARSE_STEP, CollisionModel
+from regrasp.motion.failure import PlanningError
+from regrasp.motion.kinematics import LOWER, UPPER, FloatArray
 
 ou.setLogLevel(ou.LOG_NONE)
 

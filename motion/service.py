@@ -12,22 +12,22 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation, Slerp
 
-from interfaces.cause import CauseCode
-from interfaces.cell import KnownCell
-from interfaces.devices import Arm, Clock, Gripper
-from interfaces.trajectory import Trajectory
-from motion.arm_offsets import joint_offsets
-from motion.arm_watch import ArmWatch, rest_of
-from motion.bodies import NO_POINTS, Bodies
-from motion.cable_path import natural_ways
-from motion.collision import CollisionModel
-from motion.failure import PlanningError
-from motion.grasps import choose_grasp, grasp_candidates
-from motion.kinematics import ArmKinematics
-from motion.planner import plan
-from motion.spheres import JAW_OPENING
-from motion.straight import straight_line
-from motion.task import Task
+from regrasp.interfaces.cause import CauseCode
+from regrasp.interfaces.cell import KnownCell
+from regrasp.interfaces.devices import Arm, Clock, Gripper
+from regrasp.interfaces.trajectory import Trajectory
+from regrasp.motion.arm_offsets import joint_offsets
+from regrasp.motion.arm_watch import ArmWatch, rest_of
+from regrasp.motion.bodies import NO_POINTS, Bodies
+from regrasp.motion.cable_path import natural_ways
+from regrasp.motion.collision import CollisionModel
+from regrasp.motion.failure import PlanningError
+from regrasp.motion.grasps import choose_grasp, grasp_candidates
+from regrasp.motion.kinematics import ArmKinematics
+from regrasp.motion.planner import plan
+from regrasp.motion.spheres import JAW_OPENING
+from regrasp.motion.straight import straight_line
+from regrasp.motion.task import Task
 
 FloatArray = NDArray[np.float64]
 # Points (n, 3) m of what a camera saw from that second on; None while there is no such picture.
@@ -201,7 +201,7 @@ class Motion(Bodies):
         return self._out_of_order[arm]
 
     def _follow(self, arm: str, path: FloatArray, speed: float) -> Iterator[None]:
-        from motion.timing import time_path  # late: it brings matplotlib, which a tree's check does not need
+        from regrasp.motion.timing import time_path  # late: it brings matplotlib, which a tree's check does not need
 
         alone = self._watches[arm].moved_alone(self.arms[arm].reading())
         if alone is not None:

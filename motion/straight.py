@@ -3,9 +3,9 @@
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation, Slerp
 
-from interfaces.cause import CauseCode
-from motion.failure import PlanningError
-from motion.kinematics import ArmKinematics, FloatArray
+from regrasp.interfaces.cause import CauseCode
+from regrasp.motion.failure import PlanningError
+from regrasp.motion.kinematics import ArmKinematics, FloatArray
 
 _TURN_STEP = 0.05  # rad of tool rotation between two waypoints
 _JUMP = 0.3  # rad of one joint between two waypoints: more is another branch, not the same motion

@@ -9,8 +9,8 @@ import toppra.constraint
 from numpy.typing import NDArray
 from scipy.interpolate import BPoly
 
-from interfaces.trajectory import Trajectory
-from motion.kinematics import ACCELERATION_LIMIT, VELOCITY_LIMIT, FloatArray
+from regrasp.interfaces.trajectory import Trajectory
+from regrasp.motion.kinematics import ACCELERATION_LIMIT, VELOCITY_LIMIT, FloatArray
 
 toppra.setup_logging("ERROR")
 

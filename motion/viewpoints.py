@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from interfaces.cell import OPTICAL
-from interfaces.frame import Intrinsics
-from motion.kinematics import FloatArray
+from regrasp.interfaces.cell import OPTICAL
+from regrasp.interfaces.frame import Intrinsics
+from regrasp.motion.kinematics import FloatArray
 
 SPACING = 0.25  # metres between main points
 SUB_SPACING = 0.125

@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from interfaces.frame import Intrinsics
-from perception.camera_model import project
+from regrasp.interfaces.frame import Intrinsics
+from regrasp.perception.camera_model import project
 
 FloatArray = NDArray[np.float64]
 

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial.transform import RigidTransform
 
-from interfaces.cell import KnownCell
+from regrasp.interfaces.cell import KnownCell
 
 
 def cable_course(known: KnownCell, world_from_connector: RigidTransform, spacing: float = 0.01) -> NDArray[np.float64]:

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from interfaces.frame import Intrinsics
+from regrasp.interfaces.frame import Intrinsics
 
 FloatArray = NDArray[np.float64]
 Channel = TypeVar("Channel", np.uint8, np.float32)

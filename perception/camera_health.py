@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from interfaces.frame import RgbdFrame
+from regrasp.interfaces.frame import RgbdFrame
 
 STALE = 0.5  # s without a new frame: seven in a row lost at 15 Hz
 DARK = 10.0  # mean of 255; the cell in full shadow has over 30

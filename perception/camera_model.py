@@ -5,7 +5,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from interfaces.frame import Intrinsics
+from regrasp.interfaces.frame import Intrinsics
 
 FloatArray = NDArray[np.float64]
 

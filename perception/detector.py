@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
-from interfaces.cell import KnownCell
-from interfaces.frame import Intrinsics, RgbdFrame
-from perception.camera_model import NEAREST, deproject, project
-from perception.estimate import LEFT, Estimate, NoEstimate, pose_covariance
-from perception.rgbd_pose import MIN_POINTS, min_max_axis, seen_pose, without_outliers
-from perception.segmentation import NoSegment, NotSeen, SegmentationParameters, color_mask, segment
+from regrasp.interfaces.cell import KnownCell
+from regrasp.interfaces.frame import Intrinsics, RgbdFrame
+from regrasp.perception.camera_model import NEAREST, deproject, project
+from regrasp.perception.estimate import LEFT, Estimate, NoEstimate, pose_covariance
+from regrasp.perception.rgbd_pose import MIN_POINTS, min_max_axis, seen_pose, without_outliers
+from regrasp.perception.segmentation import NoSegment, NotSeen, SegmentationParameters, color_mask, segment
 
 FloatArray = NDArray[np.float64]
 Box = tuple[float, float, float, float]
@@ -81,7 +81,7 @@ class Detection:
 
 
 class Detector:
-    """The thesis's learned technique as a `perception.technique.Technique`: the network knows what it was trained on.
+    """The thesis's learned technique (`regrasp.perception.technique`): the network knows what it was trained on.
 
     As there, the middle of the box gives the place in the image, the mean of a cluster of depth readings the depth, and
     the orientation is borrowed from the RGB-D technique, here looking into the box alone. Where that has too little
@@ -189,7 +189,7 @@ def _cluster(depth: NDArray[np.float32], box: Detection) -> NDArray[np.float64]:
 
 def shipped_network() -> bytes:
     """The ONNX file that comes with Regrasp."""
-    return files("perception").joinpath("detector.onnx").read_bytes()
+    return files("regrasp.perception").joinpath("detector.onnx").read_bytes()
 
 
 def fitted(

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
-from perception.segmentation import NotSeen
+from regrasp.perception.segmentation import NotSeen
 
 FloatArray = NDArray[np.float64]
 

@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from interfaces.cell import TAG_DICTIONARY, Clip, Connector, KnownCell, Tag, WristMount
-from interfaces.frame import Intrinsics, RgbdFrame
-from perception.camera_model import project, rays
-from perception.estimate import Estimate, NoEstimate
-from perception.registration import CARRIED, FIXED, CameraErrors
-from perception.segmentation import NotSeen
+from regrasp.interfaces.cell import TAG_DICTIONARY, Clip, Connector, KnownCell, Tag, WristMount
+from regrasp.interfaces.frame import Intrinsics, RgbdFrame
+from regrasp.perception.camera_model import project, rays
+from regrasp.perception.estimate import Estimate, NoEstimate
+from regrasp.perception.registration import CARRIED, FIXED, CameraErrors
+from regrasp.perception.segmentation import NotSeen
 
 FloatArray = NDArray[np.float64]
 
@@ -52,7 +52,7 @@ class TagPose:
 
 
 class Fiducial:
-    """A `perception.technique.Technique`. It knows the tags, and where on their bodies they are.
+    """A `regrasp.perception.technique.Technique`. It knows the tags, and where on their bodies they are.
 
     Raises ValueError for a cell whose connector has no tag.
     """

@@ -13,15 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
-from interfaces.cell import Box, Connector, KnownCell, pose_along
-from interfaces.frame import RgbdFrame
-from perception.cable_end import cable_leaves
-from perception.camera_model import NEAREST
-from perception.cylinder import COARSE, FINE, Fit, Sight, depth_misses, fit, nearest_on_rays, thinned
-from perception.estimate import LEFT, ROLL_VARIANCE, Estimate, NoEstimate
-from perception.patch import D415, MIN_AREA, Cut, Patch, Stereo, directions, look, patches
-from perception.registration import FIXED, CameraErrors, Registration, expected_errors, register
-from perception.segmentation import NotSeen, SegmentationParameters, color_mask
+from regrasp.interfaces.cell import Box, Connector, KnownCell, pose_along
+from regrasp.interfaces.frame import RgbdFrame
+from regrasp.perception.cable_end import cable_leaves
+from regrasp.perception.camera_model import NEAREST
+from regrasp.perception.cylinder import COARSE, FINE, Fit, Sight, depth_misses, fit, nearest_on_rays, thinned
+from regrasp.perception.estimate import LEFT, ROLL_VARIANCE, Estimate, NoEstimate
+from regrasp.perception.patch import D415, MIN_AREA, Cut, Patch, Stereo, directions, look, patches
+from regrasp.perception.registration import FIXED, CameraErrors, Registration, expected_errors, register
+from regrasp.perception.segmentation import NotSeen, SegmentationParameters, color_mask
 
 FloatArray = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -74,7 +74,7 @@ class _Refused:
 
 
 class Fused:
-    """A `perception.technique.Technique`. It knows the connector's colour and size, and the cell's floor and panels."""
+    """A `Technique`. It knows the connector's colour and size, and the cell's floor and panels."""
 
     def __init__(self, known: KnownCell) -> None:
         self._connector, self._boxes = known.connector, known.boxes

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 from scipy.stats import chi2
 
-from perception.estimate import Estimate
+from regrasp.perception.estimate import Estimate
 
 FloatArray = NDArray[np.float64]
 

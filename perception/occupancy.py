@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
-from interfaces.cell import Box, Connector
-from interfaces.frame import Intrinsics, RgbdFrame
-from perception.camera_model import project, rays, subsampled
-from perception.segmentation import SegmentationParameters, color_mask
+from regrasp.interfaces.cell import Box, Connector
+from regrasp.interfaces.frame import Intrinsics, RgbdFrame
+from regrasp.perception.camera_model import project, rays, subsampled
+from regrasp.perception.segmentation import SegmentationParameters, color_mask
 
 FloatArray = NDArray[np.float64]
 Depth = NDArray[np.float32]

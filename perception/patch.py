@@ -6,11 +6,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from interfaces.cell import CameraSpec
-from interfaces.frame import Intrinsics, RgbdFrame
-from perception.camera_model import FURTHEST, NEAREST
-from perception.cylinder import Sight
-from perception.outline import outline
+from regrasp.interfaces.cell import CameraSpec
+from regrasp.interfaces.frame import Intrinsics, RgbdFrame
+from regrasp.perception.camera_model import FURTHEST, NEAREST
+from regrasp.perception.cylinder import Sight
+from regrasp.perception.outline import outline
 
 FloatArray = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
-from interfaces.cell import Box, KnownCell, WristMount
-from interfaces.frame import RgbdFrame
-from perception.camera_model import rays, subsampled
+from regrasp.interfaces.cell import Box, KnownCell, WristMount
+from regrasp.interfaces.frame import RgbdFrame
+from regrasp.perception.camera_model import rays, subsampled
 
 FloatArray = NDArray[np.float64]
 

@@ -4,11 +4,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
-from interfaces.cell import KnownCell
-from interfaces.frame import RgbdFrame
-from perception.camera_model import deproject
-from perception.estimate import LEFT, Estimate, NoEstimate, pose_covariance
-from perception.segmentation import NoSegment, NotSeen, SegmentationParameters, segment
+from regrasp.interfaces.cell import KnownCell
+from regrasp.interfaces.frame import RgbdFrame
+from regrasp.perception.camera_model import deproject
+from regrasp.perception.estimate import LEFT, Estimate, NoEstimate, pose_covariance
+from regrasp.perception.segmentation import NoSegment, NotSeen, SegmentationParameters, segment
 
 FloatArray = NDArray[np.float64]
 
@@ -21,7 +21,7 @@ DEVIATIONS = 2.0  # choice: an even spread ends at 1.73 standard deviations, so 
 
 
 class Rgbd:
-    """A `perception.technique.Technique`. It knows the connector's colour; its largest patch is the connector."""
+    """A `Technique`. It knows the connector's colour; its largest patch is the connector."""
 
     def __init__(self, known: KnownCell) -> None:
         self._parameters = SegmentationParameters.for_color(known.connector.color)

@@ -9,17 +9,17 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import RigidTransform
 
-from interfaces.cell import KnownCell
-from interfaces.devices import Camera, Clock
-from interfaces.frame import RgbdFrame
-from perception.camera_health import CameraHealth
-from perception.camera_model import NEAREST, rays
-from perception.estimate import Estimate, NoEstimate
-from perception.occupancy import ASSUMED_DEPTH, Occupancy, Spheres
-from perception.registration import Registration, expected_errors, register
-from perception.segmentation import NotSeen
-from perception.technique import TechniqueName, make_technique
-from perception.track import ConnectorTrack
+from regrasp.interfaces.cell import KnownCell
+from regrasp.interfaces.devices import Camera, Clock
+from regrasp.interfaces.frame import RgbdFrame
+from regrasp.perception.camera_health import CameraHealth
+from regrasp.perception.camera_model import NEAREST, rays
+from regrasp.perception.estimate import Estimate, NoEstimate
+from regrasp.perception.occupancy import ASSUMED_DEPTH, Occupancy, Spheres
+from regrasp.perception.registration import Registration, expected_errors, register
+from regrasp.perception.segmentation import NotSeen
+from regrasp.perception.technique import TechniqueName, make_technique
+from regrasp.perception.track import ConnectorTrack
 
 # Where obstacles may matter: the space that the arms share with the cable.
 VOXEL = 0.010  # m; obstacles stand within 0.1 of the connector, and a hand must pass between

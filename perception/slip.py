@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from interfaces.reading import GripperReading
+from regrasp.interfaces.reading import GripperReading
 
 DISTANCE_LIMIT = 0.2  # metres, section 3.4.1
 GAP_TOLERANCE = 0.003  # metres; choice: backlash 1 mm, 5 sigma of the median 1 mm, give of the rubber pads 1 mm

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from interfaces.frame import RgbdFrame
+from regrasp.interfaces.frame import RgbdFrame
 
 BLOCK = 4  # pixels; narrower than the cable's image, so that its motion does not cancel within a block
 MIN_BLOCKS = 3  # choice: a stray bright pixel lights up one block, a moving cable a row of them

@@ -7,13 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
-from interfaces.cell import KnownCell
-from interfaces.frame import RgbdFrame
-from perception.detector import Detector
-from perception.estimate import Estimate, NoEstimate
-from perception.fiducial import Fiducial
-from perception.fused import Fused
-from perception.rgbd_pose import Rgbd
+from regrasp.interfaces.cell import KnownCell
+from regrasp.interfaces.frame import RgbdFrame
+from regrasp.perception.detector import Detector
+from regrasp.perception.estimate import Estimate, NoEstimate
+from regrasp.perception.fiducial import Fiducial
+from regrasp.perception.fused import Fused
+from regrasp.perception.rgbd_pose import Rgbd
 
 TechniqueName = Literal["rgbd", "fiducial", "detector", "fused"]
 TECHNIQUES: tuple[TechniqueName, ...] = get_args(TechniqueName)

@@ -7,7 +7,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from perception.estimate import Estimate, NoEstimate
+from regrasp.perception.estimate import Estimate, NoEstimate
 
 FloatArray = NDArray[np.float64]
 

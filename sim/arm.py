@@ -11,11 +11,11 @@ import pybullet as p
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from interfaces.cell import ArmSpec, Errors, GripperSpec
-from interfaces.reading import JointReading
-from interfaces.trajectory import Trajectory
-from sim.gripper import SimGripper
-from sim.robot_model import NAME, robot_urdf
+from regrasp.interfaces.cell import ArmSpec, Errors, GripperSpec
+from regrasp.interfaces.reading import JointReading
+from regrasp.interfaces.trajectory import Trajectory
+from regrasp.sim.gripper import SimGripper
+from regrasp.sim.robot_model import NAME, robot_urdf
 
 FloatArray = NDArray[np.float64]
 
@@ -33,7 +33,7 @@ _WRIST_FROM_URDF = Rotation.from_rotvec([np.pi, 0, 0])
 
 
 class SimArm:
-    """One arm in a PyBullet client; fulfils `interfaces.devices.Arm`, its `gripper` fulfils `Gripper`.
+    """One arm in a PyBullet client; fulfils `regrasp.interfaces.devices.Arm`, its `gripper` fulfils `Gripper`.
 
     `offsets` (6,) rad: what each encoder reads too little. The world calls `step()` before every physics step.
     """
@@ -88,11 +88,11 @@ class SimArm:
         self.gripper.restart_clock()
 
     def follow(self, trajectory: Trajectory) -> None:
-        """See `interfaces.devices.Arm`."""
+        """See `regrasp.interfaces.devices.Arm`."""
         self._trajectory, self._started = trajectory, self.now()
 
     def stop(self) -> None:
-        """See `interfaces.devices.Arm`: all joints brake to rest together, at most `BRAKE`."""
+        """See `regrasp.interfaces.devices.Arm`: all joints brake to rest together, at most `BRAKE`."""
         if self._trajectory is None:
             return
         q, v = self._trajectory.sample(self.now() - self._started)
@@ -108,7 +108,7 @@ class SimArm:
         self.follow(Trajectory(times, q + share[:, None] * v, (1 - times / seconds)[:, None] * v))
 
     def is_moving(self) -> bool:
-        """See `interfaces.devices.Arm`."""
+        """See `regrasp.interfaces.devices.Arm`."""
         return self._trajectory is not None
 
     def wrist_pose(self) -> RigidTransform:

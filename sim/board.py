@@ -7,11 +7,11 @@ import pybullet as p
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from interfaces.frame import Intrinsics
-from sim.picture import LightState
-from sim.printed import checkerboard_boxes, visual
-from sim.renderer import RendererName, make_renderer
-from sim.visuals import Visuals
+from regrasp.interfaces.frame import Intrinsics
+from regrasp.sim.picture import LightState
+from regrasp.sim.printed import checkerboard_boxes, visual
+from regrasp.sim.renderer import RendererName, make_renderer
+from regrasp.sim.visuals import Visuals
 
 PARTS = 16  # PyBullet's limit of boxes a body
 MARGIN = 4  # pixels between the board and the picture's edge

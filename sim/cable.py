@@ -13,8 +13,8 @@ import pybullet as p
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from interfaces.cell import Cable, Connector, pose_along
-from sim.printed import tag_boxes, visual
+from regrasp.interfaces.cell import Cable, Connector, pose_along
+from regrasp.sim.printed import tag_boxes, visual
 
 FloatArray = NDArray[np.float64]
 

@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from interfaces.cell import CameraSpec, Errors
-from interfaces.frame import Intrinsics, RgbdFrame
-from sim.depth_noise import DepthNoise
-from sim.picture import LightState
-from sim.renderer import Renderer
-from sim.visuals import Visuals
+from regrasp.interfaces.cell import CameraSpec, Errors
+from regrasp.interfaces.frame import Intrinsics, RgbdFrame
+from regrasp.sim.depth_noise import DepthNoise
+from regrasp.sim.picture import LightState
+from regrasp.sim.renderer import Renderer
+from regrasp.sim.visuals import Visuals
 
 LEAK = 0.02  # share of the light that comes past a cover
 
@@ -34,7 +34,7 @@ class _Exposure:
 
 
 class SimCamera:
-    """Fulfils `interfaces.devices.Camera`: the world calls `expose` at the camera's rate, readers call `latest`.
+    """A `regrasp.interfaces.devices.Camera`: the world calls `expose` at the camera's rate, readers call `latest`.
 
     `true_pose` gives world_from_camera with the calibration's error in it; `joints` the encoder readings (6,) of the
     arm that carries the camera, None for a fixed one; `now` the simulated seconds; `latency` is the seconds from an

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
-from interfaces.cell import CameraSpec, Errors
+from regrasp.interfaces.cell import CameraSpec, Errors
 
 MAX_DISPARITY = 126.0  # pixels that a RealSense D4xx searches; it sets the least range
 QUANTUM = 0.001  # metres

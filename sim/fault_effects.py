@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pybullet as p
 
-from interfaces import fault as f
-from sim.renderer import LightState
+from regrasp.interfaces import fault as f
+from regrasp.sim.renderer import LightState
 
 if TYPE_CHECKING:
-    from sim.world import World
+    from regrasp.sim.world import World
 
 KNOCK_SECONDS = 0.02  # s over which a knock's impulse is shared
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from interfaces.fault import AnyFault, Lasting, Phase, When
-from sim.fault_effects import Effect
+from regrasp.interfaces.fault import AnyFault, Lasting, Phase, When
+from regrasp.sim.fault_effects import Effect
 
 FloatArray = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ import pybullet as p
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
-from interfaces.cell import Clip
+from regrasp.interfaces.cell import Clip
 
 FloatArray = NDArray[np.float64]
 

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
-from interfaces.frame import Intrinsics
-from sim.meshes import corners
-from sim.picture import BACKGROUND, FAR, NEAR, Image, LightState
-from sim.shaders import BACKDROP_FRAGMENT, BACKDROP_VERTEX, FRAGMENT, SHADOW_FRAGMENT, SHADOW_VERTEX, VERTEX
-from sim.visuals import Visuals
+from regrasp.interfaces.frame import Intrinsics
+from regrasp.sim.meshes import corners
+from regrasp.sim.picture import BACKGROUND, FAR, NEAR, Image, LightState
+from regrasp.sim.shaders import BACKDROP_FRAGMENT, BACKDROP_VERTEX, FRAGMENT, SHADOW_FRAGMENT, SHADOW_VERTEX, VERTEX
+from regrasp.sim.visuals import Visuals
 
 FloatArray = NDArray[np.float64]
 SHADOW_SIZE = 1024  # texels a side of the shadow map

@@ -5,16 +5,16 @@ from collections.abc import Callable, Mapping
 import numpy as np
 import pybullet as p
 
-from interfaces.cell import Errors, GripperSpec
-from interfaces.reading import GripperReading
-from sim.robot_model import finger_position, pad_gap
+from regrasp.interfaces.cell import Errors, GripperSpec
+from regrasp.interfaces.reading import GripperReading
+from regrasp.sim.robot_model import finger_position, pad_gap
 
 OPEN_FORCE = 40.0  # N a finger while opening or holding a gap
 CLOSED_GAP = 0.003  # m between the pads of a closed jaw: the jaw's lower stop
 
 
 class SimGripper:
-    """Fulfils `interfaces.devices.Gripper` on the fingers and pads among the `links` of an arm's `body`.
+    """Fulfils `regrasp.interfaces.devices.Gripper` on the fingers and pads among the `links` of an arm's `body`.
 
     `now` gives the arm's simulated seconds. The arm calls `step()` before every physics step.
     """
@@ -44,12 +44,12 @@ class SimGripper:
         self._drive()
 
     def open(self, gap: float) -> None:
-        """See `interfaces.devices.Gripper`."""
+        """See `regrasp.interfaces.devices.Gripper`."""
         self._gap_command, self._force = gap, None
         self._drive()
 
     def close(self, force: float) -> None:
-        """See `interfaces.devices.Gripper`; `force` is capped at the jaw's maximum."""
+        """See `regrasp.interfaces.devices.Gripper`; `force` is capped at the jaw's maximum."""
         self._force = min(force, self._spec.max_force)
         self._drive()
 

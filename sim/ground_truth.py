@@ -5,8 +5,8 @@ import pybullet as p
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
-from interfaces.frame import Intrinsics
-from sim.world import World
+from regrasp.interfaces.frame import Intrinsics
+from regrasp.sim.world import World
 
 _LINK_SHIFT = 24
 FINER = 8  # choice: the edge of an obstacle is then a tenth of a percent of the connector wide

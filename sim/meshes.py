@@ -7,7 +7,7 @@ import pybullet as p
 import trimesh
 from numpy.typing import NDArray
 
-from sim.visuals import VisualItem
+from regrasp.sim.visuals import VisualItem
 
 FloatArray = NDArray[np.float64]
 CELL = 0.002  # metres: details of mesh files finer than this are merged; a pixel covers 1.4 mm at 0.9 m

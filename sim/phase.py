@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from interfaces.fault import Phase
+from regrasp.interfaces.fault import Phase
 
 AWAY = 0.10  # m from its socket: the held end is carried
 LOST_SECONDS = 0.2  # without any pad's touch, out of clip and socket: the hold is really lost, not regripped

@@ -6,7 +6,7 @@ import pybullet as p
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
-from interfaces.cell import TAG_DICTIONARY, Box, Tag
+from regrasp.interfaces.cell import TAG_DICTIONARY, Box, Tag
 
 Color = tuple[float, float, float]
 WHITE, BLACK = (0.92, 0.92, 0.90), (0.04, 0.04, 0.04)  # choice: paper and toner reflect about so much

@@ -9,11 +9,11 @@ import pybullet as p
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from interfaces.cell import OPTICAL, CameraSpec, Cell, WristMount
-from sim.arm import SimArm
-from sim.build import build_boxes
-from sim.picture import BACKGROUND, Image, LightState
-from sim.random_things import (
+from regrasp.interfaces.cell import OPTICAL, CameraSpec, Cell, WristMount
+from regrasp.sim.arm import SimArm
+from regrasp.sim.build import build_boxes
+from regrasp.sim.picture import BACKGROUND, Image, LightState
+from regrasp.sim.random_things import (
     AWAY,
     UNDER_FLOOR,
     any_color,
@@ -26,9 +26,9 @@ from sim.random_things import (
     shape,
     unlike,
 )
-from sim.renderer import RendererName, make_renderer
-from sim.robot_model import finger_position
-from sim.visuals import Visuals
+from regrasp.sim.renderer import RendererName, make_renderer
+from regrasp.sim.robot_model import finger_position
+from regrasp.sim.visuals import Visuals
 
 FloatArray = NDArray[np.float64]
 

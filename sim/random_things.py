@@ -8,7 +8,7 @@ import pybullet as p
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
-from interfaces.cell import Box, Connector, KnownCell, Socket
+from regrasp.interfaces.cell import Box, Connector, KnownCell, Socket
 
 Color = tuple[float, float, float]
 UNDER_FLOOR = (0.2, 0.0, -0.4)  # m, where no camera sees

@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
-from interfaces.frame import Intrinsics
-from sim.gl_renderer import GlRenderer
-from sim.picture import Image, LightState
-from sim.tiny_renderer import TinyRenderer
-from sim.visuals import Visuals
+from regrasp.interfaces.frame import Intrinsics
+from regrasp.sim.gl_renderer import GlRenderer
+from regrasp.sim.picture import Image, LightState
+from regrasp.sim.tiny_renderer import TinyRenderer
+from regrasp.sim.visuals import Visuals
 
 __all__ = ["Image", "LightState", "Renderer", "RendererName", "make_renderer"]
 

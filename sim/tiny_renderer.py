@@ -5,10 +5,10 @@ import pybullet as p
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from interfaces.frame import Intrinsics
-from sim.meshes import corners
-from sim.picture import BACKGROUND, FAR, NEAR, Image, LightState
-from sim.visuals import VisualItem, Visuals
+from regrasp.interfaces.frame import Intrinsics
+from regrasp.sim.meshes import corners
+from regrasp.sim.picture import BACKGROUND, FAR, NEAR, Image, LightState
+from regrasp.sim.visuals import VisualItem, Visuals
 
 
 class TinyRenderer:

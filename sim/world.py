@@ -11,20 +11,20 @@ import pybullet as p
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from interfaces.cell import Cell, WristMount
-from interfaces.fault import AnyFault
-from interfaces.scene import Gravity, Obstacle, Prop
-from sim.arm import SimArm
-from sim.build import OUT_OF_SIGHT, build_boxes, build_props, configure, filter_collisions, lay_cable
-from sim.cable import CableBody, build_cable
-from sim.camera import SimCamera, camera_error
-from sim.depth_noise import DepthNoise
-from sim.fault_effects import effect_of
-from sim.faults import Fault, Moments
-from sim.fixtures import STAND_FORCE, ClipHold, SocketHold
-from sim.phase import PhaseWatch
-from sim.renderer import LightState, RendererName, make_renderer
-from sim.visuals import Visuals
+from regrasp.interfaces.cell import Cell, WristMount
+from regrasp.interfaces.fault import AnyFault
+from regrasp.interfaces.scene import Gravity, Obstacle, Prop
+from regrasp.sim.arm import SimArm
+from regrasp.sim.build import OUT_OF_SIGHT, build_boxes, build_props, configure, filter_collisions, lay_cable
+from regrasp.sim.cable import CableBody, build_cable
+from regrasp.sim.camera import SimCamera, camera_error
+from regrasp.sim.depth_noise import DepthNoise
+from regrasp.sim.fault_effects import effect_of
+from regrasp.sim.faults import Fault, Moments
+from regrasp.sim.fixtures import STAND_FORCE, ClipHold, SocketHold
+from regrasp.sim.phase import PhaseWatch
+from regrasp.sim.renderer import LightState, RendererName, make_renderer
+from regrasp.sim.visuals import Visuals
 
 FloatArray = NDArray[np.float64]
 CONTACT_EVERY = 4  # physics steps between looks at the arms' contacts

@@ -1,13 +1,13 @@
 """Tree files, and what loads, checks, shows and exports them."""
 
-from trees.check import Finding, check_tree
-from trees.element import TreeSyntaxError
-from trees.graph import Node, collapsed, read_graph, recorded
-from trees.inputs import check_inputs
-from trees.load import TreeError, load_tree
-from trees.paths import in_tree_order, node_paths
-from trees.run_stats import Execution, NodeStats, executions, run_stats
-from trees.show import show_tree
+from regrasp.trees.check import Finding, check_tree
+from regrasp.trees.element import TreeSyntaxError
+from regrasp.trees.graph import Node, collapsed, read_graph, recorded
+from regrasp.trees.inputs import check_inputs
+from regrasp.trees.load import TreeError, load_tree
+from regrasp.trees.paths import in_tree_order, node_paths
+from regrasp.trees.run_stats import Execution, NodeStats, executions, run_stats
+from regrasp.trees.show import show_tree
 
 __all__ = [
     "Execution",

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 
-from trees.vocabulary import BUILT_IN, Attribute, Kind, kinds
+from regrasp.trees.vocabulary import BUILT_IN, Attribute, Kind, kinds
 
 _SUBTREE = Kind(
     {"ID": Attribute(str, about="the BehaviorTree to put here; every other attribute sets a key of it")},

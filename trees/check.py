@@ -9,11 +9,11 @@ from collections.abc import Collection, Iterator, Mapping
 from itertools import islice
 from pathlib import Path
 
-from interfaces.quote import cut, quoted
-from trees.element import Element, TreeSyntaxError, key_of, read_elements
-from trees.flow import check_flow
-from trees.vocabulary import COUNTERPARTS, Kind, Names, kinds, nearest
-from trees.wiring import Filled, TooLarge
+from regrasp.interfaces.quote import cut, quoted
+from regrasp.trees.element import Element, TreeSyntaxError, key_of, read_elements
+from regrasp.trees.flow import check_flow
+from regrasp.trees.vocabulary import COUNTERPARTS, Kind, Names, kinds, nearest
+from regrasp.trees.wiring import Filled, TooLarge
 
 Finding = tuple[int, str]  # line from 1 (0: the file itself), "what is wrong; what would be right"
 
@@ -31,7 +31,9 @@ def check_tree(path: Path, leaves: Mapping[str, type] | None = None, names: Name
         TypeError: a leaf class without ports.
     """
     if leaves is None:
-        from behaviors import LEAVES  # late: they bring the planner, which a check with toy leaves does not need
+        from regrasp.behaviors import (
+            LEAVES,  # late: they bring the planner, which a check with toy leaves does not need
+        )
 
         leaves = LEAVES
     try:

@@ -7,7 +7,7 @@ from pathlib import Path
 from xml.parsers import expat
 from xml.parsers.expat import errors
 
-from interfaces.quote import cut, quoted
+from regrasp.interfaces.quote import cut, quoted
 
 MAX_DEPTH = 60  # elements inside one another; the parser that builds the tree is recursive
 _KEY = re.compile(r"\{([A-Za-z_]\w*)\}")

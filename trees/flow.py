@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 from py_trees.common import Status
 
-from interfaces.quote import cut
-from trees.vocabulary import ANY_STATUS, BUILT_IN
-from trees.wiring import Node, Wire
+from regrasp.interfaces.quote import cut
+from regrasp.trees.vocabulary import ANY_STATUS, BUILT_IN
+from regrasp.trees.wiring import Node, Wire
 
 SUCCESS, FAILURE, RUNNING = Status.SUCCESS, Status.FAILURE, Status.RUNNING
 

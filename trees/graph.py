@@ -7,11 +7,11 @@ from typing import Any, Literal
 
 from py_trees.common import Status
 
-from interfaces.quote import quoted
-from trees.element import Element, key_of, read_elements
-from trees.run_stats import NodeStats
-from trees.vocabulary import BUILT_IN
-from trees.wiring import MAX_NODES, MAX_TREE_DEPTH
+from regrasp.interfaces.quote import quoted
+from regrasp.trees.element import Element, key_of, read_elements
+from regrasp.trees.run_stats import NodeStats
+from regrasp.trees.vocabulary import BUILT_IN
+from regrasp.trees.wiring import MAX_NODES, MAX_TREE_DEPTH
 
 Kind = Literal["sequence", "fallback", "parallel", "decorator", "action", "condition", "subtree"]
 _COMPOSITES: dict[str, Kind] = {
@@ -99,7 +99,7 @@ def read_graph(path: Path, leaves: Mapping[str, type] | None = None, inputs: Map
         ValueError: it has no main tree, or more nodes or depth than a tree may have.
     """
     if leaves is None:
-        from behaviors import LEAVES  # late: they bring the planner
+        from regrasp.behaviors import LEAVES  # late: they bring the planner
 
         leaves = LEAVES
     root = read_elements(path)

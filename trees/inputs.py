@@ -3,10 +3,10 @@
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from trees.check import Finding, check_runs, unknown
-from trees.element import TreeSyntaxError, read_elements
-from trees.vocabulary import Names, kinds
-from trees.wiring import TooLarge
+from regrasp.trees.check import Finding, check_runs, unknown
+from regrasp.trees.element import TreeSyntaxError, read_elements
+from regrasp.trees.vocabulary import Names, kinds
+from regrasp.trees.wiring import TooLarge
 
 
 def check_inputs(
@@ -18,7 +18,7 @@ def check_inputs(
     `leaves` and `names` as in `check_tree`.
     """
     if leaves is None:
-        from behaviors import LEAVES  # late, as in `check_tree`
+        from regrasp.behaviors import LEAVES  # late, as in `check_tree`
 
         leaves = LEAVES
     try:

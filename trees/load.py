@@ -6,7 +6,7 @@ from pathlib import Path
 import py_trees
 from py_trees.parsers.behaviour_tree_xml import parse_behaviour_tree_xml
 
-from trees.check import Finding, check_tree
+from regrasp.trees.check import Finding, check_tree
 
 
 class TreeError(ValueError):

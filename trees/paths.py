@@ -6,7 +6,7 @@ from uuid import UUID
 
 import py_trees
 
-from interfaces.quote import quoted
+from regrasp.interfaces.quote import quoted
 
 
 def in_tree_order(root: py_trees.behaviour.Behaviour) -> Iterator[py_trees.behaviour.Behaviour]:

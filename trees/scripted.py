@@ -20,11 +20,11 @@ from py_trees.composites import Composite
 from py_trees.decorators import Decorator
 from py_trees.ports import BehaviourWithPorts, PortInformation
 
-from trees.element import read_elements
-from trees.load import load_tree
-from trees.paths import find_path, in_tree_order, node_paths
-from trees.tick_table import TickTable
-from trees.vocabulary import ANY_STATUS, BUILT_IN
+from regrasp.trees.element import read_elements
+from regrasp.trees.load import load_tree
+from regrasp.trees.paths import find_path, in_tree_order, node_paths
+from regrasp.trees.tick_table import TickTable
+from regrasp.trees.vocabulary import ANY_STATUS, BUILT_IN
 
 TICK = 0.05  # simulated s, as in a run
 MOST_TICKS = 10_000  # a tree that has not ended by then never will
@@ -160,7 +160,7 @@ class ScriptedTree:
         inputs: Mapping[str, str] | None = None,
     ) -> None:
         if leaves is None:
-            from behaviors import LEAVES  # late: they bring the planner
+            from regrasp.behaviors import LEAVES  # late: they bring the planner
 
             leaves = LEAVES
         self.tree = py_trees.trees.BehaviourTree(load_tree(path, stand_ins(leaves), inputs))

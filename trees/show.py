@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from pathlib import Path
 
-from trees.graph import Node, printable, read_graph
+from regrasp.trees.graph import Node, printable, read_graph
 
 
 def show_tree(path: Path) -> str:

@@ -6,7 +6,7 @@ from uuid import UUID
 import py_trees
 from py_trees.common import Status
 
-from trees.paths import find_path, in_tree_order, node_paths
+from regrasp.trees.paths import find_path, in_tree_order, node_paths
 
 IDLE, STOPPED = ".", "X"
 _LETTERS = {Status.RUNNING: "R", Status.SUCCESS: "S", Status.FAILURE: "F", Status.INVALID: IDLE}

@@ -13,7 +13,7 @@ from random import Random
 import py_trees
 from py_trees.common import Status
 
-from trees.scripted import MOST_TICKS, ScriptedTree
+from regrasp.trees.scripted import MOST_TICKS, ScriptedTree
 
 SEEDS = 10
 DRAWN = 6  # acts of a leaf

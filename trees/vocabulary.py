@@ -16,7 +16,7 @@ from py_trees.common import Status
 from py_trees.ports import PortsMixin
 from py_trees.ports_utils import convert_str_to_type, is_instance_of_type
 
-from interfaces.quote import MOST, cut
+from regrasp.interfaces.quote import MOST, cut
 
 Accepts = Any  # a type, or the words that may stand there as a tuple of strings
 # The names that a kind of thing has: {"socket": ["back_1", "back_2"]}. In place of a list a mapping says of each name
@@ -145,8 +145,8 @@ def nearest(word: str, known: Collection[str]) -> str:
 def kinds(leaves: Mapping[str, type], names: Names | None = None) -> dict[str, Kind]:
     """Every element but SubTree: the built-in ones and the leaves.
 
-    A leaf may say more than py_trees asks: a port `above` and `names` (see `behaviors.leaf.Port`), the class `RETURNS`.
-    A port for a name takes those in `names`, or any string where there are none.
+    A leaf may say more than py_trees asks: a port `above` and `names` (see `regrasp.behaviors.leaf.Port`), the class
+    `RETURNS`. A port for a name takes those in `names`, or any string where there are none.
 
     Raises:
         TypeError: a leaf class without ports, which the parser could not build.

@@ -4,9 +4,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from interfaces.quote import cut, quoted
-from trees.element import Element, key_of
-from trees.vocabulary import Attribute, Kind
+from regrasp.interfaces.quote import cut, quoted
+from regrasp.trees.element import Element, key_of
+from regrasp.trees.vocabulary import Attribute, Kind
 
 # After subtrees are filled in: a few nested ones could stand for billions of nodes, and building and ticking recurse.
 MAX_NODES = 2000

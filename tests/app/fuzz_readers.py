@@ -21,7 +21,7 @@ from typing import Any
 
 from hostile_files import KINDS, RECORD, SHIPPED, Case, cases
 
-from app.findings import Findings
+from regrasp.app.findings import Findings
 
 RECORDED = KINDS[len(SHIPPED) :]
 FORMATS = ("ascii", "dot", "groot", "json", "mermaid", "svg")
@@ -33,7 +33,7 @@ FINDING = re.compile(r"[^\n]+: [^\n]*; [^\n]+")
 
 def read(case: Case, folder: Path) -> str:
     """How reading the case went: "clean", "findings", or what is wrong with the reader."""
-    from app.scenario_file import check_tree_file, load_cell, load_scenario  # late: in the worker
+    from regrasp.app.scenario_file import check_tree_file, load_cell, load_scenario  # late: in the worker
 
     if case.kind in RECORDED:
         run = folder / "run"
@@ -75,7 +75,7 @@ def look(run: Path, form: str) -> str:
     """How all the commands went that look at records: "clean", "findings", or what is wrong with the first of them."""
     from typer.testing import CliRunner
 
-    from app.cli import app
+    from regrasp.app.cli import app
 
     commands = (
         ["explain", str(run)],

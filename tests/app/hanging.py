@@ -6,8 +6,8 @@ from typing import Any, ClassVar
 
 from py_trees.common import Status
 
-import behaviors
-from behaviors.leaf import Leaf
+from regrasp import behaviors
+from regrasp.behaviors.leaf import Leaf
 
 
 class Hangs(Leaf):
@@ -45,6 +45,6 @@ class Goes(Leaf):
 behaviors.LEAVES = {"Hangs": Hangs, "HangsDeaf": HangsDeaf, "Goes": Goes}
 
 if __name__ == "__main__":
-    from app.__main__ import main
+    from regrasp.app.__main__ import main
 
     main()

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Literal, NamedTuple
 
-from app.resources import shipped
+from regrasp.app.resources import shipped
 
 HOSTILE = (
     *(".nan", ".inf", "-.inf", "1e999", "1.0e+999", "-0.0", "9" * 400, "0x7fffffff", "010", "1_000", "1:30", "-1", "0"),

@@ -3,7 +3,7 @@
 import py_trees
 from py_trees.common import Status
 
-from interfaces.cause import Cause, CauseCode
+from regrasp.interfaces.cause import Cause, CauseCode
 
 R, S, F = Status.RUNNING, Status.SUCCESS, Status.FAILURE
 

@@ -5,8 +5,8 @@ import time
 from pathlib import Path
 from typing import Any
 
-from app.record import Expectation, Record, Result
-from interfaces.cause import Cause, CauseCode
+from regrasp.app.record import Expectation, Record, Result
+from regrasp.interfaces.cause import Cause, CauseCode
 
 
 def by_gravity(scenario: Any, folder: Path) -> Result:

@@ -10,8 +10,8 @@ from py_trees.composites import Parallel, Selector, Sequence
 from py_trees.decorators import FailureIsSuccess, Inverter, Retry
 from scripted import F, R, S, Script
 
-from app.attempts import Attempts
-from interfaces.cause import Cause, CauseCode
+from regrasp.app.attempts import Attempts
+from regrasp.interfaces.cause import Cause, CauseCode
 
 
 @dataclass

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from app.calibration_file import CalibrationFile, load_calibration, write_calibration
-from app.cli import app
-from app.findings import Findings
-from interfaces.frame import Intrinsics
-from sim.board import board_pictures, board_poses
+from regrasp.app.calibration_file import CalibrationFile, load_calibration, write_calibration
+from regrasp.app.cli import app
+from regrasp.app.findings import Findings
+from regrasp.interfaces.frame import Intrinsics
+from regrasp.sim.board import board_pictures, board_poses
 
 K = Intrinsics.from_fov(424, 240, float(np.deg2rad(65.0)))
 

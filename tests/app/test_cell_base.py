@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from app.findings import Findings
-from app.resources import shipped
-from app.scenario_file import load_cell
+from regrasp.app.findings import Findings
+from regrasp.app.resources import shipped
+from regrasp.app.scenario_file import load_cell
 
 
 def cell(folder: Path, text: str) -> Path:

@@ -8,14 +8,14 @@ import pybullet as p
 import pytest
 import yaml
 
-from app.findings import Findings
-from app.overrides import read
-from app.placement import cable_at_start
-from app.resources import shipped
-from app.scenario_file import load_cell, load_scenario
-from interfaces.cell import Cell
-from interfaces.scene import GRAVITIES, Gravity
-from sim.world import World
+from regrasp.app.findings import Findings
+from regrasp.app.overrides import read
+from regrasp.app.placement import cable_at_start
+from regrasp.app.resources import shipped
+from regrasp.app.scenario_file import load_cell, load_scenario
+from regrasp.interfaces.cell import Cell
+from regrasp.interfaces.scene import GRAVITIES, Gravity
+from regrasp.sim.world import World
 
 
 def findings(*overrides: str, scenario: str = "no_obstacle") -> list[str]:

@@ -11,14 +11,14 @@ import pytest
 from toy_scenario import write_scenario
 from typer.testing import CliRunner
 
-from app.batch import Settings
-from app.cli import app
-from app.findings import Findings
-from app.options import parse_seeds
-from app.output import new_folder
-from app.record import Expectation, Result, Slip
-from app.resources import shipped
-from interfaces.cause import Cause, CauseCode
+from regrasp.app.batch import Settings
+from regrasp.app.cli import app
+from regrasp.app.findings import Findings
+from regrasp.app.options import parse_seeds
+from regrasp.app.output import new_folder
+from regrasp.app.record import Expectation, Result, Slip
+from regrasp.app.resources import shipped
+from regrasp.interfaces.cause import Cause, CauseCode
 
 Episode = Callable[..., Result]
 
@@ -65,7 +65,7 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> list[SimpleNamespace]:
 
 def use_episode(monkeypatch: pytest.MonkeyPatch, episode: Episode) -> None:
     module = SimpleNamespace(run_episode=episode)
-    monkeypatch.setitem(__import__("sys").modules, "app.episode", module)
+    monkeypatch.setitem(__import__("sys").modules, "regrasp.app.episode", module)
 
 
 def test_run_ends_with_a_summary_on_stdout_and_progress_on_stderr(calls: list[SimpleNamespace]) -> None:
@@ -251,7 +251,7 @@ def test_study_demo_hands_on_seeds_jobs_and_overrides(monkeypatch: pytest.Monkey
         asked.extend(args)
         return 130
 
-    monkeypatch.setattr("app.study.run_demo", run_demo)
+    monkeypatch.setattr("regrasp.app.study.run_demo", run_demo)
     ran = invoke("study", "demo", "--seeds", "2:5", "--jobs", "3", "--out", "study", "--set", "inputs.tries=1")
     assert ran.exit_code == 130
     assert asked == [range(2, 5), 3, Path("study"), ["inputs.tries=1"], Settings()]

@@ -5,8 +5,8 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from app.cli import app
-from perception.detector import INPUT, shipped_network
+from regrasp.app.cli import app
+from regrasp.perception.detector import INPUT, shipped_network
 
 
 def invoke(*args: str) -> Any:

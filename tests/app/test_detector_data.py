@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.detector_data import PATCH, Pictures, Target, draw_patch, make_pictures, target_maps
-from interfaces.cell import Cell
-from perception.detector import decode
+from regrasp.app.detector_data import PATCH, Pictures, Target, draw_patch, make_pictures, target_maps
+from regrasp.interfaces.cell import Cell
+from regrasp.perception.detector import decode
 
 
 @pytest.fixture(scope="module")
@@ -49,8 +49,8 @@ def test_patches_depend_on_the_generator_alone(pictures: Pictures) -> None:
 
 def test_patches_keep_the_connector_in_its_box(pictures: Pictures, monkeypatch: pytest.MonkeyPatch) -> None:
     """A white connector in a black picture reaches all four edges of its box, and no pixel of it is outside."""
-    monkeypatch.setattr("app.detector_data._cut_out", lambda *_: None)
-    monkeypatch.setattr("app.detector_data._recolored", lambda image, _rng: image)
+    monkeypatch.setattr("regrasp.app.detector_data._cut_out", lambda *_: None)
+    monkeypatch.setattr("regrasp.app.detector_data._recolored", lambda image, _rng: image)
     white = replace(pictures, images=np.zeros_like(pictures.images))
     white.images[pictures.masks >= 128] = 255
     compared = 0

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from app.detector_score import (
+from regrasp.app.detector_score import (
     OCCLUSION,
     Answer,
     average_precision,
@@ -10,8 +10,8 @@ from app.detector_score import (
     precision_interval,
     true_box,
 )
-from interfaces.cell import Cell
-from perception.detector import Detection
+from regrasp.interfaces.cell import Cell
+from regrasp.perception.detector import Detection
 
 BOX = (10.0, 10.0, 50.0, 20.0)
 ELSEWHERE = (100.0, 100.0, 140.0, 110.0)
@@ -58,6 +58,6 @@ def test_a_masks_box_has_the_pixels_edges() -> None:
 
 
 def test_held_out_pictures_fill_every_class(cell: Cell, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("app.detector_score.LEAST_SEEN", 6)  # the cell of tests has pictures of a sixteenth
+    monkeypatch.setattr("regrasp.app.detector_score.LEAST_SEEN", 6)  # the cell of tests has pictures of a sixteenth
     shots = held_out_shots(cell, 1, 1)
     assert [occlusion_class(s) if s.mask.any() else None for s in shots] == [*range(len(OCCLUSION)), None]

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from app.cli import app
-from perception.detector import shipped_network
+from regrasp.app.cli import app
+from regrasp.perception.detector import shipped_network
 
 torch = pytest.importorskip("torch", reason="the extra train is missing")
 onnx = pytest.importorskip("onnx", reason="the extra train is missing")
@@ -33,7 +33,7 @@ def test_a_tiny_training_leaves_a_network_and_its_figures_and_the_seed_decides(t
 
 
 def test_another_training_goes_on_from_a_network(tmp_path: Path) -> None:
-    from app.detector_train import Network, read_weights, take_over, to_onnx
+    from regrasp.app.detector_train import Network, read_weights, take_over, to_onnx
 
     model = shipped_network()
     network = Network()
@@ -74,7 +74,7 @@ def test_what_is_no_network_of_ours_is_no_start(tmp_path: Path, content: bytes) 
 
 
 def test_ctrl_c_keeps_the_best_so_far(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from app import detector_train
+    from regrasp.app import detector_train
 
     batch = detector_train._batch
     drawn: list[int] = []
@@ -92,7 +92,7 @@ def test_ctrl_c_keeps_the_best_so_far(tmp_path: Path, monkeypatch: pytest.Monkey
 
 
 def test_opencv_computes_what_torch_does() -> None:
-    from app.detector_train import Network, to_onnx
+    from regrasp.app.detector_train import Network, to_onnx
 
     torch.manual_seed(1)
     network = Network()

@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from app import doctor
+from regrasp.app import doctor
 
 
 def test_a_machine_that_runs_these_tests_lacks_nothing(tmp_path: Path) -> None:
@@ -38,6 +38,6 @@ def test_a_world_that_cannot_be_built_is_told_in_one_line(monkeypatch: pytest.Mo
     def broken(*_: object, **__: object) -> None:
         raise RuntimeError("no physics")
 
-    monkeypatch.setattr("sim.world.World", broken)
+    monkeypatch.setattr("regrasp.sim.world.World", broken)
     assert doctor.renderer().status == "wrong"
     assert doctor.renderer().seen == "no world can be built: RuntimeError: no physics"

@@ -3,10 +3,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.draw import draw_faults, draw_obstacles
-from app.scenario_schema import ObstacleSpec, ScenarioFile
-from interfaces.fault import JawOpens, When
-from interfaces.scene import Gravity
+from regrasp.app.draw import draw_faults, draw_obstacles
+from regrasp.app.scenario_schema import ObstacleSpec, ScenarioFile
+from regrasp.interfaces.fault import JawOpens, When
+from regrasp.interfaces.scene import Gravity
 
 JITTER = (0.004, 0.006, 0.002)
 

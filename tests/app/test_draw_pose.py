@@ -5,10 +5,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import RigidTransform
 
-from app.draw_pose import draw_pose
-from interfaces.cell import pose_along
-from interfaces.frame import Intrinsics
-from perception.estimate import Estimate, pose_covariance
+from regrasp.app.draw_pose import draw_pose
+from regrasp.interfaces.cell import pose_along
+from regrasp.interfaces.frame import Intrinsics
+from regrasp.perception.estimate import Estimate, pose_covariance
 
 HERE = RigidTransform.identity()
 

@@ -8,15 +8,15 @@ import py_trees
 import pytest
 from py_trees.common import Status
 
-from app.episode import run_episode
-from app.explain import explanation
-from app.findings import Findings
-from app.record import Result
-from app.record_reader import read_record
-from app.scenario_file import Scenario, load_scenario
-from behaviors.leaf import Failed, Leaf, Steps, StepsLeaf
-from interfaces.cause import CauseCode
-from sim.world import World
+from regrasp.app.episode import run_episode
+from regrasp.app.explain import explanation
+from regrasp.app.findings import Findings
+from regrasp.app.record import Result
+from regrasp.app.record_reader import read_record
+from regrasp.app.scenario_file import Scenario, load_scenario
+from regrasp.behaviors.leaf import Failed, Leaf, Steps, StepsLeaf
+from regrasp.interfaces.cause import CauseCode
+from regrasp.sim.world import World
 
 
 class Swing(StepsLeaf):
@@ -99,8 +99,8 @@ def ends(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[tuple[bool, float]]]:
         close(world)
 
     monkeypatch.setattr(World, "close", watched)
-    monkeypatch.setattr("behaviors.LEAVES", LEAVES)
-    monkeypatch.setattr("app.episode.LEAVES", LEAVES)
+    monkeypatch.setattr("regrasp.behaviors.LEAVES", LEAVES)
+    monkeypatch.setattr("regrasp.app.episode.LEAVES", LEAVES)
     yield found
     py_trees.blackboard.Blackboard.clear()
 

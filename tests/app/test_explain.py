@@ -5,14 +5,14 @@ import pytest
 from toy_record import kill, write_record
 from typer.testing import CliRunner
 
-from app.cli import app
-from app.explain import explanation
-from app.record import Attempt, Link
-from app.record_reader import Event, read_record
-from app.timeline import timeline
-from app.tried import Course
-from interfaces.cause import Cause, CauseCode
-from trees import executions
+from regrasp.app.cli import app
+from regrasp.app.explain import explanation
+from regrasp.app.record import Attempt, Link
+from regrasp.app.record_reader import Event, read_record
+from regrasp.app.timeline import timeline
+from regrasp.app.tried import Course
+from regrasp.interfaces.cause import Cause, CauseCode
+from regrasp.trees import executions
 
 
 def page(folder: Path, width: int = 100) -> str:

@@ -5,12 +5,12 @@ import py_trees
 import pytest
 from py_trees.common import Status
 
-from app.fault_service import EnteredNodes, FaultLog, break_services
-from interfaces.cause import CauseCode, ServiceError
-from interfaces.fault import PlanningFindsNothing, ServiceRaises, When
-from motion.failure import PlanningError
-from sim.fault_effects import Effect
-from sim.faults import Fault, Moments
+from regrasp.app.fault_service import EnteredNodes, FaultLog, break_services
+from regrasp.interfaces.cause import CauseCode, ServiceError
+from regrasp.interfaces.fault import PlanningFindsNothing, ServiceRaises, When
+from regrasp.motion.failure import PlanningError
+from regrasp.sim.fault_effects import Effect
+from regrasp.sim.faults import Fault, Moments
 
 AT_ONE = When(at=(1.0, 1.0))
 

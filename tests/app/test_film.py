@@ -6,9 +6,9 @@ import cv2
 import numpy as np
 import pytest
 
-from app.film import RATE, Film
-from app.video import OVERVIEW_SIZE, SIZE
-from sim.world import World
+from regrasp.app.film import RATE, Film
+from regrasp.app.video import OVERVIEW_SIZE, SIZE
+from regrasp.sim.world import World
 
 TICK = 0.05
 

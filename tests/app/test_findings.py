@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.findings import Finding, Findings, nearest, shown
+from regrasp.app.findings import Finding, Findings, nearest, shown
 
 
 def test_findings_are_kept_once_and_in_the_order_of_the_file() -> None:

@@ -5,12 +5,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from app.judge import Judge
-from app.scenario_schema import Expect, PoseError
-from behaviors.services import Belief, Notice
-from interfaces.cause import CauseCode
-from sim.ground_truth import GroundTruth
-from sim.phase import STILL_SECONDS
+from regrasp.app.judge import Judge
+from regrasp.app.scenario_schema import Expect, PoseError
+from regrasp.behaviors.services import Belief, Notice
+from regrasp.interfaces.cause import CauseCode
+from regrasp.sim.ground_truth import GroundTruth
+from regrasp.sim.phase import STILL_SECONDS
 
 TICK = 0.05
 

@@ -7,11 +7,11 @@ import pytest
 from toy_scenario import SCENARIO, TREE, write_scenario
 from typer.testing import CliRunner
 
-from app.cli import app
-from app.findings import Findings
-from app.resources import shipped
-from app.scenario_file import cases, check_tree_file, load_cell
-from interfaces.quote import MOST
+from regrasp.app.cli import app
+from regrasp.app.findings import Findings
+from regrasp.app.resources import shipped
+from regrasp.app.scenario_file import cases, check_tree_file, load_cell
+from regrasp.interfaces.quote import MOST
 
 LONG = ("9" * 5000, "a" * 5000, "{" + "a" * 5000 + "}", "[" + "a, " * 90 + "]")
 MOST_OF_A_MESSAGE = 700  # letters: some words of ours, and some values

@@ -11,7 +11,7 @@ from typing import IO
 import pytest
 from toy_record import write_record
 
-from app.progress import shown_progress
+from regrasp.app.progress import shown_progress
 
 ROOT = Path(__file__).parents[2]
 COMMANDS = [
@@ -39,7 +39,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def shell(line: str, stdout: IO[str] | None = None) -> subprocess.CompletedProcess[str]:
     """Run a line of sh, in which the command `regrasp` is ours."""
-    ours = f'regrasp() {{ "{sys.executable}" -m app "$@"; }}; {line}'
+    ours = f'regrasp() {{ "{sys.executable}" -m regrasp "$@"; }}; {line}'
     return subprocess.run(["sh", "-c", ours], stdout=stdout, stderr=subprocess.PIPE, text=True, timeout=120)
 
 
@@ -74,7 +74,7 @@ def test_standard_input_and_errors_are_not_needed(command: str) -> None:
 
 
 def test_what_is_only_written_at_the_end_finds_no_reader_either(no_reader: IO[str]) -> None:
-    program = "import app.cli, app.__main__; app.cli.app = lambda: print('a table'); app.__main__.main()"
+    program = "import regrasp.app.cli as c, regrasp.app.__main__ as m; c.app = lambda: print('a table'); m.main()"
     told = shell(f'"{sys.executable}" -c "{program}"', stdout=no_reader)
     assert (told.returncode, told.stderr) == (141, "")
 

@@ -17,15 +17,15 @@ from scipy.spatial.transform import RigidTransform
 from scipy.stats import chi2
 from typer.testing import CliRunner
 
-from app.camera_pose_file import write_camera_pose
-from app.cli import app
-from app.episode import build_world
-from app.findings import Findings
-from app.image_files import read_depth
-from app.scenario_file import load_scenario
-from app.snapshot import write_frame
-from perception.technique import TECHNIQUES
-from sim.ground_truth import GroundTruth
+from regrasp.app.camera_pose_file import write_camera_pose
+from regrasp.app.cli import app
+from regrasp.app.episode import build_world
+from regrasp.app.findings import Findings
+from regrasp.app.image_files import read_depth
+from regrasp.app.scenario_file import load_scenario
+from regrasp.app.snapshot import write_frame
+from regrasp.perception.technique import TECHNIQUES
+from regrasp.sim.ground_truth import GroundTruth
 
 K = yaml.safe_dump({"width": 64, "height": 48, "fx": 60.0, "fy": 60.0, "cx": 31.5, "cy": 23.5})
 

@@ -5,10 +5,10 @@ from numpy.typing import NDArray
 from scipy.optimize import linprog
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from app.placement import overlaps, penetration
-from interfaces.cell import KnownCell
-from motion.kinematics import ArmKinematics
-from motion.spheres import LINKS, SPHERES
+from regrasp.app.placement import overlaps, penetration
+from regrasp.interfaces.cell import KnownCell
+from regrasp.motion.kinematics import ArmKinematics
+from regrasp.motion.spheres import LINKS, SPHERES
 
 edges = st.tuples(*[st.floats(0.02, 0.5)] * 3)
 angles = st.tuples(*[st.floats(-3, 3)] * 3)

@@ -1,6 +1,6 @@
-from app.pose_both import run_both
-from app.pose_scenes import study_cell
-from app.pose_trial import Setup
+from regrasp.app.pose_both import run_both
+from regrasp.app.pose_scenes import study_cell
+from regrasp.app.pose_trial import Setup
 
 
 def test_the_wrist_camera_helps_where_the_rear_camera_sees_a_part() -> None:

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from app.pose_coverage import AXIS_LIMIT, POSITION_LIMIT, Cover, Look, _write, coverage, distances, errors
-from perception.estimate import ROLL_VARIANCE, Estimate
+from regrasp.app.pose_coverage import AXIS_LIMIT, POSITION_LIMIT, Cover, Look, _write, coverage, distances, errors
+from regrasp.perception.estimate import ROLL_VARIANCE, Estimate
 
 X = np.array([1.0, 0.0, 0.0])
 

@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform
 
-from app.pose_grasp import grasp, services_of
-from app.pose_scenes import Scene, study_cell
-from interfaces.cell import pose_along
+from regrasp.app.pose_grasp import grasp, services_of
+from regrasp.app.pose_scenes import Scene, study_cell
+from regrasp.interfaces.cell import pose_along
 
 SMALL = [f"known.cameras.{i}.{key}={size}" for i in (0, 1) for key, size in (("width", 212), ("height", 120))]
 

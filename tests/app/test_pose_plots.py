@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from matplotlib.axes import Axes
 
-from app.pose_plots import _errors, _shares
-from app.pose_study import THESIS
-from app.pose_trial import Trial
+from regrasp.app.pose_plots import _errors, _shares
+from regrasp.app.pose_study import THESIS
+from regrasp.app.pose_trial import Trial
 
 TECHNIQUES = ["fused", "rgbd", "fiducial", "detector"]
 

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform
 
-from app.findings import Findings
-from app.pose_scenes import CONFIGURATIONS, HEADLINE, POSITION_JITTER, Scene, connector_pose, frames, study_cell
-from interfaces.cell import Cell, FixedMount
-from perception.estimate import Estimate
-from perception.technique import make_technique
+from regrasp.app.findings import Findings
+from regrasp.app.pose_scenes import CONFIGURATIONS, HEADLINE, POSITION_JITTER, Scene, connector_pose, frames, study_cell
+from regrasp.interfaces.cell import Cell, FixedMount
+from regrasp.perception.estimate import Estimate
+from regrasp.perception.technique import make_technique
 
 SMALL = [f"known.cameras.{i}.{key}={size}" for i in (0, 1) for key, size in (("width", 212), ("height", 120))]
 NO_ERRORS = [

@@ -9,19 +9,19 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 from typer.testing import CliRunner
 
-from app.cli import app
-from app.pose_coverage import run_coverage
-from app.pose_negatives import FRAMES, Negative, negative_frames
-from app.pose_plots import draw
-from app.pose_scenes import study_cell
-from app.pose_study import THESIS, of_technique, run_pose
-from app.pose_trial import Setup, Trial
-from interfaces.cell import FixedMount, KnownCell
-from interfaces.frame import RgbdFrame
-from perception.camera_model import project
-from perception.estimate import Estimate, NoEstimate
-from perception.segmentation import NotSeen
-from perception.technique import Technique, make_technique
+from regrasp.app.cli import app
+from regrasp.app.pose_coverage import run_coverage
+from regrasp.app.pose_negatives import FRAMES, Negative, negative_frames
+from regrasp.app.pose_plots import draw
+from regrasp.app.pose_scenes import study_cell
+from regrasp.app.pose_study import THESIS, of_technique, run_pose
+from regrasp.app.pose_trial import Setup, Trial
+from regrasp.interfaces.cell import FixedMount, KnownCell
+from regrasp.interfaces.frame import RgbdFrame
+from regrasp.perception.camera_model import project
+from regrasp.perception.estimate import Estimate, NoEstimate
+from regrasp.perception.segmentation import NotSeen
+from regrasp.perception.technique import Technique, make_technique
 
 SMALL = [f"known.cameras.{i}.{key}={size}" for i in (0, 1) for key, size in (("width", 212), ("height", 120))]
 Vector = NDArray[np.float64]

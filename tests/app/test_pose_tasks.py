@@ -3,7 +3,7 @@ from functools import partial
 
 import pytest
 
-from app.pose_tasks import run_tasks
+from regrasp.app.pose_tasks import run_tasks
 
 
 def twice(value: int) -> list[int]:

@@ -5,10 +5,10 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
-from app.pose_trial import looked
-from interfaces.frame import Intrinsics, RgbdFrame
-from perception.estimate import Estimate, NoEstimate, pose_covariance
-from perception.segmentation import NotSeen
+from regrasp.app.pose_trial import looked
+from regrasp.interfaces.frame import Intrinsics, RgbdFrame
+from regrasp.perception.estimate import Estimate, NoEstimate, pose_covariance
+from regrasp.perception.segmentation import NotSeen
 
 RATE = 15.0
 CAMERA = Intrinsics(16, 16, 20.0, 20.0, 7.5, 7.5)

@@ -5,8 +5,8 @@ import signal
 
 import pytest
 
-from app.interrupts import late_imports
-from app.processes import run_each
+from regrasp.app.interrupts import late_imports
+from regrasp.app.processes import run_each
 
 
 def blocked() -> bool:

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 import stand_in_runs
 
-import behaviors  # noqa: F401 - once for good: pytester forgets what is imported in its runs, which ompl does not stand
+import regrasp.behaviors  # noqa: F401 - once for good: pytester forgets what is imported in its runs, which ompl does not stand
 
 SCENARIO = """\
 description: a suite of two
@@ -20,18 +20,18 @@ markers: [slow, on_the_floor]
 vary: {gravity: [zero, earth]}
 """
 CONFTEST = """\
-import app.pytest_plugin
+import regrasp.app.pytest_plugin
 import stand_in_runs
-app.pytest_plugin._run = stand_in_runs.{}
+regrasp.app.pytest_plugin._run = stand_in_runs.{}
 """
 TREE = '<root main_tree_to_execute="M"><BehaviorTree ID="M">{}</BehaviorTree></root>'
-PLUGIN = ("-p", "app.pytest_plugin", "-p", "no:cacheprovider")
+PLUGIN = ("-p", "regrasp.app.pytest_plugin", "-p", "no:cacheprovider")
 
 
 @pytest.fixture
 def suite(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> pytest.Pytester:
     """A folder with a scenario file, whose runs are stand-ins."""
-    monkeypatch.setattr("app.pytest_plugin._run", stand_in_runs.by_gravity)
+    monkeypatch.setattr("regrasp.app.pytest_plugin._run", stand_in_runs.by_gravity)
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join(sys.path))
     (pytester.path / "cells.scenario.yaml").write_text(SCENARIO)
     return pytester
@@ -207,15 +207,14 @@ def test_the_fixture_runs_a_shipped_tree_by_name(pytester: pytest.Pytester) -> N
 
 def test_where_nothing_is_collected_nothing_of_ours_is_imported(tmp_path: Path) -> None:
     program = (
-        "import json, sys, pytest; pytest.main(['-p', 'app.pytest_plugin', '--co', '-q', sys.argv[1]]);"
+        "import json, sys, pytest; pytest.main(['-p', 'regrasp.app.pytest_plugin', '--co', '-q', sys.argv[1]]);"
         "print(json.dumps(sorted(m for m in sys.modules if m.split('.')[0] in sys.argv[2:])))"
     )
-    rooms = ["app", "behaviors", "interfaces", "motion", "perception", "sim", "trees"]
     packages = ["numpy", "pydantic", "py_trees", "pybullet", "typer"]
     done = subprocess.run(
-        [sys.executable, "-c", program, str(tmp_path), *rooms, *packages], capture_output=True, text=True, check=True
+        [sys.executable, "-c", program, str(tmp_path), "regrasp", *packages], capture_output=True, text=True, check=True
     )
-    assert json.loads(done.stdout.splitlines()[-1]) == ["app", "app.pytest_plugin"]
+    assert json.loads(done.stdout.splitlines()[-1]) == ["regrasp", "regrasp.app", "regrasp.app.pytest_plugin"]
 
 
 def test_help_says_what_a_suite_takes(pytester: pytest.Pytester) -> None:

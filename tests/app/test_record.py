@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.findings import Findings
-from app.record import (
+from regrasp.app.findings import Findings
+from regrasp.app.record import (
     ArmState,
     Attempt,
     BeliefState,
@@ -19,7 +19,7 @@ from app.record import (
     Slip,
     write_whole,
 )
-from interfaces.cause import Cause, CauseCode
+from regrasp.interfaces.cause import Cause, CauseCode
 
 FIELDS = [
     *("schema", "scenario", "seed", "outcome", "succeeded", "case", "cause", "chain", "traceback", "expectations"),
@@ -151,7 +151,7 @@ def test_a_device_stays_a_device() -> None:
 def test_of_two_runs_that_take_a_folder_at_once_the_second_is_told(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("app.record.output.findings", lambda _folder: [])  # as both saw it before either began
+    monkeypatch.setattr("regrasp.app.record.output.findings", lambda _folder: [])  # as both saw it before either began
     first = Record(tmp_path / "run", "s", 1)
     with pytest.raises(Findings, match=r"run: holds a run already \(events.jsonl, ticks.jsonl\); name another folder"):
         Record(tmp_path / "run", "s", 2)

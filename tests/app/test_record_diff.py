@@ -4,9 +4,9 @@ import pytest
 from toy_record import kill, write_record
 from typer.testing import CliRunner
 
-from app.cli import app
-from app.record_diff import beginnings, differences
-from app.record_reader import read_record
+from regrasp.app.cli import app
+from regrasp.app.record_diff import beginnings, differences
+from regrasp.app.record_reader import read_record
 
 
 def differ(a: Path, b: Path) -> list[str]:

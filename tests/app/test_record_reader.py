@@ -8,11 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from toy_record import kill, write_record
 
-from app.explain import explanation
-from app.findings import Findings
-from app.record_diff import differences
-from app.record_reader import read_record
-from app.replay import Replay
+from regrasp.app.explain import explanation
+from regrasp.app.findings import Findings
+from regrasp.app.record_diff import differences
+from regrasp.app.record_reader import read_record
+from regrasp.app.replay import Replay
 
 FILES = ("result.json", "events.jsonl", "ticks.jsonl")
 

@@ -15,12 +15,12 @@ from rich.console import Console
 from toy_record import write_record
 from typer.testing import CliRunner
 
-from app.cli import app
-from app.findings import Findings
-from app.record import NodeStatus
-from app.record_reader import Tick, read_record
-from app.replay import Replay
-from app.replay_screen import View, draw, pressed
+from regrasp.app.cli import app
+from regrasp.app.findings import Findings
+from regrasp.app.record import NodeStatus
+from regrasp.app.record_reader import Tick, read_record
+from regrasp.app.replay import Replay
+from regrasp.app.replay_screen import View, draw, pressed
 
 
 @pytest.fixture
@@ -207,7 +207,7 @@ def terminal(folder: Path, request: pytest.FixtureRequest) -> Iterator[tuple[sub
     """`regrasp replay` on a pseudo-terminal of 80 by 24, or as wide as the test's parameter; with --to 1.5."""
     ours, theirs = pty.openpty()
     fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 24, getattr(request, "param", 80), 0, 0))
-    command = [sys.executable, "-m", "app", "replay", str(folder), "--to", "1.5"]
+    command = [sys.executable, "-m", "regrasp", "replay", str(folder), "--to", "1.5"]
     env = os.environ | {"TERM": "xterm-256color"}
     env = {name: value for name, value in env.items() if name not in ("COLUMNS", "LINES", "NO_COLOR")}
     process = subprocess.Popen(command, stdin=theirs, stdout=theirs, stderr=theirs, env=env, start_new_session=True)

@@ -7,15 +7,15 @@ import pytest
 from toy_scenario import SCENARIO, write_scenario
 from typer.testing import CliRunner
 
-from app.batch import Row, Run, Settings, row_of
-from app.cli import app
-from app.findings import Findings
-from app.junit import write_junit
-from app.processes import Done
-from app.record import Expectation, Record, Result
-from app.run_every import run_every
-from app.scenario_file import Scenario, cases, load_scenario
-from interfaces.cause import Cause, CauseCode
+from regrasp.app.batch import Row, Run, Settings, row_of
+from regrasp.app.cli import app
+from regrasp.app.findings import Findings
+from regrasp.app.junit import write_junit
+from regrasp.app.processes import Done
+from regrasp.app.record import Expectation, Record, Result
+from regrasp.app.run_every import run_every
+from regrasp.app.scenario_file import Scenario, cases, load_scenario
+from regrasp.interfaces.cause import Cause, CauseCode
 
 
 @pytest.fixture(autouse=True)

@@ -5,9 +5,9 @@ import pytest
 from toy_scenario import SCENARIO, write_scenario
 from typer.testing import CliRunner
 
-from app.cli import app
-from app.resources import shipped
-from app.scenario_file import load_scenario
+from regrasp.app.cli import app
+from regrasp.app.resources import shipped
+from regrasp.app.scenario_file import load_scenario
 
 
 @pytest.fixture(autouse=True)

@@ -7,13 +7,13 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from toy_scenario import write_scenario
 
-from app.findings import Finding, Findings
-from app.overrides import read
-from app.resources import shipped
-from app.scenario_file import load_cell, load_scenario
-from app.scenario_parts import tree_text
-from behaviors.unplug import Unplug
-from interfaces.cause import CauseCode
+from regrasp.app.findings import Finding, Findings
+from regrasp.app.overrides import read
+from regrasp.app.resources import shipped
+from regrasp.app.scenario_file import load_cell, load_scenario
+from regrasp.app.scenario_parts import tree_text
+from regrasp.behaviors.unplug import Unplug
+from regrasp.interfaces.cause import CauseCode
 
 ARMS = 1 + shipped("cell")["thesis"].read_text().splitlines().index("  arms:")  # the line of that key
 METRES = "expected a number in metres, such as 0.3"
@@ -245,7 +245,7 @@ def test_findings_of_all_files_come_at_once(scenario: Path) -> None:
 def test_a_tree_that_names_a_socket_which_the_cell_has_not_is_a_finding_in_the_tree(
     scenario: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("behaviors.LEAVES", {"Unplug": Unplug})
+    monkeypatch.setattr("regrasp.behaviors.LEAVES", {"Unplug": Unplug})
     tree = scenario.parent / "tree.xml"
     tree.write_text(
         tree.read_text().replace('<Wait name="settle" seconds="0.1"/>', '<Unplug name="u" socket="bck_4"/>')

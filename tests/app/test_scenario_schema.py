@@ -10,11 +10,11 @@ from pydantic import BaseModel, create_model
 from pydantic.fields import FieldInfo
 from typer.testing import CliRunner
 
-from app.cli import app
-from app.findings import Findings
-from app.resources import shipped
-from app.scenario_file import cases
-from app.scenario_schema import ScenarioFile, json_schema
+from regrasp.app.cli import app
+from regrasp.app.findings import Findings
+from regrasp.app.resources import shipped
+from regrasp.app.scenario_file import cases
+from regrasp.app.scenario_schema import ScenarioFile, json_schema
 
 
 def fields(model: type[BaseModel]) -> Iterator[tuple[str, FieldInfo]]:
@@ -27,7 +27,7 @@ def fields(model: type[BaseModel]) -> Iterator[tuple[str, FieldInfo]]:
 
 def models(annotation: Any) -> Iterator[type[BaseModel]]:
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        if annotation.__module__ in (ScenarioFile.__module__, "interfaces.fault"):
+        if annotation.__module__ in (ScenarioFile.__module__, "regrasp.interfaces.fault"):
             yield annotation
         return
     for part in get_args(annotation):
@@ -88,7 +88,7 @@ def test_the_command_prints_the_schema_and_a_reference_with_every_field() -> Non
 
 def test_the_reference_that_ships_is_what_the_command_prints() -> None:
     """Where this fails: `regrasp scenarios schema --markdown > scenarios/SCHEMA.md`."""
-    shipped = (files("scenarios") / "SCHEMA.md").read_text(encoding="utf-8")
+    shipped = (files("regrasp.scenarios") / "SCHEMA.md").read_text(encoding="utf-8")
     assert CliRunner().invoke(app, ["scenarios", "schema", "--markdown"]).stdout == shipped
 
 

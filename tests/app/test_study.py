@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from app.record import Expectation, Result, Slip
-from app.scenario_file import Scenario
-from app.study import run_demo, wilson
-from interfaces.cause import Cause, CauseCode
+from regrasp.app.record import Expectation, Result, Slip
+from regrasp.app.scenario_file import Scenario
+from regrasp.app.study import run_demo, wilson
+from regrasp.interfaces.cause import Cause, CauseCode
 
 
 def episode(scenario: Scenario, out: Path | None, *, seed: int, video: bool, renderer: str) -> Result:
@@ -97,7 +97,7 @@ def test_ctrl_c_keeps_what_was_done_and_stops_what_runs(tmp_path: Path) -> None:
     program = textwrap.dedent("""
         import sys
         from pathlib import Path
-        from app.study import run_demo
+        from regrasp.app.study import run_demo
         from test_study import slow_after_two
         if __name__ == "__main__":
             sys.exit(run_demo(range(3), 1, Path(sys.argv[1]), episode=slow_after_two))

@@ -4,7 +4,7 @@ import json
 import py_trees
 from py_trees.common import ParallelPolicy, Status
 
-from app.tick_log import TickLog, active_leaf
+from regrasp.app.tick_log import TickLog, active_leaf
 
 
 class Script(py_trees.behaviour.Behaviour):  # type: ignore[misc]

@@ -6,8 +6,8 @@ import pytest
 from toy_record import kill, write_record
 from typer.testing import CliRunner
 
-from app.cli import app
-from trees.export import FORMATS
+from regrasp.app.cli import app
+from regrasp.trees.export import FORMATS
 
 
 def export(*args: str) -> Any:

@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 from toy_record import write_record
 
-from app.record_reader import Event, read_record
-from app.tried import attempts, told_by_ticks
-from trees import Execution, run_stats
+from regrasp.app.record_reader import Event, read_record
+from regrasp.app.tried import attempts, told_by_ticks
+from regrasp.trees import Execution, run_stats
 
 
 def test_a_cause_is_told_by_the_event_of_the_failure() -> None:

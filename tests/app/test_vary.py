@@ -7,11 +7,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from toy_scenario import SCENARIO, write_scenario
 
-from app.findings import Findings
-from app.output import folder_name
-from app.scenario_file import case_names, cases, load_scenario
-from app.vary import axes, expand
-from app.yaml_lines import parse
+from regrasp.app.findings import Findings
+from regrasp.app.output import folder_name
+from regrasp.app.scenario_file import case_names, cases, load_scenario
+from regrasp.app.vary import axes, expand
+from regrasp.app.yaml_lines import parse
 
 
 @pytest.fixture(autouse=True)

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
-from app.video import OVERVIEW_SIZE, SIZE, Frame, VideoWriter, compose
+from regrasp.app.video import OVERVIEW_SIZE, SIZE, Frame, VideoWriter, compose
 
 
 def image(width: int, height: int, color: tuple[int, int, int]) -> Frame:
@@ -76,7 +76,7 @@ def test_after_ctrl_c_the_film_plays(tmp_path: Path) -> None:
     program = textwrap.dedent("""
         import sys
         import numpy as np
-        from app.video import VideoWriter
+        from regrasp.app.video import VideoWriter
         with VideoWriter(sys.argv[1], 20, (64, 48)) as video:
             for i in range(10**9):
                 video.write(np.full((48, 64, 3), 99, np.uint8))

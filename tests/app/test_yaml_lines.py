@@ -5,8 +5,8 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.findings import Findings
-from app.yaml_lines import MAX_DEPTH, parse
+from regrasp.app.findings import Findings
+from regrasp.app.yaml_lines import MAX_DEPTH, parse
 
 
 def findings(text: str) -> str:

@@ -9,10 +9,10 @@ from py_trees.composites import Selector, Sequence
 from py_trees.decorators import Retry
 from scripted import F, R, S, Script
 
-from app.attempts import Attempts
-from app.record import ArmState, BeliefState, Expectation, Pose, Record, Result, Sighting, Slip
-from app.tick_log import TickLog
-from interfaces.cause import Cause
+from regrasp.app.attempts import Attempts
+from regrasp.app.record import ArmState, BeliefState, Expectation, Pose, Record, Result, Sighting, Slip
+from regrasp.app.tick_log import TickLog
+from regrasp.interfaces.cause import Cause
 
 TREE = """\
 <root main_tree_to_execute="Main">

@@ -46,7 +46,7 @@ class Wait(BehaviourWithPorts):  # type: ignore[misc]  # py_trees is untyped to 
 
 def write_scenario(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Write mine.yaml and tree.xml into `folder` and make it the current one."""
-    monkeypatch.setattr("behaviors.LEAVES", {"Wait": Wait}, raising=False)
+    monkeypatch.setattr("regrasp.behaviors.LEAVES", {"Wait": Wait}, raising=False)
     monkeypatch.chdir(folder)
     (folder / "tree.xml").write_text(TREE)
     (folder / "mine.yaml").write_text(SCENARIO)

@@ -12,18 +12,18 @@ from numpy.typing import NDArray
 from py_trees.common import Status
 from scipy.spatial.transform import RigidTransform
 
-from behaviors import LEAVES
-from behaviors.services import Belief, Services
-from interfaces.cause import CauseCode
-from interfaces.cell import KnownCell
-from interfaces.frame import RgbdFrame
-from interfaces.reading import GripperReading
-from motion.failure import PlanningError
-from motion.task import Task
-from perception.estimate import Estimate, NoEstimate, pose_covariance
-from perception.segmentation import NotSeen
-from perception.track import ConnectorTrack
-from trees import load_tree
+from regrasp.behaviors import LEAVES
+from regrasp.behaviors.services import Belief, Services
+from regrasp.interfaces.cause import CauseCode
+from regrasp.interfaces.cell import KnownCell
+from regrasp.interfaces.frame import RgbdFrame
+from regrasp.interfaces.reading import GripperReading
+from regrasp.motion.failure import PlanningError
+from regrasp.motion.task import Task
+from regrasp.perception.estimate import Estimate, NoEstimate, pose_covariance
+from regrasp.perception.segmentation import NotSeen
+from regrasp.perception.track import ConnectorTrack
+from regrasp.trees import load_tree
 
 TICK = 0.05
 LEFT = np.array([0.0, 1.0, 0.0])

@@ -5,8 +5,8 @@ import pytest
 from fake_services import Seen, Stage, seen, unseen
 from py_trees.common import Status
 
-from interfaces.cause import CauseCode
-from interfaces.cell import KnownCell
+from regrasp.interfaces.cause import CauseCode
+from regrasp.interfaces.cell import KnownCell
 
 CHECK = '<CheckCameras name="check_cameras" seconds="1.5"/>'
 PLACE = np.array([0.35, 0.1, 0.2])

@@ -6,8 +6,8 @@ from fake_services import Stage, seen, unseen
 from py_trees.common import Status
 from scipy.spatial.transform import RigidTransform
 
-from interfaces.cause import CauseCode
-from interfaces.cell import KnownCell
+from regrasp.interfaces.cause import CauseCode
+from regrasp.interfaces.cell import KnownCell
 
 WATCH = """<Sequence name="watch" memory="false">
 <Monitor name="monitor" period="0.1"/><DetectSlip name="detect_slip"/></Sequence>"""

@@ -7,10 +7,10 @@ import pytest
 from fake_services import Stage, seen
 from py_trees.common import Status
 
-from behaviors.hand import CLOSE_SECONDS
-from behaviors.recover import BLIND_SECONDS
-from interfaces.cause import CauseCode, ServiceError
-from interfaces.cell import KnownCell
+from regrasp.behaviors.hand import CLOSE_SECONDS
+from regrasp.behaviors.recover import BLIND_SECONDS
+from regrasp.interfaces.cause import CauseCode, ServiceError
+from regrasp.interfaces.cell import KnownCell
 
 LEAF = '<{} name="leaf"/>'
 REAR, WRIST = "the rear camera is dark", "the wrist camera is frozen"

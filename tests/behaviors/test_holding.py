@@ -4,9 +4,9 @@ from fake_services import Stage
 from py_trees.common import Status
 from scipy.spatial.transform import RigidTransform
 
-from behaviors.services import Notice
-from interfaces.cause import Cause, CauseCode
-from interfaces.cell import KnownCell
+from regrasp.behaviors.services import Notice
+from regrasp.interfaces.cause import Cause, CauseCode
+from regrasp.interfaces.cell import KnownCell
 
 
 def test_an_empty_hand_says_how_often_and_when_it_lost_what_it_held(known: KnownCell, tmp_path: Path) -> None:

@@ -7,8 +7,8 @@ from fake_services import Stage, seen
 from py_trees.common import Status
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from interfaces.cell import KnownCell, pose_along
-from perception.estimate import Estimate
+from regrasp.interfaces.cell import KnownCell, pose_along
+from regrasp.perception.estimate import Estimate
 
 
 @pytest.fixture

@@ -6,8 +6,8 @@ from fake_services import Stage, seen, unseen
 from py_trees.common import Status
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from interfaces.cell import KnownCell
-from perception.track import TrackState
+from regrasp.interfaces.cell import KnownCell
+from regrasp.perception.track import TrackState
 
 MONITOR = '<Monitor name="monitor" period="0.2"/>'
 

@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 from py_trees.common import Status
 from scipy.spatial.transform import RigidTransform
 
-from interfaces.cause import CauseCode
-from interfaces.cell import KnownCell
-from interfaces.frame import Intrinsics, RgbdFrame
-from motion.failure import PlanningError
+from regrasp.interfaces.cause import CauseCode
+from regrasp.interfaces.cell import KnownCell
+from regrasp.interfaces.frame import Intrinsics, RgbdFrame
+from regrasp.motion.failure import PlanningError
 
 WAIT = '<WaitUntilStill name="wait_until_still" time_limit="6.0"/>'
 ROOM = '<MakeRoom name="make_room"/>'

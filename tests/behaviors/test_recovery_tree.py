@@ -17,14 +17,14 @@ from py_trees.blackboard import Blackboard
 from py_trees.common import Status
 from scipy.spatial.transform import RigidTransform
 
-from app.attempts import Attempts
-from app.resources import shipped
-from behaviors import LEAVES, Leaf
-from interfaces.cause import Cause, ServiceError
-from interfaces.cell import KnownCell
-from interfaces.frame import Intrinsics, RgbdFrame
-from motion.task import Task
-from trees import in_tree_order, load_tree
+from regrasp.app.attempts import Attempts
+from regrasp.app.resources import shipped
+from regrasp.behaviors import LEAVES, Leaf
+from regrasp.interfaces.cause import Cause, ServiceError
+from regrasp.interfaces.cell import KnownCell
+from regrasp.interfaces.frame import Intrinsics, RgbdFrame
+from regrasp.motion.task import Task
+from regrasp.trees import in_tree_order, load_tree
 
 Make = Callable[..., "Play"]
 TICK = 0.25  # s: more than a run's, for less to do
@@ -123,9 +123,9 @@ class Play:
 @pytest.fixture
 def play(known: KnownCell, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Make]:
     # Geometry that takes long and that no motion here looks at.
-    monkeypatch.setattr("behaviors.carry.Carry._goals", lambda *_arguments: [])
-    monkeypatch.setattr("behaviors.carry.Insert._seated", lambda *_arguments: None)
-    monkeypatch.setattr("behaviors.look.closer_views", lambda connector: [connector] * 2)
+    monkeypatch.setattr("regrasp.behaviors.carry.Carry._goals", lambda *_arguments: [])
+    monkeypatch.setattr("regrasp.behaviors.carry.Insert._seated", lambda *_arguments: None)
+    monkeypatch.setattr("regrasp.behaviors.look.closer_views", lambda connector: [connector] * 2)
     yield lambda slip, gone=False: Play(known, tmp_path, slip, gone)
     Blackboard.clear()
 

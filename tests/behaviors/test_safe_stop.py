@@ -4,8 +4,8 @@ import pytest
 from fake_services import Stage
 from py_trees.common import Status
 
-from interfaces.cause import Cause, CauseCode
-from interfaces.cell import KnownCell
+from regrasp.interfaces.cause import Cause, CauseCode
+from regrasp.interfaces.cell import KnownCell
 
 STOP = '<SafeStop name="safe_stop"/>'
 

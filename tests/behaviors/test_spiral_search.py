@@ -7,13 +7,13 @@ import pytest
 from fake_services import Stage, seen, unseen
 from py_trees.common import Status
 
-from behaviors.spiral_search import DISTANCE
-from interfaces.cause import CauseCode
-from interfaces.cell import FixedMount, KnownCell
-from motion.failure import PlanningError
-from motion.viewpoints import spiral
-from perception.estimate import Estimate, NoEstimate
-from perception.segmentation import NotSeen
+from regrasp.behaviors.spiral_search import DISTANCE
+from regrasp.interfaces.cause import CauseCode
+from regrasp.interfaces.cell import FixedMount, KnownCell
+from regrasp.motion.failure import PlanningError
+from regrasp.motion.viewpoints import spiral
+from regrasp.perception.estimate import Estimate, NoEstimate
+from regrasp.perception.segmentation import NotSeen
 
 PLACE = np.array([0.40, 0.10, 0.25])
 

@@ -6,8 +6,8 @@ from fake_services import Seen, Stage, seen, unseen
 from py_trees.common import Status
 from scipy.spatial.transform import RigidTransform
 
-from interfaces.cause import CauseCode
-from interfaces.cell import KnownCell
+from regrasp.interfaces.cause import CauseCode
+from regrasp.interfaces.cell import KnownCell
 
 LOOK = '<LookAtStow name="look_at_stow"/>'
 

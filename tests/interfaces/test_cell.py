@@ -9,7 +9,7 @@ from hypothesis import assume, example, given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from interfaces.cell import Cell, FixedMount, Socket, Tag, WristMount, pose_along
+from regrasp.interfaces.cell import Cell, FixedMount, Socket, Tag, WristMount, pose_along
 
 LENGTH = 1e-9  # metres
 coordinates = st.floats(-2.0, 2.0)
@@ -18,7 +18,7 @@ vectors = st.tuples(coordinates, coordinates, coordinates)
 
 @pytest.fixture
 def data() -> Any:
-    return yaml.safe_load((files("scenarios") / "cells/thesis.yaml").read_text(encoding="utf-8"))
+    return yaml.safe_load((files("regrasp.scenarios") / "cells/thesis.yaml").read_text(encoding="utf-8"))
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from interfaces.fault import AnyFault, Lasting, When
+from regrasp.interfaces.fault import AnyFault, Lasting, When
 
 Span = tuple[float, float]
 spans = st.tuples(st.floats(0, 1), st.floats(0, 1)).map(lambda pair: (min(pair), max(pair)))

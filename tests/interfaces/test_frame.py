@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from interfaces.frame import Intrinsics
+from regrasp.interfaces.frame import Intrinsics
 
 
 @given(width=st.integers(16, 4096), height=st.integers(16, 4096), fov=st.floats(0.1, 2.9))

@@ -2,7 +2,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from interfaces.quote import MOST, cut, quoted
+from regrasp.interfaces.quote import MOST, cut, quoted
 
 
 @given(st.text() | st.binary(max_size=200) | st.lists(st.integers()))

@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from interfaces.trajectory import Trajectory
+from regrasp.interfaces.trajectory import Trajectory
 
 EXACT = 1e-9  # rad, rad/s
 TIMES = np.array([0.0, 0.3, 1.0, 1.4])

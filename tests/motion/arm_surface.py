@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from motion.arm_offsets import WITHIN
-from motion.kinematics import ArmKinematics, world_spheres
-from motion.spheres import LINKS, spheres_at
+from regrasp.motion.arm_offsets import WITHIN
+from regrasp.motion.kinematics import ArmKinematics, world_spheres
+from regrasp.motion.spheres import LINKS, spheres_at
 
 Floats = NDArray[np.float64]
 EYE = np.array([-0.3, 0.5, 0.7])

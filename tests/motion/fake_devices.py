@@ -5,11 +5,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from interfaces.cell import KnownCell
-from interfaces.reading import GripperReading, JointReading
-from interfaces.trajectory import Trajectory
-from motion.service import Motion
-from motion.task import Task
+from regrasp.interfaces.cell import KnownCell
+from regrasp.interfaces.reading import GripperReading, JointReading
+from regrasp.interfaces.trajectory import Trajectory
+from regrasp.motion.service import Motion
+from regrasp.motion.task import Task
 
 TICK = 0.05
 

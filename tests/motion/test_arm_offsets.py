@@ -6,8 +6,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
-from motion.arm_offsets import joint_offsets
-from motion.kinematics import ArmKinematics
+from regrasp.motion.arm_offsets import joint_offsets
+from regrasp.motion.kinematics import ArmKinematics
 
 Floats = NDArray[np.float64]
 KIN = ArmKinematics(RigidTransform.identity())

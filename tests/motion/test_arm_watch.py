@@ -4,9 +4,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from interfaces.reading import JointReading
-from interfaces.trajectory import Trajectory
-from motion.arm_watch import BEHIND, JUMP, LEFT, ArmWatch, rest_of
+from regrasp.interfaces.reading import JointReading
+from regrasp.interfaces.trajectory import Trajectory
+from regrasp.motion.arm_watch import BEHIND, JUMP, LEFT, ArmWatch, rest_of
 
 DT = 0.05
 

@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from interfaces.cell import KnownCell
-from motion.cable_path import natural_pose, natural_ways
+from regrasp.interfaces.cell import KnownCell
+from regrasp.motion.cable_path import natural_pose, natural_ways
 
 sideways = st.tuples(st.floats(-0.15, 0.15), st.floats(-0.15, 0.2)).map(lambda xz: np.array([xz[0], 0.0, xz[1]]))
 turns = st.tuples(*[st.floats(-0.2, 0.2)] * 3)

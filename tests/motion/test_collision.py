@@ -6,11 +6,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import RigidTransform
 
-from interfaces.cell import Box, KnownCell
-from motion.collision import CollisionModel
-from motion.distance_grid import DistanceGrid
-from motion.kinematics import LOWER, UPPER, ArmKinematics, FloatArray
-from motion.spheres import LINKS, SPHERES
+from regrasp.interfaces.cell import Box, KnownCell
+from regrasp.motion.collision import CollisionModel
+from regrasp.motion.distance_grid import DistanceGrid
+from regrasp.motion.kinematics import LOWER, UPPER, ArmKinematics, FloatArray
+from regrasp.motion.spheres import LINKS, SPHERES
 
 HOME = np.array([0.0, -0.8, 0.8, 0.0, 0.5, 0.0])
 FORWARD = np.zeros(6)

@@ -2,7 +2,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from motion.distance_grid import FAR, DistanceGrid
+from regrasp.motion.distance_grid import FAR, DistanceGrid
 
 LOWER, UPPER, H = np.array([-0.2, 0.0, 0.1]), np.array([0.2, 0.3, 0.3]), 0.02
 

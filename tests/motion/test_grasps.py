@@ -6,12 +6,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from interfaces.cause import CauseCode
-from interfaces.cell import Box, KnownCell, pose_along
-from motion.collision import CollisionModel
-from motion.failure import PlanningError
-from motion.grasps import PREFERRED_YAW, choose_grasp, grasp_candidates
-from motion.kinematics import ArmKinematics
+from regrasp.interfaces.cause import CauseCode
+from regrasp.interfaces.cell import Box, KnownCell, pose_along
+from regrasp.motion.collision import CollisionModel
+from regrasp.motion.failure import PlanningError
+from regrasp.motion.grasps import PREFERRED_YAW, choose_grasp, grasp_candidates
+from regrasp.motion.kinematics import ArmKinematics
 
 LENGTH, RADIUS = 0.09, 0.01
 

@@ -7,13 +7,13 @@ from fake_devices import TICK, FakeGripper, Rig
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from interfaces.cause import CauseCode
-from interfaces.cell import KnownCell, pose_along
-from interfaces.frame import Intrinsics, RgbdFrame
-from motion.cable_path import natural_pose
-from motion.failure import PlanningError
-from motion.service import GRIP_OFFSETS, OPEN_GAP, TIGHT_MARGIN, Motion
-from motion.task import Task
+from regrasp.interfaces.cause import CauseCode
+from regrasp.interfaces.cell import KnownCell, pose_along
+from regrasp.interfaces.frame import Intrinsics, RgbdFrame
+from regrasp.motion.cable_path import natural_pose
+from regrasp.motion.failure import PlanningError
+from regrasp.motion.service import GRIP_OFFSETS, OPEN_GAP, TIGHT_MARGIN, Motion
+from regrasp.motion.task import Task
 
 Points = NDArray[np.float64]
 READY = np.array([0.4, -0.6, 0.6, 0.0, 0.3, 0.0])

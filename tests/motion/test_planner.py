@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform
 
-from interfaces.cause import CauseCode
-from interfaces.cell import Box
-from motion.collision import CollisionModel
-from motion.failure import PlanningError
-from motion.kinematics import ArmKinematics, FloatArray
-from motion.planner import plan
+from regrasp.interfaces.cause import CauseCode
+from regrasp.interfaces.cell import Box
+from regrasp.motion.collision import CollisionModel
+from regrasp.motion.failure import PlanningError
+from regrasp.motion.kinematics import ArmKinematics, FloatArray
+from regrasp.motion.planner import plan
 
 KIN = ArmKinematics(RigidTransform.identity())
 FLOOR = Box(name="floor", center=(0.2, 0, -0.02), size=(2.4, 2.4, 0.04))

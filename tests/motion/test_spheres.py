@@ -6,8 +6,8 @@ import rtbdata
 import trimesh
 from scipy.spatial.transform import Rotation
 
-from motion.kinematics import TOOL_OFFSET
-from motion.spheres import LINKS, SPHERES
+from regrasp.motion.kinematics import TOOL_OFFSET
+from regrasp.motion.spheres import LINKS, SPHERES
 
 MESHES = Path(rtbdata.__file__).parent / "xacro/trossen_descriptions/meshes/meshes_vx300s"
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from interfaces.cause import CauseCode
-from motion.failure import PlanningError
-from motion.kinematics import ArmKinematics
-from motion.straight import straight_line
+from regrasp.interfaces.cause import CauseCode
+from regrasp.motion.failure import PlanningError
+from regrasp.motion.kinematics import ArmKinematics
+from regrasp.motion.straight import straight_line
 
 Q0 = np.array([0.1, -0.6, 0.7, 0.2, 0.4, -0.1])
 

@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from interfaces.trajectory import Trajectory
-from motion.kinematics import ACCELERATION_LIMIT, FloatArray
-from motion.timing import STOP_TIME, brake, time_path
+from regrasp.interfaces.trajectory import Trajectory
+from regrasp.motion.kinematics import ACCELERATION_LIMIT, FloatArray
+from regrasp.motion.timing import STOP_TIME, brake, time_path
 
 paths = st.integers(2, 6).flatmap(lambda k: arrays(float, (k, 6), elements=st.floats(-2, 2, width=32)))
 

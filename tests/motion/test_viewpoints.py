@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform
 
-from interfaces.cell import Box, KnownCell, WristMount
-from motion.collision import CollisionModel
-from motion.kinematics import ArmKinematics, FloatArray
-from motion.viewpoints import DISTANCE, Stop, spiral
+from regrasp.interfaces.cell import Box, KnownCell, WristMount
+from regrasp.motion.collision import CollisionModel
+from regrasp.motion.kinematics import ArmKinematics, FloatArray
+from regrasp.motion.viewpoints import DISTANCE, Stop, spiral
 
 START = np.array([0.36, 0.14, 0.25])
 

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
-from interfaces.cell import Connector, FixedMount
-from interfaces.frame import Intrinsics, RgbdFrame
+from regrasp.interfaces.cell import Connector, FixedMount
+from regrasp.interfaces.frame import Intrinsics, RgbdFrame
 
 Image = NDArray[np.float64]
 RED, BLACK, PURPLE, WOOD = (0.75, 0.05, 0.06), (0.06, 0.06, 0.06), (0.45, 0.2, 0.6), (0.80, 0.66, 0.45)

@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 from raycast import BLACK, REAR_POSE, RED, Ball, Block, Cylinder, Sensor, render
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from interfaces.cell import Box, KnownCell
-from interfaces.frame import Intrinsics, RgbdFrame
-from perception.camera_model import project, subsampled
-from perception.registration import STEP, CameraErrors
+from regrasp.interfaces.cell import Box, KnownCell
+from regrasp.interfaces.frame import Intrinsics, RgbdFrame
+from regrasp.perception.camera_model import project, subsampled
+from regrasp.perception.registration import STEP, CameraErrors
 
 Vector = NDArray[np.float64]
 Color = tuple[float, float, float]

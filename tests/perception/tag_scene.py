@@ -7,14 +7,14 @@ import pybullet as p
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from app.resources import shipped
-from app.scenario_file import load_cell
-from interfaces.cell import Tag
-from interfaces.frame import RgbdFrame
-from sim.depth_noise import DepthNoise
-from sim.printed import tag_boxes, visual
-from sim.renderer import LightState, RendererName, make_renderer
-from sim.visuals import Visuals
+from regrasp.app.resources import shipped
+from regrasp.app.scenario_file import load_cell
+from regrasp.interfaces.cell import Tag
+from regrasp.interfaces.frame import RgbdFrame
+from regrasp.sim.depth_noise import DepthNoise
+from regrasp.sim.printed import tag_boxes, visual
+from regrasp.sim.renderer import LightState, RendererName, make_renderer
+from regrasp.sim.visuals import Visuals
 
 CELL = load_cell(shipped("cell")["thesis_tags"])
 KNOWN, CONNECTOR, CAMERA = CELL.known, CELL.known.connector, CELL.known.camera("rear")

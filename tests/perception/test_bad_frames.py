@@ -11,15 +11,15 @@ from numpy.typing import NDArray
 from raycast import REAR_POSE, RED
 from scene import LEFTWARDS, PLACE, REAR, blocks, plug, seen
 
-from app.pose_trial import CELLS
-from app.resources import shipped
-from app.scenario_file import load_cell
-from interfaces.cell import KnownCell
-from interfaces.frame import RgbdFrame
-from perception.detector import Detector
-from perception.estimate import Estimate, NoEstimate
-from perception.rgbd_pose import Rgbd
-from perception.technique import TECHNIQUES, Technique, make_technique
+from regrasp.app.pose_trial import CELLS
+from regrasp.app.resources import shipped
+from regrasp.app.scenario_file import load_cell
+from regrasp.interfaces.cell import KnownCell
+from regrasp.interfaces.frame import RgbdFrame
+from regrasp.perception.detector import Detector
+from regrasp.perception.estimate import Estimate, NoEstimate
+from regrasp.perception.rgbd_pose import Rgbd
+from regrasp.perception.technique import TECHNIQUES, Technique, make_technique
 
 CHI2_999_OF_3 = 16.27
 Random = np.random.Generator

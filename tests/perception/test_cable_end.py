@@ -5,7 +5,7 @@ import pytest
 from raycast import IDEAL, MIDDLE_THIRD, PURPLE, RED, WOOD, Ball, Block, Cylinder, Sensor, render
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from perception.cable_end import cable_leaves
+from regrasp.perception.cable_end import cable_leaves
 
 EYE = RigidTransform.identity()
 MIDDLE = np.array([0.0, 0.0, 0.75])

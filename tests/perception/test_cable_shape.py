@@ -3,8 +3,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from interfaces.cell import KnownCell, pose_along
-from perception.cable_shape import cable_course
+from regrasp.interfaces.cell import KnownCell, pose_along
+from regrasp.perception.cable_shape import cable_course
 
 
 def test_the_plugged_cable_is_about_as_long_as_it_is(known: KnownCell) -> None:

@@ -7,10 +7,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from interfaces.frame import Intrinsics
-from perception.calibration import calibrate, find_board, undistorted
-from sim.board import board_pictures, board_poses
-from sim.renderer import RendererName
+from regrasp.interfaces.frame import Intrinsics
+from regrasp.perception.calibration import calibrate, find_board, undistorted
+from regrasp.sim.board import board_pictures, board_poses
+from regrasp.sim.renderer import RendererName
 
 K = Intrinsics.from_fov(848, 480, float(np.deg2rad(65.0)))
 COLUMNS, ROWS, SQUARE = 9, 6, 0.025

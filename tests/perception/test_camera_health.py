@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from interfaces.frame import Intrinsics, RgbdFrame
-from perception.camera_health import REPEATS, STALE, CameraHealth
+from regrasp.interfaces.frame import Intrinsics, RgbdFrame
+from regrasp.perception.camera_health import REPEATS, STALE, CameraHealth
 
 RATE = 15
 

@@ -3,8 +3,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from interfaces.frame import Intrinsics
-from perception.camera_model import deproject, in_view, project, rays, subsampled
+from regrasp.interfaces.frame import Intrinsics
+from regrasp.perception.camera_model import deproject, in_view, project, rays, subsampled
 
 CAMERA = Intrinsics.from_fov(848, 480, np.deg2rad(65.0))
 

@@ -5,8 +5,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from perception import cylinder
-from perception.cylinder import COARSE, Fit, Sight, depth_misses, distance, fit, nearest_on_rays
+from regrasp.perception import cylinder
+from regrasp.perception.cylinder import COARSE, Fit, Sight, depth_misses, distance, fit, nearest_on_rays
 
 Vector = NDArray[np.float64]
 RADIUS, LENGTH = 0.010, 0.09

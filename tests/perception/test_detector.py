@@ -10,12 +10,21 @@ from numpy.typing import NDArray
 from raycast import PURPLE, WOOD, Block, Cylinder, Sensor, render
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from interfaces.cell import KnownCell
-from interfaces.frame import Intrinsics, RgbdFrame
-from perception.camera_model import project
-from perception.detector import LEAST_SIZE, MIN_SCORE, Detector, decode, fitted, network_input, overlap, pixel_sizes
-from perception.estimate import Estimate, NoEstimate
-from perception.segmentation import NotSeen
+from regrasp.interfaces.cell import KnownCell
+from regrasp.interfaces.frame import Intrinsics, RgbdFrame
+from regrasp.perception.camera_model import project
+from regrasp.perception.detector import (
+    LEAST_SIZE,
+    MIN_SCORE,
+    Detector,
+    decode,
+    fitted,
+    network_input,
+    overlap,
+    pixel_sizes,
+)
+from regrasp.perception.estimate import Estimate, NoEstimate
+from regrasp.perception.segmentation import NotSeen
 
 EYE = RigidTransform.identity()  # the camera's optical frame is the world
 MIDDLE = np.array([0.0, 0.0, 0.75])
@@ -49,7 +58,7 @@ def view(*things: Cylinder | Block, seed: int = 1, k: Intrinsics = K) -> RgbdFra
 
 
 def test_the_shipped_network_is_small() -> None:
-    assert len(files("perception").joinpath("detector.onnx").read_bytes()) < 2 * 1024 * 1024
+    assert len(files("regrasp.perception").joinpath("detector.onnx").read_bytes()) < 2 * 1024 * 1024
 
 
 @pytest.mark.parametrize("degrees", [0.0, 30.0, 75.0, 120.0, 165.0])

@@ -13,16 +13,16 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from scipy.stats import chi2
 from tag_scene import CONNECTOR, EYE, KNOWN, TAG, K, TagScene, facing, random_pose
 
-from interfaces.cell import KnownCell
-from interfaces.frame import RgbdFrame
-from perception import fiducial
-from perception.calibration import undistorted
-from perception.camera_model import project
-from perception.estimate import Estimate, NoEstimate
-from perception.fiducial import Fiducial, TagPose, find_tag
-from perception.segmentation import NotSeen
-from perception.technique import make_technique
-from sim.renderer import RendererName
+from regrasp.interfaces.cell import KnownCell
+from regrasp.interfaces.frame import RgbdFrame
+from regrasp.perception import fiducial
+from regrasp.perception.calibration import undistorted
+from regrasp.perception.camera_model import project
+from regrasp.perception.estimate import Estimate, NoEstimate
+from regrasp.perception.fiducial import Fiducial, TagPose, find_tag
+from regrasp.perception.segmentation import NotSeen
+from regrasp.perception.technique import make_technique
+from regrasp.sim.renderer import RendererName
 
 MIDDLE = np.array([0.05, -0.04, 0.75])
 BESIDE = np.array([-0.2, 0.1, 0.9])

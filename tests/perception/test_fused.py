@@ -7,12 +7,12 @@ from numpy.typing import NDArray
 from raycast import BLACK, PURPLE, REAR_POSE, RED, Ball, Block, Cylinder, Sensor
 from scene import LEFTWARDS, PLACE, Thing, blocks, plug, really, seen
 
-from interfaces.cell import KnownCell
-from interfaces.frame import RgbdFrame
-from perception.estimate import Estimate, NoEstimate
-from perception.fused import Fused
-from perception.registration import FIXED
-from perception.segmentation import NotSeen
+from regrasp.interfaces.cell import KnownCell
+from regrasp.interfaces.frame import RgbdFrame
+from regrasp.perception.estimate import Estimate, NoEstimate
+from regrasp.perception.fused import Fused
+from regrasp.perception.registration import FIXED
+from regrasp.perception.segmentation import NotSeen
 
 Vector = NDArray[np.float64]
 DOWN = np.array([0.0, 0.0, -1.0])

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 from scipy.stats import chi2
 
-from interfaces.cell import pose_along
-from perception.estimate import ROLL_VARIANCE, Estimate, pose_covariance
-from perception.fusion import COMMON, FAR, fuse
+from regrasp.interfaces.cell import pose_along
+from regrasp.perception.estimate import ROLL_VARIANCE, Estimate, pose_covariance
+from regrasp.perception.fusion import COMMON, FAR, fuse
 
 FloatArray = NDArray[np.float64]
 PLACE, LEFT = np.array([0.4, 0.1, 0.3]), np.array([0.0, 1.0, 0.0])

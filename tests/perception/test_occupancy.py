@@ -7,9 +7,9 @@ from raycast import BLACK, CONNECTOR, PURPLE, REAR_POSE, RED, WOOD, Block, Cylin
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import RigidTransform
 
-from interfaces.cell import OPTICAL, Box, Connector, pose_along
-from interfaces.frame import Intrinsics
-from perception.occupancy import KNOWN_MARGIN, Occupancy, near_boxes
+from regrasp.interfaces.cell import OPTICAL, Box, Connector, pose_along
+from regrasp.interfaces.frame import Intrinsics
+from regrasp.perception.occupancy import KNOWN_MARGIN, Occupancy, near_boxes
 
 Points = NDArray[np.float64]
 REAR = Intrinsics.from_fov(848, 480, np.deg2rad(65.0))

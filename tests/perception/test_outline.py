@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from perception.outline import Outline, outline
+from regrasp.perception.outline import Outline, outline
 
 BODY, WALL, NEAR = 0.75, 0.87, 0.65  # m
 SHIFT = 665.6 * 0.055

@@ -5,11 +5,11 @@ import pytest
 from raycast import BLACK, PURPLE, REAR_POSE, WOOD, Block, Cylinder, Sensor, render
 from scipy.spatial.transform import RigidTransform
 
-from interfaces.cell import KnownCell
-from interfaces.frame import Intrinsics, RgbdFrame
-from perception.estimate import Estimate, NoEstimate
-from perception.occupancy import Spheres
-from perception.service import Perception
+from regrasp.interfaces.cell import KnownCell
+from regrasp.interfaces.frame import Intrinsics, RgbdFrame
+from regrasp.perception.estimate import Estimate, NoEstimate
+from regrasp.perception.occupancy import Spheres
+from regrasp.perception.service import Perception
 
 PLACE = np.array([0.36, 0.02, 0.30])
 AXIS = np.array([0.1, 1.0, 0.1]) / np.sqrt(1.02)

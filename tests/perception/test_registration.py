@@ -6,9 +6,9 @@ from raycast import PURPLE, REAR_POSE, Block, Sensor
 from scene import PLACE, Thing, blocks, really, seen
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from interfaces.cell import KnownCell
-from interfaces.frame import RgbdFrame
-from perception.registration import CARRIED, FIXED, CameraErrors, Registration, register
+from regrasp.interfaces.cell import KnownCell
+from regrasp.interfaces.frame import RgbdFrame
+from regrasp.perception.registration import CARRIED, FIXED, CameraErrors, Registration, register
 
 DRAWS = 30
 

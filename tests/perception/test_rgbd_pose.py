@@ -7,11 +7,11 @@ from numpy.typing import NDArray
 from raycast import CONNECTOR, MIDDLE_THIRD, PURPLE, REAR_POSE, WOOD, Block, Cylinder, Sensor, render
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from interfaces.cell import KnownCell
-from interfaces.frame import Intrinsics, RgbdFrame
-from perception.estimate import Estimate, NoEstimate
-from perception.rgbd_pose import Rgbd, min_max_axis, n_mean
-from perception.segmentation import NotSeen
+from regrasp.interfaces.cell import KnownCell
+from regrasp.interfaces.frame import Intrinsics, RgbdFrame
+from regrasp.perception.estimate import Estimate, NoEstimate
+from regrasp.perception.rgbd_pose import Rgbd, min_max_axis, n_mean
+from regrasp.perception.segmentation import NotSeen
 
 Vector = NDArray[np.float64]
 EYE = RigidTransform.identity()  # the camera's optical frame is the world

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from interfaces.reading import GripperReading
-from perception.slip import GapTest, distance_slip, seen_at
+from regrasp.interfaces.reading import GripperReading
+from regrasp.perception.slip import GapTest, distance_slip, seen_at
 
 CENTER = np.array([0.3, -0.1, 0.4])
 

@@ -4,8 +4,8 @@ from numpy.typing import NDArray
 from raycast import BLACK, IDEAL, MIDDLE_THIRD, REAR_POSE, WOOD, Block, Cylinder, Sensor, render
 from scipy.spatial.transform import RigidTransform
 
-from interfaces.frame import Intrinsics, RgbdFrame
-from perception.stillness import Stillness
+from regrasp.interfaces.frame import Intrinsics, RgbdFrame
+from regrasp.perception.stillness import Stillness
 
 RATE = 15
 PANEL = Block(np.array([0.508, -3.0, -3.0]), np.array([0.6, 3.0, 3.0]), WOOD)

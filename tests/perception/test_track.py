@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform
 
-from perception.estimate import Estimate, NoEstimate
-from perception.segmentation import NotSeen
-from perception.track import ConnectorTrack, TrackState
+from regrasp.perception.estimate import Estimate, NoEstimate
+from regrasp.perception.segmentation import NotSeen
+from regrasp.perception.track import ConnectorTrack, TrackState
 
 PLACE = np.array([0.4, 0.0, 0.3])
 RATE = 15

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.episode import run_episode
-from app.output import FILES
-from app.record import Result
-from app.scenario_file import load_scenario
-from sim.world import World
+from regrasp.app.episode import run_episode
+from regrasp.app.output import FILES
+from regrasp.app.record import Result
+from regrasp.app.scenario_file import load_scenario
+from regrasp.sim.world import World
 
 REST_SPEED = 0.05  # rad/s: a joint that holds against a swinging cable
 FIELDS = [
@@ -145,7 +145,7 @@ class WatchedWorld(World):
 def test_an_interrupt_in_the_middle_of_a_motion_leaves_the_arms_at_rest_0_3_s_later(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, state: str
 ) -> None:
-    monkeypatch.setattr("app.episode.World", WatchedWorld)
+    monkeypatch.setattr("regrasp.app.episode.World", WatchedWorld)
     stopped: list[float] = []
 
     def progress(now: float, leaf: str) -> None:

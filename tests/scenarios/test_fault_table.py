@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.episode import run_episode
-from app.fault_schema import FAULT_TYPES
-from app.resources import shipped
-from app.scenario_file import load_scenario
-from sim.world import World
+from regrasp.app.episode import run_episode
+from regrasp.app.fault_schema import FAULT_TYPES
+from regrasp.app.resources import shipped
+from regrasp.app.scenario_file import load_scenario
+from regrasp.sim.world import World
 
 FOLDER = "faults/"
 SCENARIOS = [name.removeprefix(FOLDER) for name in shipped("scenario") if name.startswith(FOLDER)]
@@ -21,7 +21,7 @@ REST_SPEED = 0.05  # rad/s: a joint that holds against a swinging cable
 
 def rows() -> dict[str, list[str]]:
     """The table's cells by scenario: fault, begins, notices, does, end."""
-    lines = (files("scenarios") / "FAULTS.md").read_text(encoding="utf-8").splitlines()
+    lines = (files("regrasp.scenarios") / "FAULTS.md").read_text(encoding="utf-8").splitlines()
     cells = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines if line.startswith("|")]
     return {first: rest for first, *rest in cells[2:]}
 

@@ -4,10 +4,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
-from interfaces.trajectory import Trajectory
-from motion.grasps import grasp_candidates
-from motion.kinematics import ArmKinematics, wrap
-from sim.world import World
+from regrasp.interfaces.trajectory import Trajectory
+from regrasp.motion.grasps import grasp_candidates
+from regrasp.motion.kinematics import ArmKinematics, wrap
+from regrasp.sim.world import World
 
 STANDOFF = 0.06  # m before the grasp
 SHALLOW = 0.006  # m nearer to the finger tips: keeps the pads' corners off the panel behind the plug

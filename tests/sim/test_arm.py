@@ -6,12 +6,12 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
-from interfaces.cell import Cell, Errors
-from interfaces.devices import Arm
-from interfaces.scene import EARTH_GRAVITY
-from interfaces.trajectory import Trajectory
-from motion.kinematics import LOWER, UPPER, ArmKinematics
-from sim.arm import BRAKE, ENCODER_STEP, SIGN, SPEED, SimArm
+from regrasp.interfaces.cell import Cell, Errors
+from regrasp.interfaces.devices import Arm
+from regrasp.interfaces.scene import EARTH_GRAVITY
+from regrasp.interfaces.trajectory import Trajectory
+from regrasp.motion.kinematics import LOWER, UPPER, ArmKinematics
+from regrasp.sim.arm import BRAKE, ENCODER_STEP, SIGN, SPEED, SimArm
 
 TRACKING = 0.01  # rad
 STOP_TIME = 0.3  # s

@@ -8,9 +8,9 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_bvp
 
-from interfaces.cell import Cable, Cell
-from interfaces.scene import EARTH_GRAVITY
-from sim.cable import CableBody, build_cable, first_frequency, spring_torques
+from regrasp.interfaces.cell import Cable, Cell
+from regrasp.interfaces.scene import EARTH_GRAVITY
+from regrasp.sim.cable import CableBody, build_cable, first_frequency, spring_torques
 
 DROOP = 0.02  # share of the elastica's droop
 ENERGY_RISE = 0.01  # share of the initial energy

@@ -5,12 +5,12 @@ import pybullet as p
 import pytest
 from scipy.spatial.transform import RigidTransform
 
-from interfaces.cell import CameraSpec, Errors, FixedMount
-from interfaces.devices import Camera
-from sim.camera import SimCamera, camera_error
-from sim.depth_noise import DepthNoise
-from sim.renderer import LightState, make_renderer
-from sim.visuals import Visuals
+from regrasp.interfaces.cell import CameraSpec, Errors, FixedMount
+from regrasp.interfaces.devices import Camera
+from regrasp.sim.camera import SimCamera, camera_error
+from regrasp.sim.depth_noise import DepthNoise
+from regrasp.sim.renderer import LightState, make_renderer
+from regrasp.sim.visuals import Visuals
 
 SPEC = CameraSpec(
     name="wrist",

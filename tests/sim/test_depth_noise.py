@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from interfaces.cell import CameraSpec, Errors, FixedMount
-from sim.depth_noise import DepthNoise, smooth_noise
+from regrasp.interfaces.cell import CameraSpec, Errors, FixedMount
+from regrasp.sim.depth_noise import DepthNoise, smooth_noise
 
 REAR = CameraSpec(
     name="rear",

@@ -9,12 +9,12 @@ import pytest
 from hand import draw, drive, take_hold
 from numpy.typing import NDArray
 
-from app.fault_schema import FAULT_TYPES
-from interfaces.cell import Box, Cell
-from interfaces.frame import RgbdFrame
-from interfaces.scene import Obstacle
-from interfaces.trajectory import Trajectory
-from sim.world import World
+from regrasp.app.fault_schema import FAULT_TYPES
+from regrasp.interfaces.cell import Box, Cell
+from regrasp.interfaces.frame import RgbdFrame
+from regrasp.interfaces.scene import Obstacle
+from regrasp.interfaces.trajectory import Trajectory
+from regrasp.sim.world import World
 
 BLOCK = Obstacle(Box(name="block", center=(0.2, 0.6, 0.1), size=(0.1, 0.1, 0.2)), 0.0, None)
 ON, OFF = 0.5, 1.0  # s: the faults of these tests begin and end then

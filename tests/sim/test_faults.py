@@ -5,11 +5,11 @@ import pytest
 from hand import draw, start_to_draw, take_hold
 from numpy.typing import NDArray
 
-from interfaces.cell import Cell
-from interfaces.fault import AnyFault, JawOpens, PlanningFindsNothing, When
-from sim.fault_effects import Effect
-from sim.faults import Fault, Moments
-from sim.world import World
+from regrasp.interfaces.cell import Cell
+from regrasp.interfaces.fault import AnyFault, JawOpens, PlanningFindsNothing, When
+from regrasp.sim.fault_effects import Effect
+from regrasp.sim.faults import Fault, Moments
+from regrasp.sim.world import World
 
 FloatArray = NDArray[np.float64]
 SHARE = 0.02  # of the way, late: contacts are looked at every 8 ms

@@ -8,8 +8,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from interfaces.cell import Cell
-from sim.fixtures import LIP_TRAVEL, STAND_FORCE, ClipHold, Hold, SocketHold
+from regrasp.interfaces.cell import Cell
+from regrasp.sim.fixtures import LIP_TRAVEL, STAND_FORCE, ClipHold, Hold, SocketHold
 
 RAMP = 2.0  # N/s
 LET_GO = 1.0  # N around the stated force

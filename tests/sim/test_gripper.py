@@ -4,10 +4,10 @@ import numpy as np
 import pybullet as p
 import pytest
 
-from interfaces.cell import Cell
-from interfaces.devices import Gripper
-from sim.arm import SimArm
-from sim.gripper import CLOSED_GAP, SimGripper
+from regrasp.interfaces.cell import Cell
+from regrasp.interfaces.devices import Gripper
+from regrasp.sim.arm import SimArm
+from regrasp.sim.gripper import CLOSED_GAP, SimGripper
 
 GAP = 0.0005  # m
 COUPLING = 0.0005  # m between the fingers' ways

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from interfaces.cell import Box, Cell, FixedMount
-from interfaces.scene import Obstacle
-from sim.ground_truth import GroundTruth
-from sim.world import World
+from regrasp.interfaces.cell import Box, Cell, FixedMount
+from regrasp.interfaces.scene import Obstacle
+from regrasp.sim.ground_truth import GroundTruth
+from regrasp.sim.world import World
 
 
 @pytest.fixture(scope="module")

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from sim.phase import PhaseWatch
+from regrasp.sim.phase import PhaseWatch
 
 START = np.array([0.4, 0.1, 0.4])
 DT = 0.05

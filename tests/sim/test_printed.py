@@ -8,13 +8,13 @@ import pybullet as p
 import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from interfaces.cell import TAG_DICTIONARY, Tag
-from interfaces.frame import Intrinsics
-from sim.board import board_pictures, board_poses
-from sim.picture import LightState
-from sim.printed import tag_boxes, visual
-from sim.renderer import RendererName, make_renderer
-from sim.visuals import Visuals
+from regrasp.interfaces.cell import TAG_DICTIONARY, Tag
+from regrasp.interfaces.frame import Intrinsics
+from regrasp.sim.board import board_pictures, board_poses
+from regrasp.sim.picture import LightState
+from regrasp.sim.printed import tag_boxes, visual
+from regrasp.sim.renderer import RendererName, make_renderer
+from regrasp.sim.visuals import Visuals
 
 K = Intrinsics.from_fov(424, 240, float(np.deg2rad(30.0)))
 LIGHT = LightState((0.3, -0.5, -1.0), 0.45, 0.55)

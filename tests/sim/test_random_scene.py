@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
-from interfaces.cell import Cell
-from sim.random_scene import RandomScene, Shot
-from sim.random_things import rearranged
-from sim.renderer import RendererName
+from regrasp.interfaces.cell import Cell
+from regrasp.sim.random_scene import RandomScene, Shot
+from regrasp.sim.random_things import rearranged
+from regrasp.sim.renderer import RendererName
 
 RENDERERS: tuple[RendererName, ...] = ("moderngl", "tiny")
 

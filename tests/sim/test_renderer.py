@@ -9,14 +9,14 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from interfaces.cell import OPTICAL
-from interfaces.frame import Intrinsics
-from sim.gl_renderer import GlRenderer
-from sim.meshes import corners
-from sim.renderer import Image, LightState, Renderer, make_renderer
-from sim.robot_model import robot_urdf
-from sim.tiny_renderer import TinyRenderer
-from sim.visuals import Visuals
+from regrasp.interfaces.cell import OPTICAL
+from regrasp.interfaces.frame import Intrinsics
+from regrasp.sim.gl_renderer import GlRenderer
+from regrasp.sim.meshes import corners
+from regrasp.sim.renderer import Image, LightState, Renderer, make_renderer
+from regrasp.sim.robot_model import robot_urdf
+from regrasp.sim.tiny_renderer import TinyRenderer
+from regrasp.sim.visuals import Visuals
 
 K = Intrinsics.from_fov(424, 240, np.deg2rad(65.0))
 LIGHT = LightState((-0.5, 0.3, 1.0), 0.45, 0.55)

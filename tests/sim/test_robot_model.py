@@ -9,10 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import RigidTransform
 
-from motion.kinematics import ArmKinematics
-from perception.occupancy import DARK
-from sim.arm import JOINTS, SIGN
-from sim.robot_model import ARM_COLOR, CAMERA_SIZE, finger_position, pad_gap, robot_urdf
+from regrasp.motion.kinematics import ArmKinematics
+from regrasp.perception.occupancy import DARK
+from regrasp.sim.arm import JOINTS, SIGN
+from regrasp.sim.robot_model import ARM_COLOR, CAMERA_SIZE, finger_position, pad_gap, robot_urdf
 
 PAD = 0.006  # m
 OFFSET = (0.02, 0.0, 0.06)  # m

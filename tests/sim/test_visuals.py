@@ -8,11 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from interfaces.frame import Intrinsics
-from sim import tiny_renderer
-from sim.picture import FAR, NEAR, LightState
-from sim.tiny_renderer import TinyRenderer
-from sim.visuals import Visuals
+from regrasp.interfaces.frame import Intrinsics
+from regrasp.sim import tiny_renderer
+from regrasp.sim.picture import FAR, NEAR, LightState
+from regrasp.sim.tiny_renderer import TinyRenderer
+from regrasp.sim.visuals import Visuals
 
 OFFSET_URDF = """<robot name="offset">
 <link name="base">

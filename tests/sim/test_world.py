@@ -14,11 +14,11 @@ from hand import drive, kinematics, nearest, take_hold
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from interfaces.cell import Box, Cell
-from interfaces.devices import Clock
-from interfaces.scene import Obstacle, Prop
-from sim.ground_truth import GroundTruth
-from sim.world import World
+from regrasp.interfaces.cell import Box, Cell
+from regrasp.interfaces.devices import Clock
+from regrasp.interfaces.scene import Obstacle, Prop
+from regrasp.sim.ground_truth import GroundTruth
+from regrasp.sim.world import World
 
 DRIFT = 1e-4  # m in 3 s
 CREEP = 1e-3  # m in 2 s

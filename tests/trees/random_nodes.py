@@ -5,8 +5,8 @@ from typing import Any
 
 from hypothesis import strategies as st
 
-from trees import Node, NodeStats
-from trees.graph import Port
+from regrasp.trees import Node, NodeStats
+from regrasp.trees.graph import Port
 
 TEXTS = st.text(st.characters(codec="utf-8", exclude_categories=["Cc", "Cs", "Zl", "Zp"]), max_size=80)
 _PORT = st.builds(

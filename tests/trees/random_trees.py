@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from py_trees.common import Status
 from py_trees.ports import BehaviourWithPorts, PortInformation
 
-from trees.vocabulary import BUILT_IN
+from regrasp.trees.vocabulary import BUILT_IN
 
 Ports = dict[str, PortInformation]
 STATUSES = [Status.SUCCESS, Status.FAILURE, Status.RUNNING]

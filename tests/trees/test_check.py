@@ -13,8 +13,8 @@ from py_trees.common import Status
 from py_trees.ports import BehaviourWithPorts, NoDataAvailable, PortInformation
 from toy_leaves import GOOD, LEAVES
 
-from trees import check_tree, load_tree
-from trees.check import MOST_FINDINGS
+from regrasp.trees import check_tree, load_tree
+from regrasp.trees.check import MOST_FINDINGS
 
 
 @pytest.fixture(autouse=True)

@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from random_nodes import nodes
 from test_golden import features, features_with_run
 
-import trees
-from trees import Node, read_graph
-from trees.export import FORMATS, SUFFIXES, export_tree
+from regrasp import trees
+from regrasp.trees import Node, read_graph
+from regrasp.trees.export import FORMATS, SUFFIXES, export_tree
 
 # BehaviorTree.CPP's own nodes that we write; all others must be in the model.
 BUILT_IN = {

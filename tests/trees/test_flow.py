@@ -11,7 +11,7 @@ from py_trees.parsers.behaviour_tree_xml import parse_behaviour_tree_xml
 from py_trees.ports import NoDataAvailable
 from random_trees import LEAVES, Dice, trees
 
-from trees import check_tree
+from regrasp.trees import check_tree
 
 
 def line_of(name: str) -> int:

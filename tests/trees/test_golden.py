@@ -8,9 +8,9 @@ import pytest
 from numpy.typing import NDArray
 from toy_leaves import LEAVES
 
-import trees
-from trees import Node, check_tree, collapsed, read_graph, recorded, run_stats
-from trees.export import FORMATS, export_tree
+from regrasp import trees
+from regrasp.trees import Node, check_tree, collapsed, read_graph, recorded, run_stats
+from regrasp.trees.export import FORMATS, export_tree
 
 GOLDEN = Path(__file__).parent / "golden"
 FEATURES = GOLDEN / "features.xml"

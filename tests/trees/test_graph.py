@@ -8,7 +8,7 @@ from random_nodes import nodes
 from test_golden import CHAIN, FEATURES, features, features_with_run
 from toy_leaves import LEAVES
 
-from trees import Node, collapsed, load_tree, node_paths, read_graph, run_stats
+from regrasp.trees import Node, collapsed, load_tree, node_paths, read_graph, run_stats
 
 
 def by_path(root: Node) -> dict[str, Node]:

@@ -3,8 +3,8 @@ from pathlib import Path
 import pytest
 from toy_leaves import LEAVES
 
-from app.resources import shipped
-from trees import check_inputs
+from regrasp.app.resources import shipped
+from regrasp.trees import check_inputs
 
 TREE = """\
 <root main_tree_to_execute="Main">

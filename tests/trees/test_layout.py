@@ -3,8 +3,8 @@ from itertools import combinations
 from hypothesis import given
 from random_nodes import nodes
 
-from trees import Node
-from trees.export.layout import GAP_X, Box, lay_out
+from regrasp.trees import Node
+from regrasp.trees.export.layout import GAP_X, Box, lay_out
 
 SIZES = {"sequence": (60.0, 26.0), "decorator": (180.0, 40.0), "condition": (20.0, 80.0), "subtree": (300.0, 27.0)}
 

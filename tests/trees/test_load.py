@@ -6,7 +6,7 @@ import pytest
 from py_trees.common import Status
 from toy_leaves import GOOD, LEAVES
 
-from trees import TreeError, load_tree, node_paths
+from regrasp.trees import TreeError, load_tree, node_paths
 
 
 @pytest.fixture(autouse=True)

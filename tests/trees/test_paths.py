@@ -3,7 +3,7 @@ from pathlib import Path
 import py_trees
 from toy_leaves import GOOD, LEAVES
 
-from trees import in_tree_order, load_tree, node_paths
+from regrasp.trees import in_tree_order, load_tree, node_paths
 
 
 def test_paths_hold_subtree_names_and_follow_tree_order(tmp_path: Path) -> None:

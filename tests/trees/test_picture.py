@@ -7,11 +7,11 @@ from hypothesis import given, settings
 from random_nodes import TEXTS, nodes
 from test_golden import features, features_with_run
 
-from trees import Node, collapsed
-from trees.export import THEMES, export_tree
-from trees.export.picture import picture
-from trees.export.scene import Rect, Text
-from trees.export.text_width import shortened, text_width
+from regrasp.trees import Node, collapsed
+from regrasp.trees.export import THEMES, export_tree
+from regrasp.trees.export.picture import picture
+from regrasp.trees.export.scene import Rect, Text
+from regrasp.trees.export.text_width import shortened, text_width
 
 LIGHT, SVG = THEMES["light"], "{http://www.w3.org/2000/svg}"
 ASCII = "".join(map(chr, range(32, 127)))

@@ -9,7 +9,7 @@ from textwrap import dedent
 import pytest
 from py_trees.common import Status
 
-from trees.scripted import ScriptedTree
+from regrasp.trees.scripted import ScriptedTree
 
 # After the first try the hand holds nothing; a safe stop fails by design.
 USUAL = {"Holding": "success, failure", "SafeStop": "2 failure"}

@@ -12,10 +12,10 @@ from py_trees.behaviours import Failure, Running, Success
 from py_trees.common import Status
 from random_trees import LEAVES, Dice, trees
 
-from app.attempts import Attempts
-from app.tick_log import TickLog
-from app.tried import told_by_ticks
-from trees import Execution, TreeError, executions, load_tree, run_stats
+from regrasp.app.attempts import Attempts
+from regrasp.app.tick_log import TickLog
+from regrasp.app.tried import told_by_ticks
+from regrasp.trees import Execution, TreeError, executions, load_tree, run_stats
 
 TICK = 0.05
 

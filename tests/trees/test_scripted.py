@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from py_trees.common import Status
 from toy_leaves import GOOD, LEAVES
 
-from trees import TreeError
-from trees.scripted import Act, ScriptedTree, leaves_named_in, parse_script
+from regrasp.trees import TreeError
+from regrasp.trees.scripted import Act, ScriptedTree, leaves_named_in, parse_script
 
 Make = Callable[..., ScriptedTree]
 

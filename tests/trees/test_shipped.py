@@ -5,8 +5,8 @@ from pathlib import Path
 import py_trees
 import pytest
 
-import trees
-from trees import check_tree, load_tree, node_paths, show_tree
+from regrasp import trees
+from regrasp.trees import check_tree, load_tree, node_paths, show_tree
 
 SHIPPED = sorted(Path(trees.__file__).parent.glob("*.xml"))
 
@@ -15,7 +15,7 @@ every_tree = pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem
 
 @every_tree
 def test_a_shipped_tree_is_clean_loads_and_is_shown_in_full(path: Path) -> None:
-    from behaviors import LEAVES
+    from regrasp.behaviors import LEAVES
 
     assert check_tree(path) == []
     root = load_tree(path, LEAVES)

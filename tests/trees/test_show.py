@@ -2,7 +2,7 @@ from pathlib import Path
 
 from toy_leaves import GOOD
 
-from trees import show_tree
+from regrasp.trees import show_tree
 
 
 def test_a_tree_is_drawn_with_names_types_memory_and_ports(tmp_path: Path) -> None:

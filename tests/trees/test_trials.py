@@ -7,7 +7,7 @@ from py_trees.decorators import Decorator
 from py_trees.ports import PortsMixin
 from toy_leaves import GOOD, LEAVES
 
-from trees.trials import left_by_a_stop, never_ends, trials
+from regrasp.trees.trials import left_by_a_stop, never_ends, trials
 
 TREE = '<root main_tree_to_execute="M"><BehaviorTree ID="M">{}</BehaviorTree></root>'
 TWO = '<Sequence name="root" memory="true"><Wait name="a" ticks="1"/><Wait name="b" ticks="1"/></Sequence>'

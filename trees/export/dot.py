@@ -2,9 +2,9 @@
 
 from collections.abc import Iterator, Mapping
 
-from trees.export.labels import details, heading, identifiers, links, tooltip
-from trees.export.themes import Theme, colour_of
-from trees.graph import Node
+from regrasp.trees.export.labels import details, heading, identifiers, links, tooltip
+from regrasp.trees.export.themes import Theme, colour_of
+from regrasp.trees.graph import Node
 
 
 def to_dot(root: Node, theme: Theme) -> str:

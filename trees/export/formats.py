@@ -2,18 +2,18 @@
 
 from collections.abc import Callable
 
-from trees.export.dot import to_dot
-from trees.export.groot import to_groot
-from trees.export.json_text import to_json
-from trees.export.mermaid import to_mermaid
-from trees.export.svg import to_svg
-from trees.export.themes import THEMES, Theme
-from trees.graph import Node
-from trees.show import to_ascii
+from regrasp.trees.export.dot import to_dot
+from regrasp.trees.export.groot import to_groot
+from regrasp.trees.export.json_text import to_json
+from regrasp.trees.export.mermaid import to_mermaid
+from regrasp.trees.export.svg import to_svg
+from regrasp.trees.export.themes import THEMES, Theme
+from regrasp.trees.graph import Node
+from regrasp.trees.show import to_ascii
 
 
 def _png(root: Node, theme: Theme) -> bytes:
-    from trees.export.png import to_png  # late: OpenCV takes a moment
+    from regrasp.trees.export.png import to_png  # late: OpenCV takes a moment
 
     return to_png(root, theme)
 

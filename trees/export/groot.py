@@ -7,7 +7,7 @@ keys become ports of its model; those of the main tree, which nobody calls, are 
 
 from xml.etree import ElementTree as ET
 
-from trees.graph import Node, Port
+from regrasp.trees.graph import Node, Port
 
 _BUILT_IN = {"ForceFailure", "ForceSuccess", "Inverter", "Repeat", "RetryUntilSuccessful", "RunOnce"}
 _RENAMED = {

@@ -1,8 +1,8 @@
 """The little sign of each kind of node, drawn in lines: no font has to have it."""
 
-from trees.export.scene import Lines, Point, Rect, Shape, Text
-from trees.export.text_width import text_width
-from trees.graph import Node
+from regrasp.trees.export.scene import Lines, Point, Rect, Shape, Text
+from regrasp.trees.export.text_width import text_width
+from regrasp.trees.graph import Node
 
 ICON = 18.0  # px, square
 _STAR = 7.0  # px that the star of memory adds to the width

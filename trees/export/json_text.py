@@ -20,7 +20,7 @@ import json
 from dataclasses import asdict
 from typing import Any
 
-from trees.graph import Node
+from regrasp.trees.graph import Node
 
 
 def to_json(root: Node) -> str:

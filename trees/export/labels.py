@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from trees.graph import Kind, Node
+from regrasp.trees.graph import Kind, Node
 
 SYMBOLS: dict[Kind, str] = {"sequence": "→", "fallback": "?", "parallel": "⇉", "decorator": "δ"}
 

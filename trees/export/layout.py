@@ -11,7 +11,7 @@ Lying on its side a tree of 60 nodes has about the shape of a screen, since name
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
-from trees.graph import Node
+from regrasp.trees.graph import Node
 
 GAP_X = 34.0  # px between a box and its children, room for the links
 GAP_Y = 6.0  # px between siblings

@@ -2,9 +2,9 @@
 
 from collections.abc import Iterator, Mapping
 
-from trees.export.labels import details, heading, identifiers, links
-from trees.export.themes import THEMES
-from trees.graph import Kind, Node
+from regrasp.trees.export.labels import details, heading, identifiers, links
+from regrasp.trees.export.themes import THEMES
+from regrasp.trees.graph import Kind, Node
 
 _SHAPES: dict[Kind, tuple[str, str]] = {"decorator": ("{{", "}}"), "action": ("(", ")"), "condition": ("([", "])")}
 _LIGHT = THEMES["light"]  # every node brings its colours, so that it is read on a dark page too

@@ -3,14 +3,14 @@
 from dataclasses import replace
 from typing import get_args
 
-from trees.export.icons import ICON, icon, icon_width
-from trees.export.labels import details, tooltip
-from trees.export.layout import Box, lay_out
-from trees.export.scene import Curve, Group, Rect, Scene, Shape, Text
-from trees.export.text_width import shortened, text_width
-from trees.export.themes import Theme, colour_of
-from trees.graph import Kind, Node
-from trees.run_stats import NodeStats
+from regrasp.trees.export.icons import ICON, icon, icon_width
+from regrasp.trees.export.labels import details, tooltip
+from regrasp.trees.export.layout import Box, lay_out
+from regrasp.trees.export.scene import Curve, Group, Rect, Scene, Shape, Text
+from regrasp.trees.export.text_width import shortened, text_width
+from regrasp.trees.export.themes import Theme, colour_of
+from regrasp.trees.graph import Kind, Node
+from regrasp.trees.run_stats import NodeStats
 
 NAME, SMALL = 13.0, 10.5  # px, font sizes
 MAX_TEXT = 250.0  # px; what is longer is cut, and whole in the tooltip

@@ -4,10 +4,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from trees.export.picture import picture
-from trees.export.scene import Curve, Lines, Rect, Scene, Shape, Text
-from trees.export.themes import Theme
-from trees.graph import Node
+from regrasp.trees.export.picture import picture
+from regrasp.trees.export.scene import Curve, Lines, Rect, Scene, Shape, Text
+from regrasp.trees.export.themes import Theme
+from regrasp.trees.graph import Node
 
 _MAX_PIXELS = 60e6  # of a very large tree the picture gets coarser
 _SHIFT = 4  # bits below the pixel in OpenCV's coordinates

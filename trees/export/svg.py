@@ -2,10 +2,10 @@
 
 from xml.sax.saxutils import escape, quoteattr
 
-from trees.export.picture import picture
-from trees.export.scene import Curve, Group, Lines, Rect, Scene, Shape
-from trees.export.themes import Theme
-from trees.graph import Node
+from regrasp.trees.export.picture import picture
+from regrasp.trees.export.scene import Curve, Group, Lines, Rect, Scene, Shape
+from regrasp.trees.export.themes import Theme
+from regrasp.trees.graph import Node
 
 _FONTS = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, 'DejaVu Sans', sans-serif"
 

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from trees.graph import Kind, Node
+from regrasp.trees.graph import Kind, Node
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,1 @@
+"""Behaviour-tree autonomy that anyone can run, test and measure."""
