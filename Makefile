@@ -31,10 +31,10 @@ bench: setup
 	$(BIN)/python -m regrasp.app.bench
 
 fuzz: setup
-	$(BIN)/python tests/app/fuzz_readers.py --cases 2000
+	$(BIN)/python tests/support/fuzz_readers.py --cases 2000
 
 readme: setup
-	$(BIN)/python tests/app/readme_commands.py
+	$(BIN)/python tests/support/readme_commands.py
 
 guard: setup
 	$(BIN)/python tests/guard/run_guard.py check

@@ -13,8 +13,8 @@ from hypothesis import settings
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.cell import Box, Cell, KnownCell
-from regrasp.motion.collision import CollisionModel
-from regrasp.motion.kinematics import ArmKinematics
+from regrasp.motion.robots.kinematics import ArmKinematics
+from regrasp.motion.scene.collision import CollisionModel
 
 pytest_plugins = ["pytester", "regrasp.app.pytest_plugin"]
 

@@ -21,7 +21,7 @@ def main() -> None:
 def _run() -> None:
     try:
         try:
-            from regrasp.app.cli import app  # takes a moment, in which Ctrl-C may come
+            from regrasp.app.cli.commands import app  # takes a moment, in which Ctrl-C may come
 
             app()
         finally:

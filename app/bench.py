@@ -13,23 +13,24 @@ from numpy.typing import NDArray
 from py_trees.parsers.behaviour_tree_xml import parse_behaviour_tree_xml
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from regrasp.app.attempts import Attempts
-from regrasp.app.resources import shipped
-from regrasp.app.scenario_file import load_cell, load_scenario
-from regrasp.app.table import print_table
-from regrasp.app.tick_log import TickLog
+from regrasp.app.files.resources import shipped
+from regrasp.app.run.attempts import Attempts
+from regrasp.app.run.tick_log import TickLog
+from regrasp.app.scenario.cell_file import load_cell
+from regrasp.app.scenario.load import load_scenario
+from regrasp.app.studies.table import print_table
 from regrasp.behaviors import LEAVES
 from regrasp.interfaces.cell import TAG_DICTIONARY, Cell
 from regrasp.interfaces.frame import RgbdFrame
-from regrasp.perception.detector import Detector, fitted, network_input, pixel_sizes, shipped_network
-from regrasp.perception.estimate import NoEstimate
-from regrasp.perception.fused import Fused
-from regrasp.perception.registration import FIXED, register
-from regrasp.perception.rgbd_pose import Rgbd
-from regrasp.perception.segmentation import SegmentationParameters, color_mask
-from regrasp.perception.technique import make_technique
-from regrasp.sim.cable import spring_torques
-from regrasp.sim.renderer import make_renderer
+from regrasp.perception.camera.registration import FIXED, register
+from regrasp.perception.pose.detector import Detector, fitted, network_input, pixel_sizes, shipped_network
+from regrasp.perception.pose.estimate import NoEstimate
+from regrasp.perception.pose.fused.fused import Fused
+from regrasp.perception.pose.rgbd import Rgbd
+from regrasp.perception.pose.segmentation import SegmentationParameters, color_mask
+from regrasp.perception.pose.technique import make_technique
+from regrasp.sim.cable.cable import spring_torques
+from regrasp.sim.render.renderer import make_renderer
 from regrasp.sim.world import World
 from regrasp.trees import check_tree
 from regrasp.trees.scripted import ScriptedTree

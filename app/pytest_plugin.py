@@ -36,8 +36,8 @@ import pytest
 
 # Everything of Regrasp comes late: a pytest that collects nothing of ours must not wait for it.
 if TYPE_CHECKING:
-    from regrasp.app.record import Result
-    from regrasp.app.scenario_file import Scenario
+    from regrasp.app.records.result import Result
+    from regrasp.app.scenario.load import Scenario
     from regrasp.trees.scripted import ScriptedTree
 
 SCENARIO, TREE = ".scenario.yaml", ".tree.xml"
@@ -72,7 +72,7 @@ def pytest_configure(config: pytest.Config) -> None:
             f"--scenario-wall-limit {limit:g} is no limit; write seconds of at least 1, such as 600"
         )
     if records is not None:
-        from regrasp.app.output import findings
+        from regrasp.app.records.folders import findings
 
         for finding in findings(records):
             raise pytest.UsageError(f"--scenario-records: {finding}")
@@ -109,8 +109,8 @@ class ScenarioSuite(pytest.File):
 
     def collect(self) -> Iterator[pytest.Item]:
         """The cases. Raises `CollectError` with a line for each finding in the file."""
-        from regrasp.app.findings import Findings
-        from regrasp.app.scenario_file import cases
+        from regrasp.app.files.findings import Findings
+        from regrasp.app.scenario.load import cases
 
         try:
             found = cases(str(self.path), _overrides(self.config.getoption("--scenario-seed")))
@@ -153,8 +153,8 @@ class ScenarioCase(_Item):
 
     def runtest(self) -> None:
         """Run it in a process of its own. Raises `Failed` with the explanation when it did not come out as expected."""
-        from regrasp.app.batch import Run, result_of
-        from regrasp.app.processes import run_each
+        from regrasp.app.run.batch import Run, result_of
+        from regrasp.app.run.processes import run_each
 
         folder = self._folder()
         self.user_properties += [("seed", self.scenario.file.seed), ("record", str(folder))]
@@ -170,7 +170,7 @@ class ScenarioCase(_Item):
 
     def _folder(self) -> Path:
         """A new folder for the record."""
-        from regrasp.app.output import new_folder
+        from regrasp.app.records.folders import new_folder
 
         kept: Path | None = self.config.getoption("--scenario-records")
         name = f"{self.path.name.removesuffix(SCENARIO)}-{self.name}"
@@ -182,14 +182,14 @@ class ScenarioCase(_Item):
 
 def _run(scenario: Scenario, folder: Path) -> Result:
     """In the case's process, the only one that needs the physics."""
-    from regrasp.app.episode import run_episode
+    from regrasp.app.run.episode import run_episode
 
     return run_episode(scenario, folder, seed=scenario.file.seed)
 
 
 def _explained(folder: Path) -> str:
-    from regrasp.app.explain import REPORT_WIDTH, explanation
-    from regrasp.app.record_reader import read_record
+    from regrasp.app.records.explain import REPORT_WIDTH, explanation
+    from regrasp.app.records.reader import read_record
 
     return f"{explanation(read_record(folder), REPORT_WIDTH)}\nrecord  {folder}"
 
@@ -199,8 +199,8 @@ class TreeFile(pytest.File):
 
     def collect(self) -> Iterator[pytest.Item]:
         """Its two tests. Raises `CollectError` with a line for each finding in the file."""
-        from regrasp.app.findings import Findings
-        from regrasp.app.scenario_file import check_tree_file
+        from regrasp.app.files.findings import Findings
+        from regrasp.app.scenario.load import check_tree_file
         from regrasp.trees.trials import left_by_a_stop, never_ends
 
         try:
@@ -235,7 +235,7 @@ def scripted_tree() -> Iterator[Callable[..., ScriptedTree]]:
     """Makes a tree of scripted leaves by a tree file or a shipped tree's name; arguments: `regrasp.trees.scripted`."""
     from py_trees.blackboard import Blackboard
 
-    from regrasp.app.resources import resolve
+    from regrasp.app.files.resources import resolve
     from regrasp.trees.scripted import ScriptedTree
 
     def make(tree: str | Path, script: dict[str, str] | None = None, **options: Any) -> ScriptedTree:

@@ -1,20 +1,20 @@
 """py_trees leaves, one module per state of the task. `LEAVES` is what a tree file may name."""
 
-from regrasp.behaviors.carry import Carry, Insert
-from regrasp.behaviors.check_cameras import CheckCameras
-from regrasp.behaviors.detect_slip import DetectSlip
-from regrasp.behaviors.holding import Holding
+from regrasp.behaviors.cable.carry import Carry, Insert
+from regrasp.behaviors.cable.detect_slip import DetectSlip
+from regrasp.behaviors.cable.look_closer import LookCloser
+from regrasp.behaviors.cable.monitor import Monitor
+from regrasp.behaviors.cable.recover import MakeRoom, WaitUntilStill
+from regrasp.behaviors.cable.regrasp import Regrasp
+from regrasp.behaviors.cable.spiral_search import SpiralSearch
+from regrasp.behaviors.cable.stow import LetGo, LookAtStow
+from regrasp.behaviors.cable.unplug import Unplug
+from regrasp.behaviors.common.check_cameras import CheckCameras
+from regrasp.behaviors.common.holding import Holding
+from regrasp.behaviors.common.safe_stop import SafeStop
+from regrasp.behaviors.common.start_up import StartUp
+from regrasp.behaviors.common.use_technique import UseTechnique
 from regrasp.behaviors.leaf import Leaf
-from regrasp.behaviors.look_closer import LookCloser
-from regrasp.behaviors.monitor import Monitor
-from regrasp.behaviors.recover import MakeRoom, WaitUntilStill
-from regrasp.behaviors.regrasp import Regrasp
-from regrasp.behaviors.safe_stop import SafeStop
-from regrasp.behaviors.spiral_search import SpiralSearch
-from regrasp.behaviors.start_up import StartUp
-from regrasp.behaviors.stow import LetGo, LookAtStow
-from regrasp.behaviors.unplug import Unplug
-from regrasp.behaviors.use_technique import UseTechnique
 
 LEAVES: dict[str, type[Leaf]] = {
     leaf.__name__: leaf

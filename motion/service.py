@@ -16,17 +16,17 @@ from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.cell import KnownCell
 from regrasp.interfaces.devices import Arm, Clock, Gripper
 from regrasp.interfaces.trajectory import Trajectory
-from regrasp.motion.arm_offsets import joint_offsets
-from regrasp.motion.arm_watch import ArmWatch, rest_of
-from regrasp.motion.bodies import NO_POINTS, Bodies
-from regrasp.motion.cable_path import natural_ways
-from regrasp.motion.collision import CollisionModel
 from regrasp.motion.failure import PlanningError
-from regrasp.motion.grasps import choose_grasp, grasp_candidates
-from regrasp.motion.kinematics import ArmKinematics
-from regrasp.motion.planner import plan
-from regrasp.motion.spheres import JAW_OPENING
-from regrasp.motion.straight import straight_line
+from regrasp.motion.grasping.grasps import choose_grasp, grasp_candidates
+from regrasp.motion.planning.cable_path import natural_ways
+from regrasp.motion.planning.planner import plan
+from regrasp.motion.planning.straight import straight_line
+from regrasp.motion.robots.arm_offsets import joint_offsets
+from regrasp.motion.robots.arm_watch import ArmWatch, rest_of
+from regrasp.motion.robots.kinematics import ArmKinematics
+from regrasp.motion.robots.spheres import JAW_OPENING
+from regrasp.motion.scene.bodies import NO_POINTS, Bodies
+from regrasp.motion.scene.collision import CollisionModel
 from regrasp.motion.task import Task
 
 FloatArray = NDArray[np.float64]
@@ -201,7 +201,9 @@ class Motion(Bodies):
         return self._out_of_order[arm]
 
     def _follow(self, arm: str, path: FloatArray, speed: float) -> Iterator[None]:
-        from regrasp.motion.timing import time_path  # late: it brings matplotlib, which a tree's check does not need
+        from regrasp.motion.planning.timing import (
+            time_path,  # late: it brings matplotlib, which a tree's check does not need
+        )
 
         alone = self._watches[arm].moved_alone(self.arms[arm].reading())
         if alone is not None:

@@ -12,14 +12,14 @@ from scipy.spatial.transform import RigidTransform
 from regrasp.interfaces.cell import KnownCell
 from regrasp.interfaces.devices import Camera, Clock
 from regrasp.interfaces.frame import RgbdFrame
-from regrasp.perception.camera_health import CameraHealth
-from regrasp.perception.camera_model import NEAREST, rays
-from regrasp.perception.estimate import Estimate, NoEstimate
-from regrasp.perception.occupancy import ASSUMED_DEPTH, Occupancy, Spheres
-from regrasp.perception.registration import Registration, expected_errors, register
-from regrasp.perception.segmentation import NotSeen
-from regrasp.perception.technique import TechniqueName, make_technique
-from regrasp.perception.track import ConnectorTrack
+from regrasp.perception.camera.health import CameraHealth
+from regrasp.perception.camera.model import NEAREST, rays
+from regrasp.perception.camera.registration import Registration, expected_errors, register
+from regrasp.perception.mapping.occupancy import ASSUMED_DEPTH, Occupancy, Spheres
+from regrasp.perception.pose.estimate import Estimate, NoEstimate
+from regrasp.perception.pose.segmentation import NotSeen
+from regrasp.perception.pose.technique import TechniqueName, make_technique
+from regrasp.perception.tracking.track import ConnectorTrack
 
 # Where obstacles may matter: the space that the arms share with the cable.
 VOXEL = 0.010  # m; obstacles stand within 0.1 of the connector, and a hand must pass between

@@ -8,9 +8,9 @@ from scipy.spatial.transform import RigidTransform, Rotation, Slerp
 
 from regrasp.interfaces.cell import Box, HiddenWorld, KnownCell, Socket
 from regrasp.interfaces.scene import EARTH_GRAVITY, Gravity, Obstacle, Prop
-from regrasp.sim.cable import CableBody
-from regrasp.sim.fixtures import Hold
-from regrasp.sim.printed import tag_boxes, visual
+from regrasp.sim.cable.cable import CableBody
+from regrasp.sim.cable.fixtures import Hold
+from regrasp.sim.render.printed import tag_boxes, visual
 
 LAY_SECONDS, SETTLE_SECONDS = 1.5, 2.5  # the cable is drawn from straight into its socket, then comes to rest
 BOX_FRICTION = 0.5

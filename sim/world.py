@@ -14,17 +14,17 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from regrasp.interfaces.cell import Cell, WristMount
 from regrasp.interfaces.fault import AnyFault
 from regrasp.interfaces.scene import Gravity, Obstacle, Prop
-from regrasp.sim.arm import SimArm
 from regrasp.sim.build import OUT_OF_SIGHT, build_boxes, build_props, configure, filter_collisions, lay_cable
-from regrasp.sim.cable import CableBody, build_cable
-from regrasp.sim.camera import SimCamera, camera_error
-from regrasp.sim.depth_noise import DepthNoise
-from regrasp.sim.fault_effects import effect_of
-from regrasp.sim.faults import Fault, Moments
-from regrasp.sim.fixtures import STAND_FORCE, ClipHold, SocketHold
-from regrasp.sim.phase import PhaseWatch
-from regrasp.sim.renderer import LightState, RendererName, make_renderer
-from regrasp.sim.visuals import Visuals
+from regrasp.sim.cable.cable import CableBody, build_cable
+from regrasp.sim.cable.fixtures import STAND_FORCE, ClipHold, SocketHold
+from regrasp.sim.cable.phase import PhaseWatch
+from regrasp.sim.cameras.camera import SimCamera, camera_error
+from regrasp.sim.cameras.depth_noise import DepthNoise
+from regrasp.sim.faults.effects import effect_of
+from regrasp.sim.faults.faults import Fault, Moments
+from regrasp.sim.render.renderer import LightState, RendererName, make_renderer
+from regrasp.sim.render.visuals import Visuals
+from regrasp.sim.robot.arm import SimArm
 
 FloatArray = NDArray[np.float64]
 CONTACT_EVERY = 4  # physics steps between looks at the arms' contacts

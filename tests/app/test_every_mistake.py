@@ -9,8 +9,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from toy_scenario import write_scenario
 
-from regrasp.app.findings import Findings
-from regrasp.app.scenario_file import cases
+from regrasp.app.files.findings import Findings
+from regrasp.app.scenario.load import cases
 
 LINES = """\
 description: a foam block hides the end of the cable

@@ -13,13 +13,13 @@ from typing import Any
 
 import pytest
 
-from regrasp.app.batch import Run, result_of
-from regrasp.app.explain import explanation
 from regrasp.app.interrupts import BURST
-from regrasp.app.processes import Done, run_each
-from regrasp.app.record import AT_WORK, Record, leaf_at_work
-from regrasp.app.record_reader import read_record
-from regrasp.app.scenario_file import load_scenario
+from regrasp.app.records.explain import explanation
+from regrasp.app.records.reader import read_record
+from regrasp.app.records.record import AT_WORK, Record, leaf_at_work
+from regrasp.app.run.batch import Run, result_of
+from regrasp.app.run.processes import Done, run_each
+from regrasp.app.scenario.load import load_scenario
 
 ROOT = Path(__file__).parents[2]
 PATIENCE = 120.0  # s
@@ -176,7 +176,7 @@ def answer() -> int:
 
 
 def test_a_task_that_takes_too_long_is_stopped_and_the_others_go_on(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("regrasp.app.processes.GRACE", 0.5)
+    monkeypatch.setattr("regrasp.app.run.processes.GRACE", 0.5)
     with closing(run_each([hang, answer, hang_deaf], 3, wall_limit=20.0)) as ended:
         done = sorted(ended)
     assert [(one.value, one.timed_out) for one in done] == [(None, True), (7, False), (None, True)]

@@ -7,10 +7,11 @@ import pytest
 from toy_scenario import SCENARIO, TREE, write_scenario
 from typer.testing import CliRunner
 
-from regrasp.app.cli import app
-from regrasp.app.findings import Findings
-from regrasp.app.resources import shipped
-from regrasp.app.scenario_file import cases, check_tree_file, load_cell
+from regrasp.app.cli.commands import app
+from regrasp.app.files.findings import Findings
+from regrasp.app.files.resources import shipped
+from regrasp.app.scenario.cell_file import load_cell
+from regrasp.app.scenario.load import cases, check_tree_file
 from regrasp.interfaces.quote import MOST
 
 LONG = ("9" * 5000, "a" * 5000, "{" + "a" * 5000 + "}", "[" + "a, " * 90 + "]")

@@ -11,7 +11,7 @@ from typing import IO
 import pytest
 from toy_record import write_record
 
-from regrasp.app.progress import shown_progress
+from regrasp.app.cli.progress import shown_progress
 
 ROOT = Path(__file__).parents[2]
 COMMANDS = [
@@ -74,7 +74,9 @@ def test_standard_input_and_errors_are_not_needed(command: str) -> None:
 
 
 def test_what_is_only_written_at_the_end_finds_no_reader_either(no_reader: IO[str]) -> None:
-    program = "import regrasp.app.cli as c, regrasp.app.__main__ as m; c.app = lambda: print('a table'); m.main()"
+    program = (
+        "import regrasp.app.cli.commands as c, regrasp.app.__main__ as m; c.app = lambda: print('a table'); m.main()"
+    )
     told = shell(f'"{sys.executable}" -c "{program}"', stdout=no_reader)
     assert (told.returncode, told.stderr) == (141, "")
 

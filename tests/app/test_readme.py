@@ -8,8 +8,8 @@ import pytest
 import typer.main
 from readme_commands import README, commands
 
-from regrasp.app.cli import app
-from regrasp.app.scenario_file import cases
+from regrasp.app.cli.commands import app
+from regrasp.app.scenario.load import cases
 
 TEXT = README.read_text(encoding="utf-8")
 OURS = [command for command in commands(TEXT) if command.startswith("regrasp ")]

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from regrasp.app.cli import app
+from regrasp.app.cli.commands import app
 
 COMMANDS = """
 run loop.yaml

@@ -7,8 +7,8 @@ import pytest
 from fake_services import Stage, seen
 from py_trees.common import Status
 
-from regrasp.behaviors.hand import CLOSE_SECONDS
-from regrasp.behaviors.recover import BLIND_SECONDS
+from regrasp.behaviors.cable.hand import CLOSE_SECONDS
+from regrasp.behaviors.cable.recover import BLIND_SECONDS
 from regrasp.interfaces.cause import CauseCode, ServiceError
 from regrasp.interfaces.cell import KnownCell
 

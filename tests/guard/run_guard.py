@@ -22,9 +22,9 @@ from typing import Any
 
 import numpy as np
 
-from regrasp.app import episode
-from regrasp.app.processes import run_each
-from regrasp.app.scenario_file import load_scenario
+from regrasp.app.run import episode
+from regrasp.app.run.processes import run_each
+from regrasp.app.scenario.load import load_scenario
 
 KEPT = Path(__file__).with_name("runs.json")
 SCENARIOS = ("no_obstacle", "short_obstacle", "tall_obstacle")

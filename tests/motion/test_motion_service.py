@@ -10,8 +10,8 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.cell import KnownCell, pose_along
 from regrasp.interfaces.frame import Intrinsics, RgbdFrame
-from regrasp.motion.cable_path import natural_pose
 from regrasp.motion.failure import PlanningError
+from regrasp.motion.planning.cable_path import natural_pose
 from regrasp.motion.service import GRIP_OFFSETS, OPEN_GAP, TIGHT_MARGIN, Motion
 from regrasp.motion.task import Task
 

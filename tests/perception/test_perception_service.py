@@ -7,8 +7,8 @@ from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.cell import KnownCell
 from regrasp.interfaces.frame import Intrinsics, RgbdFrame
-from regrasp.perception.estimate import Estimate, NoEstimate
-from regrasp.perception.occupancy import Spheres
+from regrasp.perception.mapping.occupancy import Spheres
+from regrasp.perception.pose.estimate import Estimate, NoEstimate
 from regrasp.perception.service import Perception
 
 PLACE = np.array([0.36, 0.02, 0.30])

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from regrasp.app.episode import run_episode
-from regrasp.app.output import FILES
-from regrasp.app.record import Result
-from regrasp.app.scenario_file import load_scenario
+from regrasp.app.records.folders import FILES
+from regrasp.app.records.result import Result
+from regrasp.app.run.episode import run_episode
+from regrasp.app.scenario.load import load_scenario
 from regrasp.sim.world import World
 
 REST_SPEED = 0.05  # rad/s: a joint that holds against a swinging cable
@@ -145,7 +145,7 @@ class WatchedWorld(World):
 def test_an_interrupt_in_the_middle_of_a_motion_leaves_the_arms_at_rest_0_3_s_later(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, state: str
 ) -> None:
-    monkeypatch.setattr("regrasp.app.episode.World", WatchedWorld)
+    monkeypatch.setattr("regrasp.app.run.episode.World", WatchedWorld)
     stopped: list[float] = []
 
     def progress(now: float, leaf: str) -> None:

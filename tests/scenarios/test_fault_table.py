@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from regrasp.app.episode import run_episode
-from regrasp.app.fault_schema import FAULT_TYPES
-from regrasp.app.resources import shipped
-from regrasp.app.scenario_file import load_scenario
+from regrasp.app.files.resources import shipped
+from regrasp.app.run.episode import run_episode
+from regrasp.app.scenario.load import load_scenario
+from regrasp.app.scenario.schema import FAULT_TYPES
 from regrasp.sim.world import World
 
 FOLDER = "faults/"

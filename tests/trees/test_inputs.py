@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 from toy_leaves import LEAVES
 
-from regrasp.app.resources import shipped
+from regrasp.app.files.resources import shipped
 from regrasp.trees import check_inputs
 
 TREE = """\

@@ -12,9 +12,9 @@ from py_trees.behaviours import Failure, Running, Success
 from py_trees.common import Status
 from random_trees import LEAVES, Dice, trees
 
-from regrasp.app.attempts import Attempts
-from regrasp.app.tick_log import TickLog
-from regrasp.app.tried import told_by_ticks
+from regrasp.app.records.history import told_by_ticks
+from regrasp.app.run.attempts import Attempts
+from regrasp.app.run.tick_log import TickLog
 from regrasp.trees import Execution, TreeError, executions, load_tree, run_stats
 
 TICK = 0.05

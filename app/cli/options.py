@@ -1,0 +1,61 @@
+"""Options that several commands take."""
+
+import re
+from collections.abc import Iterator
+from typing import Annotated, Literal
+
+import typer
+
+from regrasp.app.files.findings import Finding, Findings
+from regrasp.app.scenario.schema import MOST_SEED
+from regrasp.interfaces.quote import quoted
+
+MOST_SEEDS = 10_000  # of one study
+
+
+def _scenarios(incomplete: str) -> Iterator[str]:
+    """Names for the shell's completion; it completes paths by itself."""
+    from regrasp.app.files.resources import shipped
+
+    return (name for name in shipped("scenario") if name.startswith(incomplete))
+
+
+ScenarioName = Annotated[
+    str,
+    typer.Argument(help="A shipped scenario's name, or a path to a .yaml file.", autocompletion=_scenarios),
+]
+Seed = Annotated[
+    int | None, typer.Option(min=0, max=MOST_SEED, help="Draws every error, noise and jitter; default the scenario's.")
+]
+Renderer = Annotated[
+    Literal["auto", "moderngl", "tiny"],
+    typer.Option(
+        help="What draws the cameras' pictures; auto takes OpenGL (moderngl) where it works, else PyBullet's."
+    ),
+]
+WallLimit = Annotated[
+    float | None,
+    typer.Option(min=1.0, metavar="SECONDS", help="Stop a run that takes longer, by the clock on the wall."),
+]
+LogLevel = Annotated[
+    Literal["debug", "info", "warning", "error"] | None,
+    typer.Option(help="Show the run's events from this level on, as events.jsonl has them all."),
+]
+Sets = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set", metavar="KEY=VALUE", help="Change a value of the scenario, or with cell. of its cell; repeat."
+    ),
+]
+
+
+def parse_seeds(text: str) -> range:
+    """The seeds of "A:B", B left out. Raises `Findings` for anything else."""
+    first, after = map(int, text.split(":")) if re.fullmatch(r"\d{1,10}:\d{1,10}", text) else (0, 0)
+    if not first < after <= MOST_SEED:
+        right = f"write A:B with A below B and B at most {MOST_SEED}, such as 0:20"
+        raise Findings([Finding("--seeds", 0, f"{quoted(text)} is no range of seeds; {right}")])
+    seeds = range(first, after)
+    if len(seeds) > MOST_SEEDS:
+        raise Findings([Finding("--seeds", 0, f"{len(seeds)} seeds; ask for at most {MOST_SEEDS} in one study")])
+    return seeds

@@ -1,0 +1,85 @@
+"""What a running episode shows on stderr, and how Ctrl-C reaches it."""
+
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any, NamedTuple
+
+from rich.console import Console
+
+from regrasp.app.cli.options import LogLevel
+from regrasp.app.files.findings import printable
+from regrasp.app.interrupts import interruptible
+from regrasp.app.records.record import OnEvent, Progress
+from regrasp.app.records.summary import in_words
+
+QUIET_SECONDS = 5.0  # simulated, between two lines of a leaf that goes on
+LEVELS = ("debug", "info", "warning", "error")
+
+
+class Shown(NamedTuple):
+    """What `run_episode` calls: at each tick, and for each event."""
+
+    tick: Progress
+    event: OnEvent
+
+
+@contextmanager
+def shown_progress(quiet: bool, level: LogLevel = None) -> Iterator[Shown]:
+    """Callbacks for `run_episode`: one live line on a terminal, else a line a leaf; `quiet` shows nothing.
+
+    Events from `level` on are shown as lines; None shows none. While it is open, Ctrl-C raises KeyboardInterrupt from
+    the tick's callback, so between two ticks; a second one at once.
+    """
+    console = Console(stderr=True, highlight=False, markup=False)
+    shown_levels = LEVELS[LEVELS.index(level) :] if level else ()
+
+    def event(values: Mapping[str, Any]) -> None:
+        if values["level"] in shown_levels:
+            rest = {name: value for name, value in values.items() if name not in ("t", "level", "event", "node")}
+            what = in_words(str(values["event"]), rest)
+            told = printable(f"{values['t']:7.2f} s  {values['level']:<7}  {values.get('node') or '-'}  {what}")
+            if console.is_terminal:
+                console.print(told, soft_wrap=True)
+            else:
+                _print(told)
+
+    with interruptible() as check:
+        if quiet:
+            yield Shown(lambda _time, _leaf: check(), event)
+        elif console.is_terminal:
+            with console.status("starting") as status:
+
+                def live(time: float, leaf: str) -> None:
+                    check()
+                    status.update(f"{time:7.1f} s  {leaf}")
+
+                yield Shown(live, event)
+        else:
+            lines = _Lines()
+
+            def plain(time: float, leaf: str) -> None:
+                check()
+                lines.show(time, leaf)
+
+            yield Shown(plain, event)
+
+
+class _Lines:
+    """A line when the leaf changes, at most one a simulated second, and one now and then while it goes on."""
+
+    def __init__(self) -> None:
+        self.time = float("-inf")
+        self.leaf = ""
+
+    def show(self, time: float, leaf: str) -> None:
+        if time - self.time >= (QUIET_SECONDS if leaf == self.leaf else 1.0):
+            self.time, self.leaf = time, leaf
+            _print(f"{time:7.1f} s  {leaf}")
+
+
+def _print(line: str) -> None:
+    try:
+        print(line, file=sys.stderr, flush=True)
+    except BrokenPipeError:  # who watched has gone: as Ctrl-C, with the record kept
+        raise KeyboardInterrupt from None

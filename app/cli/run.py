@@ -1,0 +1,175 @@
+"""`regrasp run`."""
+
+import math
+import os
+import sys
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from regrasp.app.cli.options import LogLevel, Renderer, ScenarioName, Seed, Sets, WallLimit
+from regrasp.app.cli.progress import shown_progress
+from regrasp.app.cli.run_every import run_every
+from regrasp.app.files.findings import Finding, Findings, printable, shown
+from regrasp.app.interrupts import late_imports
+from regrasp.app.records import folders
+from regrasp.app.records.summary import summary
+from regrasp.app.run.batch import Run, Settings, result_of
+from regrasp.app.run.processes import run_each
+from regrasp.app.scenario.load import Scenario, cases, load_scenario
+
+if TYPE_CHECKING:
+    from regrasp.app.records.result import Result
+
+EXIT_UNMET, EXIT_INTERRUPTED = 1, 130
+
+
+def add_to(app: typer.Typer) -> None:
+    """Make the command one of `app`."""
+    app.command("run")(run)
+
+
+def run(
+    scenario: ScenarioName,
+    case: Annotated[
+        str | None, typer.Option(metavar="NAME", help="The case to run; default that of the first values.")
+    ] = None,
+    every: Annotated[bool, typer.Option("--all", help="Run every case, each in a process of its own.")] = False,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, help="With --all: cases side by side; default one a processor.")
+    ] = None,
+    seed: Seed = None,
+    sets: Sets = None,
+    out: Annotated[
+        Path | None, typer.Option(help="The record's folder, with --all that of all records; default in runs/.")
+    ] = None,
+    junit: Annotated[Path | None, typer.Option(metavar="FILE", help="With --all: write JUnit XML, too.")] = None,
+    video: Annotated[bool, typer.Option("--video", help="Film the run into the record.")] = False,
+    renderer: Renderer = "auto",
+    wall_limit: WallLimit = None,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Check everything, say what would run, and run nothing.")
+    ] = False,
+    gui: Annotated[bool, typer.Option("--gui", help="Show PyBullet's window.")] = False,
+    log_level: LogLevel = None,
+    quiet: Annotated[bool, typer.Option("--quiet", help="No progress; only the summary.")] = False,
+) -> None:
+    """Run a scenario and leave a record of it.
+
+    \b
+    Examples:
+      regrasp run short_obstacle --video
+      regrasp run tall_obstacle --seed 7 --case gravity=earth --out runs/tall-7
+      regrasp run mine.yaml --set obstacles.0.size=[0.08,0.12,0.3] --dry-run
+      regrasp run mine.yaml --all --set 'vary.seed="0:5"' --junit mine.xml
+
+    \b
+    Exit code: 0 every expectation met, 1 not, 2 bad input, 130 Ctrl-C.
+    """
+    overrides = [*(sets or []), *([] if seed is None else [f"seed={seed}"])]
+    twice = seed is not None and any(text.partition("=")[0].strip() == "seed" for text in sets or [])
+    wrong = [Finding("--seed", 0, "the seed is given by --set, too; leave one out")] if twice else []
+    wrong += [] if not gui or _display() else [_NO_DISPLAY]
+    if every:
+        wrong += _given("is for a single case; leave --all out", case=case, gui=gui, log_level=log_level)
+        if dry_run:
+            wrong += folders.unwritable_file(junit) if junit else []
+            _tell(_checked(partial(cases, scenario, overrides), wrong, out), out)
+            return
+        settings = Settings(video, renderer, quiet, wall_limit or math.inf)
+        raise typer.Exit(run_every(scenario, overrides, jobs or os.cpu_count() or 1, out, junit, settings, wrong))
+    wrong += _given("is for many cases; write --all, too", jobs=jobs, junit=junit)
+    [loaded] = _checked(lambda: [load_scenario(scenario, overrides, case)], wrong, out)
+    if dry_run:
+        _tell([loaded], out)
+        return
+    folder = out or folders.new_folder(f"{loaded.name}-{loaded.file.seed}")
+    settings = Settings(video, renderer, quiet, wall_limit or math.inf)
+    here = partial(_run, loaded, folder, settings, gui, log_level)
+    try:
+        result = here() if wall_limit is None else _watched(Run(loaded, loaded.file.seed, folder), here, wall_limit)
+    finally:
+        if out is None:
+            folders.leave_if_empty(folder)
+    if wall_limit is not None and result.cause and not folder.exists():  # it was stopped before that
+        typer.echo(f"{result.cause.code}: {result.cause.message}, before the run began; there is no record", err=True)
+        raise typer.Exit(EXIT_UNMET)
+    typer.echo(summary(result, folder))
+    raise typer.Exit(exit_code(result))
+
+
+def _checked(load: Callable[[], list[Scenario]], wrong: list[Finding], out: Path | None) -> list[Scenario]:
+    """The scenarios, or the findings of all that is wrong with them and with the options."""
+    wrong += folders.unwritable(folders.RUNS) if out is None else folders.findings(out)
+    try:
+        loaded = load()
+    except Findings as error:
+        raise Findings([*wrong, *error.items]) from None
+    if wrong:
+        raise Findings(wrong)
+    return loaded
+
+
+def _run(scenario: Scenario, folder: Path, settings: Settings, gui: bool, log_level: LogLevel) -> "Result":
+    """Run in this process, with progress on stderr."""
+    with late_imports():
+        from regrasp.app.run.episode import run_episode  # brings the planner, the compiler and the physics: seconds
+
+    with shown_progress(settings.quiet, log_level) as show:
+        return run_episode(
+            scenario,
+            folder,
+            seed=scenario.file.seed,
+            video=settings.video,
+            gui=gui,
+            renderer=settings.renderer,
+            progress=show.tick,
+            on_event=show.event,
+        )
+
+
+def _watched(run: Run, task: Callable[[], "Result"], wall_limit: float) -> "Result":
+    """Do it in a process of its own, which is stopped after `wall_limit` seconds."""
+    from regrasp.app.records.reader import read_record  # late: it brings py_trees
+
+    assert run.folder is not None
+    try:
+        [done] = run_each([task], 1, wall_limit)
+    except KeyboardInterrupt:
+        if (kept := read_record(run.folder).result) is None:
+            raise
+        return kept
+    return result_of(run, done)
+
+
+def _tell(loaded: list[Scenario], out: Path | None) -> None:
+    """What a dry run says."""
+    first = loaded[0]
+    typer.echo(f"{shown(first.path)}: nothing wrong; tree {shown(first.tree)}, cell {first.file.cell}")
+    for scenario in loaded:
+        typer.echo(f"  would run {printable(scenario.title)}, seed {scenario.file.seed}")
+    typer.echo(f"  record{'s' if len(loaded) > 1 else ''} in {out or 'a new folder of runs/'}")
+
+
+def _given(message: str, **options: object) -> list[Finding]:
+    """A finding for each of these options that is given."""
+    return [Finding(f"--{name.replace('_', '-')}", 0, message) for name, value in options.items() if value]
+
+
+_NO_DISPLAY = Finding(
+    "--gui", 0, "there is no display here (DISPLAY is not set); run without it, and film with --video"
+)
+
+
+def _display() -> bool:
+    return sys.platform != "linux" or bool(os.environ.get("DISPLAY"))
+
+
+def exit_code(result: "Result") -> int:
+    """0 when all that was expected came out, 130 after Ctrl-C, else 1."""
+    if result.outcome == "interrupted":
+        return EXIT_INTERRUPTED
+    return 0 if result.succeeded else EXIT_UNMET

@@ -1,0 +1,70 @@
+"""Every case of a scenario, and what to tell of them."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from regrasp.app.files.findings import Finding, Findings, printable
+from regrasp.app.records import folders
+from regrasp.app.run.batch import Episode, Row, Run, Settings, run_all
+from regrasp.app.run.junit import write_junit
+from regrasp.app.scenario.load import cases
+from regrasp.app.studies.table import print_table
+
+
+def run_every(
+    scenario: str,
+    overrides: Sequence[str],
+    jobs: int,
+    out: Path | None = None,
+    junit: Path | None = None,
+    settings: Settings = Settings(),  # noqa: B008 - it does not change
+    wrong: Sequence[Finding] = (),
+    episode: Episode | None = None,
+) -> int:
+    """Run every case, each in its own process, its record in a folder of `out` with its name.
+
+    Progress goes to stderr, a table to stdout, JUnit XML to `junit`. Returns the exit code: 0 when all came out as
+    expected, 1 when not, 130 after Ctrl-C, which keeps what was done. `episode` stands in for `run_episode` in tests.
+
+    Raises:
+        Findings: bad input; `wrong` holds what the caller found.
+        OSError: the disk is full or the like.
+    """
+    found = [*wrong, *(folders.unwritable_file(junit) if junit else [])]
+    try:
+        loaded = cases(scenario, overrides)
+    except Findings as error:
+        raise Findings([*found, *error.items]) from None
+    names = [folders.folder_name(case.case) for case in loaded]
+    found += [f for name in names for f in folders.findings(out / name)] if out else folders.unwritable(folders.RUNS)
+    if found:
+        raise Findings(found)
+    into = out or folders.new_folder(f"{loaded[0].name}-all")
+    runs = [Run(case, case.file.seed, into / name) for case, name in zip(loaded, names, strict=True)]
+    rows, interrupted = run_all(runs, jobs, settings=settings, episode=episode)
+    if junit:
+        junit.parent.mkdir(parents=True, exist_ok=True)
+        write_junit(junit, loaded[0].name, runs, rows)
+    _tell(loaded[0].name, runs, rows, into)
+    return 130 if interrupted else 0 if all(row.succeeded for row in rows.values()) else 1
+
+
+def _tell(name: str, runs: Sequence[Run], rows: Mapping[int, Row], into: Path) -> None:
+    header = ("case", "as expected", "outcome", "simulated s", "seconds")
+    lines = [
+        (
+            printable(row.case),
+            "yes" if row.succeeded else "no",
+            row.outcome,
+            f"{row.sim_seconds:.1f}",
+            f"{row.wall_seconds:.1f}",
+        )
+        for row in rows.values()
+    ]
+    if lines:
+        print_table(header, lines)
+    for row in rows.values():
+        if not row.succeeded:
+            print(f"{printable(row.case)}: {printable(row.why)}")
+    succeeded = sum(row.succeeded for row in rows.values())
+    print(f"{name}: {succeeded} of {len(runs)} cases as expected; records in {into}")

@@ -1,0 +1,116 @@
+"""`regrasp scenarios`: look at scenarios."""
+
+import json
+from typing import Annotated
+
+import typer
+import yaml
+
+from regrasp.app.cli.options import Sets
+from regrasp.app.files.findings import Finding, Findings, printable, shown
+from regrasp.app.files.resources import shipped
+from regrasp.app.files.schema_doc import markdown
+from regrasp.app.scenario.load import case_names, cases, description, load_scenario
+
+app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="List, check and show scenarios.")
+Name = Annotated[str, typer.Argument(help="A shipped scenario's name, or a path to a .yaml file.")]
+
+
+@app.command("list")
+def list_scenarios() -> None:
+    """List the shipped scenarios, with their cases."""
+    known = shipped("scenario")
+    width = max(map(len, known), default=0)
+    for name, path in known.items():
+        typer.echo(f"{name:<{width}}  {_counted(len(case_names(name))):>9}  {description(path)}")
+
+
+def _counted(cases: int) -> str:
+    return f"{cases} case{'s' if cases != 1 else ''}"
+
+
+@app.command("check")
+def check(
+    files: Annotated[list[str] | None, typer.Argument(help="Names or paths; default all that are shipped.")] = None,
+    sets: Sets = None,
+) -> None:
+    """Check scenarios, in every case, without a run.
+
+    With their cells and trees; tells all that is wrong.
+
+    \b
+    Examples:
+      regrasp scenarios check
+      regrasp scenarios check my/scenario.yaml --set vary.seed=[1,2,3]
+
+    \b
+    Exit code: 0 nothing is wrong, 2 findings, a line each on stderr.
+    """
+    found: list[Finding] = []
+    for name in files or shipped("scenario"):
+        try:
+            checked = cases(name, sets or [])
+            typer.echo(f"{shown(checked[0].path)}: {_counted(len(checked))}, nothing wrong")
+        except Findings as error:
+            found += error.items
+    if found:
+        raise Findings(found)
+
+
+@app.command("show")
+def show(
+    scenario: Name,
+    case: Annotated[
+        str | None, typer.Option(metavar="NAME", help="The case; default that of the first values.")
+    ] = None,
+    sets: Sets = None,
+) -> None:
+    """Print a scenario as a run takes it.
+
+    One case's values, your changes and all defaults, as YAML.
+
+    Without --case the names of all cases come first, as comments.
+
+    \b
+    Examples:
+      regrasp scenarios show short_obstacle
+      regrasp scenarios show short_obstacle --case gravity=earth > mine.yaml
+    """
+    loaded = load_scenario(scenario, sets or [], case)
+    names = case_names(scenario, sets or []) if case is None else [loaded.case]
+    typer.echo(f"# {printable(loaded.name)}: {'this case' if case else 'the first of these cases'}")
+    for name in names:
+        typer.echo(f"#   {printable(name)}")
+    content = loaded.file.model_dump(mode="json", exclude_none=True, exclude={"vary"})
+    typer.echo(
+        yaml.safe_dump(content, sort_keys=False, allow_unicode=True, default_flow_style=None, width=120).rstrip()
+    )
+
+
+@app.command("schema")
+def schema(
+    as_markdown: Annotated[
+        bool, typer.Option("--markdown", help="A reference to read: each field, its meaning and an example.")
+    ] = False,
+) -> None:
+    """Print what a scenario file may say.
+
+    As JSON Schema (draft 2020-12), for editors.
+
+    \b
+    With the YAML language server (VS Code, Neovim, Emacs) an editor completes
+    and checks scenario files:
+      regrasp scenarios schema > scenario.schema.json
+    and as the first line of your scenario, with the path from it to that file:
+      # yaml-language-server: $schema=scenario.schema.json
+
+    \b
+    To read it yourself:
+      regrasp scenarios schema --markdown
+    """
+    from regrasp.app.scenario.schema import ScenarioFile, json_schema
+
+    if as_markdown:
+        typer.echo(markdown(ScenarioFile.model_json_schema()))
+    else:
+        typer.echo(json.dumps(json_schema(), indent=2, ensure_ascii=False))

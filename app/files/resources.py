@@ -1,0 +1,71 @@
+"""Shipped scenarios, cells and trees by name, and files by path."""
+
+import os
+from importlib.resources import files
+from pathlib import Path
+from typing import Literal
+
+from regrasp.app.files.findings import Finding, Findings, closest, shown, why_no_file
+from regrasp.interfaces.quote import cut, quoted
+
+Kind = Literal["scenario", "cell", "tree"]
+_SUFFIX: dict[Kind, str] = {"scenario": ".yaml", "cell": ".yaml", "tree": ".xml"}
+MOST_NAMED = 5  # shipped ones, after an unknown name
+MAX_BYTES = 256 * 1024  # of a file that a person writes
+
+
+def shipped(kind: Kind) -> dict[str, Path]:
+    """Name to file of everything of this kind that comes with Regrasp, sorted by name; scenarios of faults last."""
+    folders = {"scenario": "scenarios", "cell": "scenarios/cells", "tree": "trees"}
+    folder = Path(str(files("regrasp"))) / folders[kind]
+    names = {path.stem: path for path in sorted(folder.glob("*" + _SUFFIX[kind]))}
+    if kind == "scenario":
+        names |= {f"faults/{path.stem}": path for path in sorted((folder / "faults").glob("*" + _SUFFIX[kind]))}
+    return names
+
+
+def resolve(kind: Kind, name: str, beside: Path, where: tuple[str, int] | None = None) -> Path:
+    """The file that `name` means: what is written like one, from `beside`, else a shipped one; nothing else is opened.
+
+    Raises `Findings`, at the place `where` (source, line) that holds the name; without one, at the name itself.
+    """
+    path = beside / name
+    known = shipped(kind)
+    if name.endswith(_SUFFIX[kind]):
+        return path
+    if name in known:
+        return known[name]
+    name = cut(name)
+    what = "a folder" if os.path.isdir(path) else f"no {_SUFFIX[kind]} file" if os.path.exists(path) else ""
+    wrong = f"{quoted(name)} is {what}" if name and what else f"no {kind} named {quoted(name)}"
+    close = closest(name, known)
+    hint = f"did you mean {quoted(close)}?" if close else _those_shipped(kind, list(known))
+    raise Findings([Finding(*(where or (name or kind, 0)), f"{wrong}; {hint} (a path ends in {_SUFFIX[kind]})")])
+
+
+def _those_shipped(kind: Kind, names: list[str]) -> str:
+    """The names in words; of many the first, and how to see all."""
+    if len(names) <= MOST_NAMED:
+        return f"the shipped ones are {', '.join(names)}"
+    more = f"regrasp {kind}s list shows {len(names) - MOST_NAMED} more"
+    return f"the shipped ones are {', '.join(names[:MOST_NAMED])}; {more}"
+
+
+def read_text(path: Path, where: tuple[str, int] | None = None) -> str:
+    """The text of a file that a person wrote. Raises `Findings` when there is no such file or it is no text."""
+    source, line = where or (shown(path), 0)
+    if not os.path.isfile(path):
+        raise Findings([Finding(source, line, f"{quoted(shown(path))} {why_no_file(path)}; name a file")])
+    try:
+        with path.open("rb") as stream:
+            data = stream.read(MAX_BYTES + 1)
+    except OSError as error:
+        raise Findings([Finding(source, line, f"cannot read {quoted(shown(path))}: {error.strerror}")]) from None
+    if len(data) > MAX_BYTES:
+        raise Findings([Finding(shown(path), 0, f"longer than {MAX_BYTES} bytes; name a file written by hand")])
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        at = data.count(b"\n", 0, error.start) + 1
+        message = f"byte {data[error.start]:#04x} is not UTF-8; save the file as UTF-8 text"
+        raise Findings([Finding(shown(path), at, message)]) from None

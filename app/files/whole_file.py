@@ -1,0 +1,36 @@
+"""Files written in one step."""
+
+import errno
+import os
+from pathlib import Path
+
+from regrasp.app.files.findings import real
+
+
+def write_whole(path: Path, content: str | bytes) -> None:
+    """Write a file in one step: readers see the old one or the new one, never a half.
+
+    What a link names is written, not the link; a pipe or a device takes the content as it comes.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    data = content.encode() if isinstance(content, str) else content
+    if path.exists() and not path.is_file():
+        path.write_bytes(data)
+        return
+    path = real(path)
+    if path.is_symlink():  # it leads back to itself
+        raise OSError(errno.ELOOP, os.strerror(errno.ELOOP), str(path))
+    part = path.with_name(path.name + ".part")
+    try:
+        with part.open("wb") as file:
+            if path.exists():
+                os.fchmod(file.fileno(), path.stat().st_mode)
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        part.replace(path)
+    except BaseException:
+        part.unlink(missing_ok=True)
+        raise

@@ -1,0 +1,42 @@
+"""What `regrasp snapshot` does: frames of a scenario's first moments as files that `regrasp perceive` reads."""
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from regrasp.app.files.whole_file import write_whole
+from regrasp.app.frames.calibration_file import CalibrationFile, write_calibration
+from regrasp.app.frames.camera_pose_file import write_camera_pose
+from regrasp.app.run.episode import build_world
+from regrasp.app.scenario.load import Scenario
+from regrasp.interfaces.cell import FixedMount
+from regrasp.interfaces.frame import RgbdFrame
+
+MILLIMETRES = 1000.0  # in a metre: the depth file's unit
+
+
+def take(scenario: Scenario, camera: str, count: int, out: Path) -> None:
+    """Write `count` frames of a camera, its intrinsics and, of a fixed one, its pose as the robot knows it to `out`."""
+    spec = scenario.cell.known.camera(camera)
+    world = build_world(scenario, scenario.file.seed)
+    try:
+        for number in range(1, count + 1):
+            while (frame := world.cameras[camera].latest()) is None or frame.number < number:
+                world.advance(world.step_seconds)
+            write_frame(out, frame, "" if count == 1 else f"_{number:03}")
+    finally:
+        world.close()
+    if isinstance(spec.mount, FixedMount):
+        write_camera_pose(out / "camera_pose.yaml", spec.mount.world_from_camera)
+
+
+def write_frame(out: Path, frame: RgbdFrame, suffix: str = "") -> None:
+    """Write rgb.png, depth.png (16 bit, millimetres) and intrinsics.yaml to a folder. Raises OSError."""
+    out.mkdir(parents=True, exist_ok=True)
+    depth = np.rint(MILLIMETRES * frame.depth).astype(np.uint16)
+    for name, image in (("rgb", cv2.cvtColor(frame.rgb, cv2.COLOR_RGB2BGR)), ("depth", depth)):
+        write_whole(out / f"{name}{suffix}.png", cv2.imencode(".png", image)[1].tobytes())
+    k = frame.intrinsics
+    file = CalibrationFile(width=k.width, height=k.height, fx=k.fx, fy=k.fy, cx=k.cx, cy=k.cy)
+    write_calibration(out / "intrinsics.yaml", file)

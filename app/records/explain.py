@@ -1,0 +1,131 @@
+"""A page about a run for a person: what it was, what was tried, why it ended so, and what the robot knew."""
+
+from collections.abc import Iterator
+
+from regrasp.app.files.findings import printable
+from regrasp.app.records.history import attempts, course
+from regrasp.app.records.reader import RunRecord
+from regrasp.app.records.result import DEFAULT_CASE, BeliefState, Link, Pose, Result
+from regrasp.app.records.summary import expectation_lines, headline, slip_lines, what_ran
+from regrasp.app.records.timeline import event_text, timeline, wrapped
+
+REPORT_WIDTH = 100  # columns of a page in a test report
+LAST_EVENTS = 8  # shown of a run without a result
+
+
+def explanation(record: RunRecord, width: int) -> str:
+    """The page, in lines of about `width` columns; nothing in it steers a terminal."""
+    page = _page(record, width) if record.result is None else _whole(record, record.result, width)
+    return "\n".join(printable(line).rstrip() for line in page) + "\n"
+
+
+def _whole(record: RunRecord, result: Result, width: int) -> Iterator[str]:
+    yield f"{headline(result)}, {result.sim_seconds:.1f} simulated seconds"
+    yield from _what_was_run(record, result.versions)
+    yield from _section("Why it ended so", _why(result, width))
+    yield from _tried(record, width)
+    yield from _section("Losses of the connector, by ground truth", slip_lines(result))
+    if result.belief:
+        yield from _section("What the robot knew at the end", _belief(result.belief))
+    yield from _section("What was expected", expectation_lines(result))
+    yield from _section("Traceback", (result.traceback or "").splitlines())
+
+
+def _page(record: RunRecord, width: int) -> Iterator[str]:
+    """Of a run without a result."""
+    begin = record.begin
+    ran = what_ran(
+        str(begin.get("scenario", "a run")), str(begin.get("case", DEFAULT_CASE)), begin.get("seed", "unknown")
+    )
+    end = next((e.values.get("outcome") for e in record.events if e.event == "end"), None)
+    yield f"{ran}: killed, or still going on" if end is None else f"{ran}: {end}, but its result.json is gone"
+    yield from _what_was_run(record, {})
+    yield from _tried(record, width)
+    statuses = {tick.path: tick.status for tick in record.ticks}
+    running = sorted((p for p, status in statuses.items() if status == "RUNNING"), key=lambda path: path.split("/"))
+    # Whatever stands below a path comes right after it.
+    leaves = [
+        path for path, after in zip(running, [*running[1:], ""], strict=False) if not after.startswith(path + "/")
+    ]
+    if record.at_work:
+        at, leaf = record.at_work
+        leaves = [f"{leaf}: its tick at {at:.2f} s has not ended", *(other for other in leaves if other != leaf)]
+    yield from _section(f"What was running at {record.end:.2f} s, when the record ends", leaves)
+    events = [event for event in record.events if event.event != "begin"]
+    last = (f"{e.t:8.2f}  {e.node or '-'}  {event_text(e)}" for e in events[-LAST_EVENTS:])
+    yield from _section("The last events", (line for text in last for line in wrapped(text, width - 2)))
+
+
+def _tried(record: RunRecord, width: int) -> Iterator[str]:
+    told = timeline(attempts(record), record.events, course(record), width - 2)
+    yield from _section("What was tried (simulated seconds, from and to)", told)
+
+
+def _what_was_run(record: RunRecord, versions: dict[str, str]) -> Iterator[str]:
+    begin = record.begin
+    told = [f"{name} {begin[name]}" for name in ("gravity", "cell", "tree", "renderer") if name in begin]
+    told += [f"regrasp {versions['regrasp']}"] if "regrasp" in versions else []
+    if told:
+        yield "  " + ", ".join(told)
+    overrides = begin.get("overrides")
+    if isinstance(overrides, list) and overrides:
+        yield "  changed: " + " ".join(map(str, overrides))
+    yield from (f"  note: {remark}" for remark in record.remarks)
+
+
+def _section(title: str, lines: Iterator[str] | list[str]) -> Iterator[str]:
+    """A heading and its indented lines, nothing where there are none."""
+    found = [*lines]
+    if found:
+        yield from ("", title)
+        yield from (f"  {line}" for line in found)
+
+
+def _why(result: Result, width: int) -> Iterator[str]:
+    if result.cause:
+        yield from wrapped(f"{result.cause.code}: {result.cause.message}", width - 2)
+        if result.cause.node:
+            yield f"in {result.cause.node}"
+    chain = result.chain or ()
+    names = [*_relative(chain)]
+    column = min(36, max(map(len, names), default=0))
+    for name, link in zip(names, chain, strict=True):
+        first, *more = wrapped(f"{link.at:8.2f} s  {link.type}: {link.why}", width - 2, " " * (column + 2), " " * 12)
+        if len(name) > column:
+            yield name
+            name = ""
+        yield from (name + first[len(name) :], *more)
+
+
+def _relative(chain: tuple[Link, ...]) -> Iterator[str]:
+    """Each link's path without the path of the link above it, indented."""
+    above = ""
+    for depth, link in enumerate(chain):
+        yield "  " * min(depth, 12) + link.path.removeprefix(above)
+        above = link.path + "/"
+
+
+def _belief(belief: BeliefState) -> Iterator[str]:
+    yield f"the right hand holds {'the connector' if belief.held else 'nothing'}"
+    if belief.connector:
+        sure = "all of it seen" if belief.sure else "a part of it seen"
+        yield f"connector found by the {belief.found_by or 'unknown'} camera at {_place(belief.connector)}, {sure}"
+    else:
+        yield "connector not found since it was lost, or never lost"
+    if seen := belief.last_seen:
+        yield f"connector seen last at {seen.at:.2f} s by the {seen.camera} camera at {_numbers(seen.position)} m"
+    yield f"searches in vain since then: {belief.vain_searches}"
+    yield f"obstacles mapped: {belief.occupied_voxels} voxels"
+    for name, arm in belief.arms.items():
+        yield f"{name} arm: tool at {_place(arm.tool)}"
+        yield f"  joints {_numbers(arm.joints)} rad"
+    for at, by in belief.notices:
+        yield f"noticed a loss at {at:.2f} s by {by}"
+
+
+def _place(pose: Pose) -> str:
+    return f"{_numbers(pose.position)} m"
+
+
+def _numbers(values: tuple[float, ...]) -> str:
+    return "(" + ", ".join(f"{round(value, 3) + 0.0:.3f}" for value in values) + ")"

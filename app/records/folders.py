@@ -1,0 +1,96 @@
+"""Where a run's record goes, and whether it can."""
+
+import contextlib
+import hashlib
+import os
+import re
+import tempfile
+from itertools import count
+from pathlib import Path
+
+from regrasp.app.files.findings import Finding, real, shown
+from regrasp.interfaces.quote import quoted
+
+RUNS = Path("runs")  # where records go by default
+RUN_FILES = ("result.json", "events.jsonl", "ticks.jsonl")  # by which a run's folder is known
+FILES = (*RUN_FILES, "scenario.yaml", "cell.yaml", "tree.xml")  # of a run's folder
+
+
+def new_folder(name: str, within: Path = RUNS) -> Path:
+    """Make the first folder NAME-1, NAME-2, ... that does not exist, in the folder `within`.
+
+    The folder is made at once: of two runs that begin together each gets its own.
+
+    Raises:
+        OSError: none can be made.
+    """
+    within.mkdir(parents=True, exist_ok=True)
+    for n in count(1):
+        folder = within / f"{folder_name(name)}-{n}"
+        with contextlib.suppress(FileExistsError):
+            folder.mkdir()
+            return folder
+    raise AssertionError("unreachable")
+
+
+def leave_if_empty(folder: Path) -> None:
+    """Take a folder away in which nothing was written."""
+    with contextlib.suppress(OSError):
+        folder.rmdir()
+        if folder.parent == RUNS:
+            RUNS.rmdir()
+
+
+def folder_name(case: str) -> str:
+    """A case's name as that of a folder: what is no plain letter gives way to _ and a digest that keeps names apart."""
+    plain = re.sub(r"[^A-Za-z0-9_.,=+-]+", "_", case)[:100].strip(".") or "_"
+    return plain if plain == case else f"{plain}-{hashlib.sha256(case.encode()).hexdigest()[:8]}"
+
+
+def taken(out: Path) -> list[str]:
+    """The files in `out` that a run would overwrite."""
+    return [name for name in FILES if os.path.lexists(out / name)]
+
+
+def holds_a_run(out: Path) -> list[Finding]:
+    """The finding of a folder that another run has taken, [] of one that is free."""
+    there = taken(out)
+    if set(there) & set(RUN_FILES):
+        return [Finding(shown(out), 0, f"holds a run already ({', '.join(there)}); name another folder")]
+    if there:
+        return [Finding(shown(out), 0, f"holds {', '.join(there)}, which a run would overwrite; name another folder")]
+    return []
+
+
+def findings(out: Path) -> list[Finding]:
+    """Why no run can be written to `out`; nothing is left behind by the look."""
+    if there := holds_a_run(out):
+        return there
+    if out == Path():
+        return [Finding("--out", 0, "names this very folder; name one of its own for the run")]
+    return unwritable(out)
+
+
+def unwritable_file(file: Path, *, new: bool = False) -> list[Finding]:
+    """Why no file can be written there; nothing is left behind by the look. `new`: one that exists is not replaced."""
+    if os.path.isdir(file):
+        return [Finding(shown(file), 0, "is a folder; name a file")]
+    if real(file).is_symlink():
+        return [Finding(shown(file), 0, "is a link that leads back to itself; name another file")]
+    if new and os.path.exists(file):
+        return [Finding(shown(file), 0, "exists already; name another file, or remove it")]
+    return unwritable(file.parent)
+
+
+def unwritable(out: Path) -> list[Finding]:
+    """Why no folder `out` can be made or written in; nothing is left behind by the look."""
+    spot = out.absolute()
+    while not os.path.lexists(spot) and spot != spot.parent:
+        spot = spot.parent
+    if not os.path.isdir(spot):
+        return [Finding(shown(out), 0, f"{quoted(shown(spot))} is no folder; name another place")]
+    try:
+        with tempfile.TemporaryFile(dir=spot):
+            return []
+    except OSError as error:
+        return [Finding(shown(out), 0, f"cannot write in {quoted(shown(spot))} ({error.strerror}); name another place")]

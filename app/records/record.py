@@ -1,0 +1,165 @@
+"""A run's record: a folder of result.json, events.jsonl, ticks.jsonl and what was run; see app/records/RECORD.md."""
+
+import dataclasses
+import io
+import json
+import logging
+import math
+import os
+import traceback
+from collections.abc import Callable, Mapping, MutableMapping
+from pathlib import Path
+from types import TracebackType
+from typing import Any, BinaryIO, Self, TextIO
+
+import structlog
+
+from regrasp.app.files.findings import Findings
+from regrasp.app.files.whole_file import write_whole
+from regrasp.app.interrupts import WallLimit, held_back
+from regrasp.app.records import folders
+from regrasp.app.records.result import DEFAULT_CASE, Outcome, Result, plain
+from regrasp.interfaces.cause import Cause, CauseCode
+
+MOST_AT_WORK = 1 << 16  # bytes of it
+AT_WORK = "at_work.json"  # while a run goes on: which leaf is in the middle of a tick
+
+
+Progress = Callable[[float, str], None]  # simulated seconds, active leaf; called at each tick
+OnEvent = Callable[[Mapping[str, Any]], None]  # called with each event as events.jsonl has it
+
+
+class Record:
+    """Context manager over a run's folder; with None as the folder all stays in memory.
+
+    `ticks` is the stream for a `TickLog`. On leaving, the streams are closed and result.json is written: the one given
+    to `finish`, or, where the run did not come so far, one that tells of the interrupt or the error.
+    """
+
+    def __init__(
+        self,
+        folder: Path | None,
+        scenario: str,
+        seed: int,
+        case: str = DEFAULT_CASE,
+        copies: Mapping[str, str] | None = None,
+    ) -> None:
+        """Create the folder, with `copies` (name to text) of what is run.
+
+        Raises:
+            Findings: it holds a run already, or cannot be written.
+            OSError: it cannot be created or written.
+        """
+        self.folder = folder
+        self.result: Result | None = None
+        self._scenario = scenario
+        self._seed = seed
+        self._case = case
+        self.events: TextIO = io.StringIO()
+        self.ticks: TextIO = io.StringIO()
+        self._at_work: BinaryIO = io.BytesIO()
+        self._longest = 0
+        if folder is not None:
+            folder.mkdir(parents=True, exist_ok=True)
+            if found := folders.findings(folder):
+                raise Findings(found)
+            try:
+                self.events = (folder / "events.jsonl").open("x", encoding="utf-8", newline="\n")
+            except FileExistsError:  # another run took the folder this very moment
+                raise Findings(folders.holds_a_run(folder)) from None
+            self._at_work = (folder / AT_WORK).open("wb", buffering=0)
+            self.at_work(0.0, "")
+            self.ticks = (folder / "ticks.jsonl").open("x", encoding="utf-8", newline="\n")
+            for name, text in (copies or {}).items():
+                (folder / name).write_text(text, encoding="utf-8", newline="\n")
+
+    def logger(self, now: Callable[[], float], on_event: OnEvent | None = None) -> Any:
+        """A structlog logger into events.jsonl; each line begins with `t`, the simulated second by `now`.
+
+        `on_event` is called with each event's values, too.
+        """
+
+        def stamp(_logger: Any, level: str, event: MutableMapping[str, Any]) -> dict[str, Any]:
+            values = {"t": round(now(), 6), "level": level, "event": event.pop("event", ""), **plain(dict(event))}
+            if on_event is not None:
+                on_event(values)
+            return values
+
+        return structlog.wrap_logger(
+            structlog.WriteLogger(self.events),
+            processors=[structlog.processors.format_exc_info, stamp, structlog.processors.JSONRenderer()],
+            wrapper_class=structlog.make_filtering_bound_logger(logging.DEBUG),
+        )
+
+    def at_work(self, t: float, node: str) -> None:
+        """Note that a leaf begins its tick at second `t`, or, with "" for its path, that the tick has ended.
+
+        Should the process die or hang in the middle of it, this is all that names the leaf.
+        """
+        line = json.dumps({"t": round(t, 6), "node": node}).ljust(self._longest)
+        self._longest = len(line)  # a shorter line leaves nothing of a longer one, in a single write
+        self._at_work.seek(0)
+        self._at_work.write(line.encode() + b"\n")
+
+    def finish(self, result: Result) -> None:
+        """The run's result, written when the record closes; a later one replaces it."""
+        self.result = result
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        with held_back():
+            if self.result is None:
+                self.result = self._cut_short(error)
+            if self.folder is not None:
+                self.events.close()
+                self.ticks.close()
+                self._at_work.close()
+                write_whole(self.folder / "result.json", self.result.to_json())
+                (self.folder / AT_WORK).unlink(missing_ok=True)
+
+    def _cut_short(self, error: BaseException | None) -> Result:
+        if isinstance(error, KeyboardInterrupt):
+            code = CauseCode.WALL_LIMIT if isinstance(error, WallLimit) else CauseCode.INTERRUPTED
+            cause = Cause(code, "stopped from outside before the run could end")
+            outcome: Outcome = "wall_limit" if isinstance(error, WallLimit) else "interrupted"
+            return Result(self._scenario, self._seed, outcome, succeeded=False, case=self._case, cause=cause)
+        message = f"{type(error).__name__}: {error}" if error else "the run ended without a result"
+        cause = Cause(CauseCode.INTERNAL_ERROR, message)
+        trace = "".join(traceback.format_exception(error)) if error else None
+        return Result(
+            self._scenario,
+            self._seed,
+            "internal_error",
+            succeeded=False,
+            case=self._case,
+            cause=cause,
+            traceback=trace,
+        )
+
+
+def finish_killed(folder: Path, run: Result) -> Result:
+    """The result `run` of a run whose process is gone, with the leaf that was at work; written where there is none.
+
+    Nothing is written where the folder holds no run.
+    """
+    if run.cause is not None and (leaf := leaf_at_work(folder)):
+        run = dataclasses.replace(run, cause=dataclasses.replace(run.cause, node=leaf[1]), sim_seconds=leaf[0])
+    if (folder / "events.jsonl").is_file() and not os.path.lexists(folder / "result.json"):
+        with held_back():
+            write_whole(folder / "result.json", run.to_json())
+            (folder / AT_WORK).unlink(missing_ok=True)
+    return run
+
+
+def leaf_at_work(folder: Path) -> tuple[float, str] | None:
+    """The second (simulated) and the path of the leaf in whose tick a run was killed, or hangs; None: in none."""
+    try:
+        noted = json.loads((folder / AT_WORK).read_bytes()[:MOST_AT_WORK])
+        t, node = float(noted["t"]), noted["node"]
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+    return (t, node) if isinstance(node, str) and node and math.isfinite(t) else None

@@ -1,0 +1,163 @@
+"""What came out of a run: the fields of result.json (see RECORD.md beside this file)."""
+
+import dataclasses
+import json
+import math
+import platform
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any, Literal
+
+from regrasp.interfaces.cause import Cause
+
+Outcome = Literal["stowed", "safe_stop", "time_limit", "wall_limit", "interrupted", "internal_error"]
+NodeStatus = Literal["RUNNING", "SUCCESS", "FAILURE", "INVALID"]
+DEFAULT_CASE = "default"  # of a scenario that varies nothing
+SCHEMA = 1  # of result.json; fields may be added to it, none changes its meaning
+
+_PACKAGES = (
+    "regrasp",
+    "eaik",
+    "moderngl",
+    "numba",
+    "numpy",
+    "ompl",
+    "opencv",
+    "py_trees",
+    "pybullet",
+    "scipy",
+    "toppra",
+)
+_DISTRIBUTIONS = {"opencv": "opencv-python-headless"}  # where the package index has another name
+
+
+def versions() -> dict[str, str]:
+    """Version of Python and of the packages that bear on a run's course; those that are not installed are left out."""
+    found = {"python": platform.python_version()}
+    for name in _PACKAGES:
+        try:
+            found[name] = version(_DISTRIBUTIONS.get(name, name))
+        except PackageNotFoundError:
+            continue
+    return found
+
+
+@dataclasses.dataclass(frozen=True)
+class Expectation:
+    """One expectation of the scenario: what came out and what was asked."""
+
+    name: str
+    met: bool
+    value: Any
+    limit: Any
+
+
+@dataclasses.dataclass(frozen=True)
+class Slip:
+    """One loss of the connector, in simulated seconds; None where it was not noticed."""
+
+    released_at: float
+    detected_at: float | None
+    detected_by: str | None
+
+
+@dataclasses.dataclass(frozen=True)
+class Attempt:
+    """One execution of a leaf, in simulated seconds; INVALID: it was stopped. What ended alike tick by tick is one."""
+
+    path: str
+    started: float
+    ended: float
+    status: NodeStatus
+    cause: Cause | None = None
+    times: int = 1
+
+
+@dataclasses.dataclass(frozen=True)
+class Link:
+    """One node of the chain from the root down to the leaf that decided the outcome: what became of it, and when."""
+
+    path: str
+    type: str
+    at: float
+    why: str
+
+
+@dataclasses.dataclass(frozen=True)
+class Pose:
+    """Metres, and x, y, z, w."""
+
+    position: tuple[float, float, float]
+    quaternion: tuple[float, float, float, float]
+
+
+@dataclasses.dataclass(frozen=True)
+class Sighting:
+    """Where (m, world) and when (simulated s) a camera saw the connector."""
+
+    at: float
+    camera: str
+    position: tuple[float, float, float]
+
+
+@dataclasses.dataclass(frozen=True)
+class ArmState:
+    """Joints (rad) as read, and world_from_tool by them."""
+
+    joints: tuple[float, ...]
+    tool: Pose
+
+
+@dataclasses.dataclass(frozen=True)
+class BeliefState:
+    """The world as the robot knew it at the end; no ground truth."""
+
+    held: Pose | None  # tool_from_connector of the right hand
+    connector: Pose | None  # world_from_connector as last found for a grasp
+    sure: bool  # whether the whole of it was seen there
+    found_by: str | None
+    last_seen: Sighting | None
+    arms: dict[str, ArmState]
+    occupied_voxels: int  # of the obstacles that it mapped
+    vain_searches: int  # since the connector was found last
+    notices: tuple[tuple[float, str], ...]  # losses that it noticed: when (simulated s), by which test
+
+
+@dataclasses.dataclass(frozen=True)
+class Result:
+    """What came out of a run; the fields of result.json in their order. Seconds and ratios are plain floats."""
+
+    schema: int = dataclasses.field(default=SCHEMA, init=False)
+    scenario: str
+    seed: int
+    outcome: Outcome
+    succeeded: bool
+    case: str = DEFAULT_CASE  # of the scenario's, where some of its values vary
+    cause: Cause | None = None
+    chain: tuple[Link, ...] | None = None  # None where the run ended stowed, or in no node
+    traceback: str | None = None  # of an internal_error
+    expectations: tuple[Expectation, ...] = ()
+    slips: tuple[Slip, ...] = ()
+    sim_seconds: float = 0.0
+    wall_seconds: float = 0.0
+    real_time_factor: float = 0.0
+    renderer: str = ""
+    versions: dict[str, str] = dataclasses.field(default_factory=versions)
+    belief: BeliefState | None = None
+    attempts: tuple[Attempt, ...] = ()
+
+    def to_json(self) -> str:
+        """The text of result.json; numbers that JSON has no word for (inf, nan) become null."""
+        return json.dumps(plain(dataclasses.asdict(self)), indent=2, allow_nan=False) + "\n"
+
+
+def plain(value: Any) -> Any:
+    """The value in JSON's own types: tuples and arrays as lists, numpy scalars as numbers, inf and nan as None."""
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, dict):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(item) for item in value]
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return value if value is None or isinstance(value, (bool, int, str)) else str(value)

@@ -1,0 +1,1 @@
+"""Running: an episode, its logs and its film; many at once."""

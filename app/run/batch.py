@@ -1,0 +1,159 @@
+"""Many runs, each in a process of its own, and the row that each leaves."""
+
+import contextlib
+import math
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from regrasp.app.records.record import finish_killed
+from regrasp.app.records.result import Outcome, Result
+from regrasp.app.records.summary import asked
+from regrasp.app.run.processes import Done, run_each
+from regrasp.app.scenario.load import Scenario
+from regrasp.interfaces.cause import Cause, CauseCode
+
+if TYPE_CHECKING:
+    from regrasp.sim.render.renderer import RendererName
+
+Episode = Callable[..., Result]
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How runs are done: what is drawn and shown, and the seconds of wall time that each may take."""
+
+    video: bool = False
+    renderer: "RendererName" = "auto"
+    quiet: bool = False
+    wall_limit: float = math.inf
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run to do: a scenario's case with a seed, and the folder of its record."""
+
+    scenario: Scenario
+    seed: int
+    folder: Path | None = None
+
+    def __str__(self) -> str:
+        seed = "" if "seed=" in self.scenario.case else f" seed {self.seed}"
+        return f"{self.scenario.title}{seed}"
+
+
+@dataclass(frozen=True)
+class Row:
+    """What is kept of a run. Seconds are simulated ones unless said otherwise, forces newtons; None: not known."""
+
+    scenario: str
+    case: str
+    gravity: str
+    seed: int
+    outcome: str
+    succeeded: bool
+    cause: dict[str, Any] | None
+    peak_memory_mb: float
+    slips: int = 0
+    detection_delays: list[float] = field(default_factory=list)
+    detected_by: list[str] = field(default_factory=list)
+    unintended_force: float | None = None
+    unmet: list[str] = field(default_factory=list)
+    why: str = ""  # the cause and the unmet expectations in words; '' for a run that came out as expected
+    sim_seconds: float = 0.0
+    wall_seconds: float = 0.0  # on the clock on the wall
+    real_time_factor: float = 0.0
+
+
+def run_all(
+    runs: Sequence[Run],
+    jobs: int,
+    keep: Callable[[list[Row]], None] = lambda rows: None,
+    settings: Settings = Settings(),
+    episode: Episode | None = None,
+) -> tuple[dict[int, Row], bool]:
+    """Do all, `jobs` at a time; the rows by the runs' numbers, and whether Ctrl-C cut it short.
+
+    After each run a line goes to stderr, unless `quiet`, and `keep` gets the rows so far. A run whose process died
+    counts as an internal error; one that takes longer than the wall limit is stopped.
+    `episode` stands in for `run_episode` in tests.
+    """
+    tasks = [
+        partial(
+            episode or _run_episode,
+            run.scenario,
+            run.folder,
+            seed=run.seed,
+            video=settings.video,
+            renderer=settings.renderer,
+        )
+        for run in runs
+    ]
+    rows: dict[int, Row] = {}
+    try:
+        with contextlib.closing(run_each(tasks, jobs, settings.wall_limit)) as ended:
+            for done in ended:
+                row = rows[done.number] = row_of(runs[done.number], done)
+                keep([rows[i] for i in sorted(rows)])
+                if not settings.quiet:
+                    told = f"[{len(rows)}/{len(runs)}] {runs[done.number]}: {_summary(row)}"
+                    print(told, file=sys.stderr, flush=True)
+    except KeyboardInterrupt:
+        print(f"interrupted; {len(rows)} of {len(runs)} runs were done", file=sys.stderr)
+        return dict(sorted(rows.items())), True
+    return dict(sorted(rows.items())), False
+
+
+def _run_episode(*args: Any, **kwargs: Any) -> Result:
+    """`run_episode`, which brings the physics into the process of its own and not into ours."""
+    from regrasp.app.run.episode import run_episode
+
+    return run_episode(*args, **kwargs)
+
+
+def _summary(row: Row) -> str:
+    verdict = row.outcome if row.succeeded else f"{row.outcome}, not as expected"
+    return f"{verdict}, {row.sim_seconds:.1f} s simulated, {row.real_time_factor:.2f} x real time"
+
+
+def result_of(run: Run, done: Done[Result]) -> Result:
+    """What a run came to; of a process that died or was killed the record is finished here, with the leaf at work."""
+    if done.value is not None:
+        return done.value
+    code = CauseCode.WALL_LIMIT if done.timed_out else CauseCode.INTERNAL_ERROR
+    outcome: Outcome = "wall_limit" if done.timed_out else "internal_error"
+    cause = Cause(code, done.error)
+    result = Result(run.scenario.name, run.seed, outcome, succeeded=False, case=run.scenario.case, cause=cause)
+    return finish_killed(run.folder, result) if run.folder else result
+
+
+def row_of(run: Run, done: Done[Result]) -> Row:
+    """A run's row."""
+    what = (run.scenario.name, run.scenario.case, run.scenario.file.gravity, run.seed)
+    result = result_of(run, done)
+    values = {e.name: e.value for e in result.expectations}
+    return Row(
+        *what,
+        outcome=result.outcome,
+        succeeded=result.succeeded,
+        cause=asdict(result.cause) if result.cause else None,
+        slips=len(result.slips),
+        detection_delays=[s.detected_at - s.released_at for s in result.slips if s.detected_at is not None],
+        detected_by=[s.detected_by for s in result.slips if s.detected_by],
+        unintended_force=values.get("unintended_force"),
+        unmet=[e.name for e in result.expectations if not e.met],
+        why="" if result.succeeded else failure(result),
+        sim_seconds=result.sim_seconds,
+        wall_seconds=result.wall_seconds,
+        real_time_factor=result.real_time_factor,
+        peak_memory_mb=round(done.peak_memory_mb, 1),
+    )
+
+
+def failure(result: Result) -> str:
+    """Why a run did not come out as expected, in words: its cause and every unmet expectation."""
+    cause = [f"{result.cause.code}: {result.cause.message}"] if result.cause else []
+    return "; ".join([*cause, *(f"{e.name} is {e.value}, asked {asked(e)}" for e in result.expectations if not e.met)])

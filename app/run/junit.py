@@ -1,0 +1,63 @@
+"""JUnit XML of the runs of a scenario's cases, as build servers read it."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+from regrasp.app.files.findings import Findings, printable
+from regrasp.app.files.whole_file import write_whole
+from regrasp.app.run.batch import Row, Run
+
+ERRORS = ("internal_error", "wall_limit")  # outcomes that say nothing of the robot
+
+
+def write_junit(path: Path, name: str, runs: Sequence[Run], rows: Mapping[int, Row]) -> None:
+    """One testcase a run: time on the wall, why it failed in a sentence and in full, the record's folder.
+
+    `rows` by the runs' numbers; a run without one was interrupted and counts as skipped.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    errors = sum(row.outcome in ERRORS for row in rows.values())
+    counts = {
+        "tests": len(runs),
+        "failures": sum(not row.succeeded for row in rows.values()) - errors,
+        "errors": errors,
+        "skipped": len(runs) - len(rows),
+        "time": f"{sum(row.wall_seconds for row in rows.values()):.3f}",
+    }
+    told = {key: str(value) for key, value in counts.items()}
+    above = {key: text for key, text in told.items() if key != "skipped"}  # the common schema has no such sum
+    suites = ET.Element("testsuites", {"name": "regrasp", **above})
+    suite = ET.SubElement(suites, "testsuite", {"name": printable(name), **told})
+    for number, run in enumerate(runs):
+        _testcase(suite, run, rows.get(number))
+    ET.indent(suites)
+    text = ET.tostring(suites, encoding="unicode")
+    write_whole(path, f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n')
+
+
+def _testcase(suite: ET.Element, run: Run, row: Row | None) -> None:
+    about = {"classname": printable(run.scenario.name), "name": printable(run.scenario.case)}
+    case = ET.SubElement(suite, "testcase", {**about, "time": f"{row.wall_seconds if row else 0.0:.3f}"})
+    if row is None:
+        ET.SubElement(case, "skipped", {"message": "interrupted before its end"})
+    elif not row.succeeded:
+        tag = "error" if row.outcome in ERRORS else "failure"
+        code = row.cause["code"] if row.cause else row.outcome
+        why = printable(row.why)
+        ET.SubElement(case, tag, {"type": str(code), "message": why}).text = _in_full(run.folder) or why
+    if run.folder is not None:
+        ET.SubElement(case, "system-out").text = printable(str(run.folder))
+
+
+def _in_full(folder: Path | None) -> str:
+    """The page that `regrasp explain` shows of a record; '' where the run did not come to have one."""
+    from regrasp.app.records.explain import REPORT_WIDTH, explanation  # late: the command line starts with this module
+    from regrasp.app.records.reader import read_record
+
+    try:
+        return explanation(read_record(folder), REPORT_WIDTH) if folder else ""
+    except Findings:
+        return ""

@@ -1,0 +1,1 @@
+"""Scenario and cell files: read, checked, varied, and drawn from a seed."""

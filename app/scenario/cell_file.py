@@ -1,0 +1,69 @@
+"""Cell files: what stands in a cell, read and checked."""
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from regrasp.app.files.findings import Finding, Findings, attempt, nearest, shown
+from regrasp.app.files.overrides import Assignment, apply, lay_over
+from regrasp.app.files.resources import read_text, resolve
+from regrasp.app.files.validation import validated
+from regrasp.app.files.yaml_lines import Document, Place, parse
+from regrasp.app.scenario.cell_layout import impossible
+from regrasp.interfaces.cell import Cell
+from regrasp.interfaces.quote import MOST, cut, quoted
+
+
+def load_cell(path: Path, assignments: Sequence[Assignment] = (), where: Place | None = None) -> Cell:
+    """Read and check a cell file with values laid over it.
+
+    A cell may name another as its `base`, whose values it takes where it gives none; that one names no base in turn.
+    Raises `Findings`, at `where` (the place that names the cell) when there is no such file.
+    """
+    document = parse(read_text(path, where), shown(path))
+    if isinstance(document.value, dict) and "base" in document.value:
+        document = _on_base(document, path.parent)
+    fits = isinstance(document.value, dict)  # else that alone is wrong, and not what is laid over it
+    _, found = attempt(apply, document, assignments if fits else ())
+    cell, wrong = attempt(validated, document, Cell)
+    found += wrong
+    if cell:
+        found += [*_misnamed(document, cell)] or impossible(document, cell)
+    if found or not cell:
+        raise Findings(found)
+    return cell
+
+
+def _on_base(top: Document, folder: Path) -> Document:
+    assert isinstance(top.value, dict)
+    name, place = top.value.pop("base"), top.place(("base",))
+    if not isinstance(name, str):
+        raise Findings([Finding(*place, f"base is {quoted(name)}; expected the name of a cell or a path to its file")])
+    path = resolve("cell", name, folder, place)
+    document = parse(read_text(path, place), shown(path))
+    if isinstance(document.value, dict) and "base" in document.value:
+        raise Findings(
+            [Finding(*place, f"{quoted(shown(path))} has a base itself; name that one, and give here what it adds")]
+        )
+    lay_over(document, top)
+    return document
+
+
+def _misnamed(document: Document, cell: Cell) -> Iterator[Finding]:
+    """Names in a cell that do not go together."""
+    known = cell.known
+    boxes = [*known.boxes, *known.clip.bracket]
+    for name, count in Counter(box.name for box in boxes).items():
+        if count > 1:
+            yield Finding(*document.place(("known", "boxes")), f"{count} boxes are named {quoted(name)}; rename them")
+    sockets = [s.name for s in known.sockets]
+    if known.plugged_into not in sockets:
+        message = f"no socket {quoted(known.plugged_into)}; {nearest(known.plugged_into, sockets)}"
+        yield Finding(*document.place(("known", "plugged_into")), message)
+    arms: list[str] = [a.name for a in known.arms]
+    cameras: list[str] = [c.name for c in known.cameras]
+    groups = {"sockets": (sockets, sockets), "arms": (arms, ["left", "right"]), "cameras": (cameras, ["rear", "wrist"])}
+    for key, (names, needed) in groups.items():
+        if sorted(names) != sorted(set(needed)):
+            given, right = (cut(", ".join(group), 3 * MOST) for group in (names, sorted(set(needed))))
+            yield Finding(*document.place(("known", key)), f"{key} are {given}; give one each of {right}")

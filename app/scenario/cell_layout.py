@@ -1,0 +1,250 @@
+"""What in a cell cannot be: parts that stand in one another, joints past their limits, a cable that is too short."""
+
+from collections.abc import Iterator
+from functools import lru_cache
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial.transform import RigidTransform
+
+from regrasp.app.files.findings import Finding
+from regrasp.app.files.yaml_lines import Document, Path
+from regrasp.app.scenario.placement import (
+    FloatArray,
+    arm_base,
+    asleep,
+    box_halves,
+    cable_at_start,
+    cable_error,
+    cube_depths,
+    fixed_cameras,
+    line_depth,
+    penetration,
+    socket_block,
+)
+from regrasp.interfaces.cell import PLUGGED_INTO, Cell, FixedMount, KnownCell
+from regrasp.interfaces.fault import JOINT_NAMES
+from regrasp.interfaces.quote import cut, quoted
+from regrasp.interfaces.scene import GRAVITIES
+
+MOST_OVERLAP = 0.005  # metres: the spheres that fill an arm stand out of it by less
+ENDS = 0.05  # metres of the cable at its sockets, which are built in
+
+
+class Part(NamedTuple):
+    """A body that does not move: where the file says so, name, centre (3,) and half edges (3, 3), metres."""
+
+    path: Path
+    name: str
+    center: FloatArray
+    halves: FloatArray
+
+
+def impossible(document: Document, cell: Cell) -> list[Finding]:
+    """What is wrong with a cell although each of its values is right."""
+    known = cell.known
+    found = [
+        *_joints(document, known),
+        *_overlaps(document, known),
+        *_cable(document, cell),
+        *_clip(document, known),
+        *_sight(document, known),
+    ]
+    return found or [*_in_the_way(document, cell), *_plug(document, known)]  # which take a moment
+
+
+def _joints(document: Document, known: KnownCell) -> Iterator[Finding]:
+    from regrasp.motion.robots.kinematics import LOWER, UPPER  # late: it brings the compiler
+
+    for i, arm in enumerate(known.arms):
+        for j, (angle, low, high) in enumerate(zip(arm.sleep, LOWER, UPPER, strict=True)):
+            if not low <= angle <= high:
+                told = f"{angle:g} rad is past the limits of the {arm.name} arm's {JOINT_NAMES[j]}; "
+                inside = f"write one from {np.ceil(100 * low) / 100:.2f} to {np.floor(100 * high) / 100:.2f}"
+                yield Finding(*document.place(("known", "arms", i, "sleep", j)), told + inside)
+
+
+def _overlaps(document: Document, known: KnownCell) -> Iterator[Finding]:
+    """Arms, cameras, the plugged and the stowed connector in other parts of the cell."""
+    parts = [*_parts(known)]
+    bases = [Part(("known", "arms", i), *arm_base(arm)) for i, arm in enumerate(known.arms)]
+    for part in [*parts, *bases]:
+        for name, depth in _inside(known, part, bases):
+            if depth > MOST_OVERLAP:
+                message = f"{cut(part.name)} reaches {depth:.3f} m into {name}; move one of them"
+                yield Finding(*document.place(part.path), message)
+    if (depth := _between_the_arms(known)) > MOST_OVERLAP:
+        message = f"the arms asleep reach {depth:.3f} m into each other; change their sleep or their bases"
+        yield Finding(*document.place(("known", "arms")), message)
+    for name, place in fixed_cameras(known):
+        for part in [*parts, *bases]:
+            if penetration(part.halves, place - part.center) > 0:
+                yield Finding(
+                    *document.place(part.path), f"the {name} camera is inside {cut(part.name)}; move one of them"
+                )
+
+
+def _between_the_arms(known: KnownCell) -> float:
+    """How deep (m) the arms asleep reach into each other, by the spheres that fill their moving links."""
+    from regrasp.motion.robots.spheres import LINKS, SPHERES  # late: they bring the compiler
+
+    moving = LINKS > 0
+    radii = SPHERES[moving, 3]
+    bodies = [asleep(arm)[0][moving] for arm in known.arms]
+    deepest = [
+        float((radii[:, None] + radii[None] - np.linalg.norm(a[:, None] - b[None], axis=2)).max())
+        for a, b in combinations(bodies, 2)
+    ]
+    return max(deepest, default=0.0)
+
+
+def _inside(known: KnownCell, part: Part, bases: list[Part]) -> Iterator[tuple[str, float]]:
+    """What a part may stand in, with the depth (m) that it reaches into it."""
+    for arm, base in zip(known.arms, bases, strict=True):
+        if part.path == base.path:
+            continue
+        if part.path[1] != "arms" or part.path > base.path:  # a pair of bases once
+            yield base.name, penetration(np.vstack([part.halves, base.halves]), part.center - base.center)
+        centers, halves = asleep(arm)
+        yield f"the {arm.name} arm asleep", float(cube_depths(part.halves, part.center - centers, halves).max())
+    length, radius = known.connector.length, known.connector.radius
+    size = (length, radius * np.sqrt(2), radius * np.sqrt(2))  # the box inside the cylinder
+    plugged = known.socket(PLUGGED_INTO)
+    poses = {
+        "the plugged connector": plugged.world_from_plug(length),
+        "the stowed connector": known.clip.world_from_seat,
+    }
+    own: dict[str, Path] = {
+        "the plugged connector": ("known", "sockets", known.sockets.index(plugged)),
+        "the stowed connector": ("known", "clip"),
+    }
+    for name, pose in poses.items():
+        if part.path[: len(own[name])] != own[name]:
+            halves = box_halves(pose.rotation.as_matrix(), size)
+            yield name, penetration(np.vstack([part.halves, halves]), part.center - pose.translation)
+
+
+def _parts(known: KnownCell) -> Iterator[Part]:
+    """Boxes, sockets and the clip's bracket."""
+    for i, box in enumerate(known.boxes):
+        yield Part(("known", "boxes", i), box.name, np.array(box.center), box_halves(np.eye(3), box.size))
+    for i, box in enumerate(known.clip.bracket):
+        yield Part(("known", "clip", "bracket", i), box.name, np.array(box.center), box_halves(np.eye(3), box.size))
+    for i, socket in enumerate(known.sockets):
+        yield Part(("known", "sockets", i), *socket_block(socket))
+
+
+def _in_the_way(document: Document, cell: Cell) -> Iterator[Finding]:
+    """Boxes through which the cable hangs at the start, in one gravity or the other, but at its ends."""
+    for part in _parts(cell.known):
+        if part.path[1] == "sockets":
+            continue
+        for gravity in GRAVITIES:
+            points = np.array(cable_at_start(cell, gravity))
+            points = points[(along := np.linspace(0.0, cell.hidden.cable.length, len(points))) > ENDS]
+            points = points[: -np.count_nonzero(along > cell.hidden.cable.length - ENDS)]
+            depth = line_depth(part.halves, part.center, points, cell.hidden.cable.radius) if len(points) > 1 else 0.0
+            if depth > max(MOST_OVERLAP, cable_error(cell, gravity)):
+                told = (
+                    f"{cut(part.name)} reaches {depth:.3f} m into the cable at the start ({gravity} gravity); move it"
+                )
+                yield Finding(*document.place(part.path), told)
+                break
+
+
+def _sight(document: Document, known: KnownCell) -> Iterator[Finding]:
+    """The rear camera, which watches the carrying, must see where it begins or ends."""
+    camera = known.camera("rear")
+    if not isinstance(camera.mount, FixedMount):
+        return
+    pose, k = camera.mount.world_from_camera, camera.intrinsics
+    plug = known.socket(PLUGGED_INTO).world_from_plug(known.connector.length).translation
+    boxes = [part for part in _parts(known) if part.path[1] == "boxes"]
+    for target in (plug, np.asarray(known.clip.seat)):
+        x, y, z = pose.inv().apply(target)
+        in_view = z > 0 and 0 <= k.fx * x / z + k.cx < k.width and 0 <= k.fy * y / z + k.cy < k.height
+        ray = np.array([pose.translation, pose.translation + 0.9 * (target - pose.translation)])  # not into its socket
+        if in_view and all(line_depth(box.halves, box.center, ray, 0.0) <= 0 for box in boxes):
+            return
+    where = document.place(("known", "cameras", known.cameras.index(camera), "mount"))
+    yield Finding(*where, "the rear camera sees neither the plugged connector nor the clip; turn or move it")
+
+
+def _cable(document: Document, cell: Cell) -> Iterator[Finding]:
+    known, cable = cell.known, cell.hidden.cable
+    plugged = known.socket(PLUGGED_INTO)
+    if plugged is known.sockets[-1]:
+        message = (
+            f"{quoted(plugged.name)}, the last socket, holds the cable's other end; name another, or put it elsewhere"
+        )
+        yield Finding(*document.place(("known", "plugged_into")), message)
+        return
+    rear = [-0.5 * known.connector.length, 0.0, 0.0]
+    ends = {
+        f"socket {plugged.name}": plugged.world_from_plug(known.connector.length),
+        "the clip": known.clip.world_from_seat,
+    }
+    for name, pose in ends.items():
+        way = float(np.linalg.norm(pose.apply(rear) - cable.anchor))
+        if way >= cable.length:
+            message = f"a cable {cable.length:g} m long does not reach a connector in {cut(name)}, {way:.3f} m away"
+            place = document.place(("hidden", "cable", "length"))
+            yield Finding(*place, f"{message}; make it longer, or move that nearer")
+
+
+def _clip(document: Document, known: KnownCell) -> Iterator[Finding]:
+    from regrasp.behaviors.cable.hand import HAND  # late: it brings the planner and the compiler
+    from regrasp.motion.robots.kinematics import ORIGINS, TOOL_OFFSET
+
+    shoulder = np.asarray(known.arm(HAND).base) + ORIGINS[0] + ORIGINS[1]
+    reach = float(np.linalg.norm(ORIGINS[2:], axis=1).sum() + np.linalg.norm(TOOL_OFFSET))
+    way = float(np.linalg.norm(np.asarray(known.clip.seat) - shoulder))
+    if way > reach:
+        message = f"the clip is {way:.2f} m from the {HAND} arm's shoulder, which reaches {reach:.2f} m"
+        yield Finding(*document.place(("known", "clip", "seat")), f"{message}; move it nearer")
+
+
+def _plug(document: Document, known: KnownCell) -> Iterator[Finding]:
+    from regrasp.motion.service import JAW_SLACK, OPEN_GAP  # late: it brings the planner and the compiler
+
+    thick = 2 * known.connector.radius
+    if thick + 2 * JAW_SLACK > OPEN_GAP:
+        message = f"a connector {1e3 * thick:.0f} mm thick does not fit the jaw, which opens {1e3 * OPEN_GAP:.0f} mm"
+        right = f"write a radius up to {0.5 * OPEN_GAP - JAW_SLACK:.3f}"
+        yield Finding(*document.place(("known", "connector", "radius")), f"{message} and needs some room; {right}")
+        return
+    if trouble := _no_grasp(known):
+        message = f"no way to take hold of a connector in socket {cut(known.plugged_into)}: {trouble}"
+        yield Finding(*document.place(("known", "plugged_into")), f"{message}; plug it in elsewhere, or make room")
+
+
+@lru_cache(maxsize=64)
+def _no_grasp(known: KnownCell) -> str | None:
+    """Why the hand cannot take hold of the plugged connector among the known boxes; None when it can."""
+    from regrasp.behaviors.cable.hand import HAND  # late: they bring the planner and the compiler
+    from regrasp.behaviors.cable.unplug import SHALLOW
+    from regrasp.motion.failure import PlanningError
+    from regrasp.motion.grasping.grasps import choose_grasp, grasp_candidates
+    from regrasp.motion.robots.kinematics import ArmKinematics
+    from regrasp.motion.scene.collision import CollisionModel
+    from regrasp.motion.service import GRIP_OFFSETS, NEAR_MARGINS, OPEN_GAP, TIGHT_MARGIN
+
+    arms: dict[str, ArmKinematics] = {
+        arm.name: ArmKinematics(RigidTransform.from_translation(arm.base)) for arm in known.arms
+    }
+    boxes, connector = known.solids(), known.connector
+    others = [CollisionModel(arms[a.name], boxes).spheres(np.array(a.sleep)) for a in known.arms if a.name != HAND]
+    model = CollisionModel(arms[HAND], boxes, other_arm=np.vstack(others), opening=OPEN_GAP)
+    plug = known.socket(PLUGGED_INTO).world_from_plug(connector.length)
+    asleep_at = np.array(known.arm(HAND).sleep)
+    try:
+        candidates = [
+            grasp
+            for offset in GRIP_OFFSETS
+            for grasp in grasp_candidates(plug, connector.length, connector.radius, offset, shallow=SHALLOW)
+        ]
+        choose_grasp(arms[HAND], model, asleep_at, candidates, margin=TIGHT_MARGIN, near_margin=NEAR_MARGINS[-1])
+    except (PlanningError, ValueError) as error:
+        return str(error)
+    return None

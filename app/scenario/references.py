@@ -1,0 +1,106 @@
+"""What the parts of a scenario must be to one another, its cell and its tree, as far as each part is right alone."""
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from pydantic import TypeAdapter
+
+from regrasp.app.files.findings import Finding, Findings, nearest
+from regrasp.app.files.schema_nodes import at
+from regrasp.app.files.validation import part
+from regrasp.app.files.yaml_lines import Document
+from regrasp.app.scenario.schema import TreeInput
+from regrasp.interfaces.cell import PLUGGED_INTO, Cell
+from regrasp.interfaces.quote import cut, quoted
+
+_INPUT = TypeAdapter[TreeInput](TreeInput)
+
+
+def tree_text(value: TreeInput) -> str:
+    """An input's value as a tree file would state it."""
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def names_of(cell: Cell | None) -> dict[str, dict[str, str]]:
+    """What a tree may name of the cell, by kind, each with why it cannot work there, "" if it can (`trees.check_tree`).
+
+    Without a cell, what it may name in any.
+    """
+    from regrasp.perception.pose.technique import TECHNIQUES  # late: it brings the compiler with it
+
+    techniques: dict[str, str] = dict.fromkeys(TECHNIQUES, "")
+    if cell is None:
+        return {"technique": techniques}
+    if cell.known.connector.tag is None:
+        techniques["fiducial"] = "needs a tag on the connector, and this cell's has none; take the cell thesis_tags"
+    plugged = cell.known.plugged_into
+    empty = f"is empty at the start: the cell's plugged_into is {quoted(plugged)}; write {PLUGGED_INTO}"
+    sockets = {socket.name: "" if socket.name == plugged else empty for socket in cell.known.sockets}
+    return {"socket": {PLUGGED_INTO: ""} | sockets, "technique": techniques}
+
+
+def check_inputs(document: Document, tree: Path | None, cell: Cell | None) -> None:
+    """Raises `Findings` for inputs that the tree does not take, or not with these values."""
+    from regrasp.trees import (
+        check_inputs as of_tree,  # the leaves bring the planner and the compiler with them: seconds
+    )
+
+    written = at(document.value, ("inputs",))
+    if tree is None or not isinstance(written, dict):
+        return
+    values = {key: part(document, ("inputs", key), _INPUT) for key in written}
+    given = {key: tree_text(value) for key, value in values.items() if value is not None}
+    if found := [
+        Finding(*document.place(("inputs", key)), f"inputs.{cut(key)}: {message}")
+        for key, message in of_tree(tree, given, names=names_of(cell))
+    ]:
+        raise Findings(found)
+
+
+def check_names(document: Document, tree: Path | None) -> None:
+    """Raises `Findings` for obstacles and nodes of the tree that faults name and that are not there."""
+    if found := [*_obstacles(document), *_nodes(document, tree)]:
+        raise Findings(found)
+
+
+def _faults(document: Document) -> Iterator[tuple[int, Mapping[str, Any]]]:
+    """Number and keys of each fault that has any."""
+    written = at(document.value, ("faults",))
+    for i, fault in enumerate(written if isinstance(written, list) else []):
+        if isinstance(fault, dict):
+            yield i, fault
+
+
+def _obstacles(document: Document) -> Iterator[Finding]:
+    written = at(document.value, ("obstacles",))
+    obstacles = written if isinstance(written, list) else []
+    names = [name for i in range(len(obstacles)) if isinstance(name := at(obstacles, (i, "name")), str)]
+    if len(names) < len(obstacles) or (written is not None and not isinstance(written, list)):
+        return  # nobody knows what the others are called
+    for i, fault in _faults(document):
+        name = fault.get("obstacle")
+        if fault.get("type") == "obstacle_moves_in" and isinstance(name, str) and name not in names:
+            message = f"no obstacle {quoted(name)}; {nearest(name, names)}"
+            yield Finding(*document.place(("faults", i, "obstacle")), message)
+
+
+def _nodes(document: Document, tree: Path | None) -> Iterator[Finding]:
+    for i, _ in _faults(document):
+        name = at(document.value, ("faults", i, "when", "node"))
+        if tree and isinstance(name, str) and (names := _node_names(tree)) and name not in names:
+            alike = [other for other in names if ("/" in other) == ("/" in name)]
+            message = f"no node {quoted(name)} in {tree.name}; {nearest(name, alike)}"
+            yield Finding(*document.place(("faults", i, "when", "node")), message)
+
+
+def _node_names(tree: Path) -> set[str]:
+    """Every way to name a node of the tree: its path, and the last names of it; none where the file is no tree."""
+    from regrasp.trees import TreeSyntaxError, read_graph
+
+    try:
+        nodes = read_graph(tree).walk()
+    except (OSError, TreeSyntaxError, ValueError):  # a finding of the tree's own check
+        return set()
+    steps = [node.path.split("/") for node in nodes if node.kind != "subtree"]
+    return {"/".join(names[i:]) for names in steps for i in range(len(names))}

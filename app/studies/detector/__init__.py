@@ -1,0 +1,1 @@
+"""The detector's pictures, its training, and its score."""

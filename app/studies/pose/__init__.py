@@ -1,0 +1,1 @@
+"""The pose study: the techniques compared on the same scenes."""

@@ -1,0 +1,1 @@
+"""What each task brings to the door: its judge and its words."""

@@ -1,0 +1,46 @@
+"""Notice that the connector has left the hand."""
+
+from typing import Any, ClassVar
+
+from py_trees.common import Status
+
+from regrasp.behaviors.cable.hand import HAND
+from regrasp.behaviors.leaf import Leaf
+from regrasp.behaviors.services import Notice
+from regrasp.interfaces.cause import CauseCode
+from regrasp.perception.tracking.slip import GapTest, SlipEvidence, distance_slip
+from regrasp.perception.tracking.track import TrackState
+
+
+class DetectSlip(Leaf):
+    """RUNNING while the connector is held; FAILURE, with the test that said so, once it has slipped.
+
+    The thesis's test is the distance between gripper and estimated connector; the finger gap tells at once what the eye
+    may miss, an end that stays near.
+    """
+
+    INPUT_PORTS: ClassVar[dict[str, Any]] = {}
+    OUTPUT_PORTS: ClassVar[dict[str, Any]] = {}
+    RETURNS = frozenset({Status.RUNNING, Status.FAILURE})
+
+    def initialise(self) -> None:
+        """Forget the readings of an earlier carry."""
+        self._gap = GapTest(2 * self.services.known.connector.radius)
+
+    def work(self) -> Status:
+        """See the class."""
+        self._gap.feed(self.services.motion.grippers[HAND].reading())
+        for evidence in (self._gap.evidence(), self._distance()):
+            if evidence is not None and evidence.detected:
+                self.services.belief.held = None
+                self.services.belief.notices.append(Notice(self.services.clock.now(), evidence.by))
+                self.say("slip", by=evidence.by, value=round(evidence.value, 4), limit=evidence.limit)
+                return self.fail(CauseCode.SLIPPED, evidence.sentence)
+        return Status.RUNNING
+
+    def _distance(self) -> SlipEvidence | None:
+        """The thesis's test, while the connector is seen; what the hand hides is no slip."""
+        track, now = self.services.perception.track, self.services.clock.now()
+        if track.last is None or track.state(now)[0] is not TrackState.VISIBLE:
+            return None
+        return distance_slip(self.services.motion.tool(HAND).translation, track.last.position)

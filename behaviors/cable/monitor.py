@@ -1,0 +1,49 @@
+"""Keep an eye on the connector while it is carried."""
+
+from typing import Any, ClassVar
+
+from py_trees.common import Status
+
+from regrasp.behaviors.cable.hand import HAND
+from regrasp.behaviors.leaf import Leaf, Port
+
+
+class Monitor(Leaf):
+    """Looks through the rear camera every `period` seconds and tells the track where the hand is; always SUCCESS.
+
+    It stands before `DetectSlip` in a Sequence without memory, so both come at every tick.
+    """
+
+    INPUT_PORTS: ClassVar[dict[str, Any]] = {
+        "period": Port(data_type=float, required=False, default_value=0.1, above=0, description="s between looks")
+    }
+    OUTPUT_PORTS: ClassVar[dict[str, Any]] = {}
+    RETURNS = frozenset({Status.SUCCESS})
+    _due = 0.0
+    _trouble = False
+
+    def work(self) -> Status:
+        """See the class."""
+        perception, now = self.services.perception, self.services.clock.now()
+        tool, held = self.services.motion.tool(HAND), self.services.belief.held
+        perception.track.held(tool.translation)
+        perception.hint = None if held is None else (tool * held).rotation.apply([1.0, 0.0, 0.0])
+        if now >= self._due - 1e-9:
+            perception.look("rear")
+            self._due = now + self.get_input("period")
+            self._tell_trouble(perception.trouble("rear"))
+        state, sentence = perception.track.state(now)
+        self.feedback_message = f"{state.value}: {sentence}"
+        return Status.SUCCESS
+
+    def _tell_trouble(self, trouble: str | None) -> None:
+        if (trouble is not None) != self._trouble:
+            self._trouble = trouble is not None
+            self.say("camera", camera="rear", trusted=not self._trouble, why=trouble or "its frames are sound again")
+
+    def terminate(self, new_status: Status) -> None:
+        """Stopped from above: the hand no longer carries under watch."""
+        if new_status is Status.INVALID:
+            self.services.perception.track.held(None)
+            self.services.perception.hint = None
+            self._due = 0.0

@@ -1,0 +1,83 @@
+"""Leave the connector in the clip, and look whether it stays there."""
+
+import numpy as np
+
+from regrasp.behaviors.cable.hand import EYE, HAND, HandLeaf
+from regrasp.behaviors.cable.look import LookLeaf
+from regrasp.behaviors.leaf import Failed, Steps
+from regrasp.behaviors.services import Notice
+from regrasp.interfaces.cause import CauseCode
+from regrasp.motion.failure import PlanningError
+from regrasp.motion.scene.bodies import NO_POINTS
+from regrasp.perception.pose.cable_shape import cable_course
+from regrasp.perception.pose.estimate import Estimate
+from regrasp.perception.tracking.slip import seen_at
+
+OPEN_SECONDS = 0.6
+LOOK_SECONDS = 1.0
+STOWED_RADIUS = 0.04  # m: 20 mm of the clip, 10 mm of the eye, and a part hidden by the clip
+
+
+class LetGo(HandLeaf):
+    """Opens the jaw, draws it back and brings the arm to its sleep pose."""
+
+    def steps(self) -> Steps:
+        """See the class."""
+        yield self.services.motion.release(HAND)
+        self.services.belief.held = None
+        yield from self.wait(OPEN_SECONDS)
+        known, motion = self.services.known, self.services.motion
+        seat = known.clip.world_from_seat
+        along = np.linspace(-0.5, 0.5, 10)[:, None] * known.connector.length
+        yield from self.draw_back()
+        # The way to sleep must not sweep the stowed end out of its clip.
+        motion.keep_clear(np.vstack([seat.apply(along * [1.0, 0.0, 0.0]), cable_course(known, seat)]))
+        yield from self.go_to_sleep(HAND)
+        motion.keep_clear(NO_POINTS)
+
+
+class LookAtStow(LookLeaf):
+    """A look at the clip: FAILURE when the connector is not there, so that an end that fell out is not left lying.
+
+    The wrist camera looks where the rear one is not to be trusted.
+    """
+
+    def steps(self) -> Steps:
+        """See the class."""
+        clock, perception = self.services.clock, self.services.perception
+        begin = clock.now()
+        seen: list[Estimate] = []
+        while clock.now() < begin + LOOK_SECONDS - 1e-9:
+            yield None
+            result = perception.look("rear")
+            if isinstance(result, Estimate) and result.stamp > begin:
+                seen.append(result)
+        trouble = perception.trouble("rear")
+        if trouble is not None:
+            yield from self._look_from_the_wrist(trouble, seen)
+        if not seen:
+            self._lost("no camera sees the connector at the clip")
+        else:
+            evidence = seen_at(seen[-1].position, np.array(self.services.known.clip.seat), STOWED_RADIUS)
+            self.say("looked at the clip", distance=round(evidence.value, 4), stowed=evidence.detected)
+            if not evidence.detected:
+                self._lost(evidence.sentence)
+
+    def _look_from_the_wrist(self, trouble: str, seen: list[Estimate]) -> Steps:
+        self.say("the wrist camera looks at the clip", why=trouble)
+        seen.clear()
+        if (other := self.services.perception.trouble("wrist")) is not None:
+            raise Failed(CauseCode.CAMERA_FAILED, f"{trouble}; {other}")
+        try:
+            _, goals = self.best_view(self.services.known.clip.world_from_seat)
+            yield from self.go_and_look(goals, LOOK_SECONDS, seen)
+        except PlanningError as error:
+            raise Failed(CauseCode.CAMERA_FAILED, f"{trouble}; the wrist camera cannot look there: {error}") from None
+        other = self.services.perception.trouble("wrist")
+        yield from self.go_to_sleep(EYE)
+        if other is not None:
+            raise Failed(CauseCode.CAMERA_FAILED, f"{trouble}; {other}")
+
+    def _lost(self, message: str) -> None:
+        self.services.belief.notices.append(Notice(self.services.clock.now(), "place"))
+        raise Failed(CauseCode.NOT_STOWED, message)

@@ -1,0 +1,1 @@
+"""Leaves of no task in particular."""

@@ -1,0 +1,28 @@
+"""Choose how the robot finds the connector."""
+
+from typing import Any, ClassVar
+
+from py_trees.common import Status
+
+from regrasp.behaviors.leaf import Leaf, Port
+
+
+class UseTechnique(Leaf):
+    """From now on every look is by this technique of `regrasp.perception.pose.technique`."""
+
+    INPUT_PORTS: ClassVar[dict[str, Any]] = {
+        "technique": Port(
+            data_type=str,
+            names="technique",
+            description="rgbd, detector, fused; fiducial where the connector has a tag",
+        )
+    }
+    OUTPUT_PORTS: ClassVar[dict[str, Any]] = {}
+    RETURNS = frozenset({Status.SUCCESS})
+
+    def work(self) -> Status:
+        """See the class."""
+        name = self.get_input("technique")
+        self.services.perception.use(name)
+        self.say("looks from now on", technique=name)
+        return Status.SUCCESS

@@ -1,0 +1,1 @@
+"""How to take hold of things."""

@@ -1,0 +1,1 @@
+"""Paths, and paths in time."""

@@ -1,0 +1,204 @@
+"""Collision-free joint paths: straight when that is free, else OMPL's RRTConnect, then shortened.
+
+Counted, never timed: the same seed gives the same path.
+"""
+
+import numpy as np
+import ompl.base as ob
+import ompl.geometric as og
+import ompl.util as ou
+from numpy.typing import NDArray
+
+from regrasp.interfaces.cause import CauseCode
+from regrasp.motion.failure import PlanningError
+from regrasp.motion.robots.kinematics import LOWER, UPPER, FloatArray
+from regrasp.motion.scene.collision import COARSE_STEP, CollisionModel
+
+ou.setLogLevel(ou.LOG_NONE)
+
+# Metres that the arm's far end moves per radian, about: distances in joint space count the big joints more.
+WEIGHTS = np.array([0.75, 0.75, 0.5, 0.25, 0.25, 0.12])
+_SHORTCUTS = 80  # tries
+_FINE_SLACK = 0.003  # m: between two coarse checks, 0.02 rad apart, a hand 0.3 m off the joint's axis bulges no further
+_ESCAPE_STEP = 0.02  # rad
+_ESCAPE_STEPS = 100
+_ATTEMPTS = 4  # searches, when the fine check of a found path fails
+
+
+def plan(
+    model: CollisionModel,
+    start: FloatArray,
+    goals: NDArray[np.float64],
+    seed: int,
+    max_checks: int = 20000,
+    margin: float = 0.01,
+) -> FloatArray:
+    """Joint path (k, 6) rad from `start` (6,) to one of `goals` (n, 6), `margin` metres from everything.
+
+    A start that is nearer than `margin` but does not touch (after a grasp beside a panel) is first led away: the path
+    begins with small steps along which the clearance only grows. `max_checks` bounds the configurations checked by the
+    search.
+
+    Raises PlanningError: MOTION_BLOCKED if the start touches something, NO_COLLISION_FREE_GOAL if all goals do,
+    PLANNING_FAILED if no path was found.
+    """
+    start, goals = np.asarray(start, float), np.asarray(goals, float).reshape(-1, 6)
+    escape = _escape(model, start, margin, np.random.default_rng(seed))
+    free_goals = _free_goals(model, goals, margin)
+    for goal in free_goals:
+        if model.path_free(np.array([escape[-1], goal]), margin):
+            return _joined(escape, np.array([escape[-1], goal]))
+    budget = _Budget(max_checks)
+    for attempt in range(_ATTEMPTS):
+        found = _search(model, escape[-1], free_goals, seed + attempt, budget, margin)
+        path = _shortened(model, found, margin, np.random.default_rng([seed, attempt]))
+        if model.path_free(path, max(0.0, margin - _FINE_SLACK)):
+            return _joined(escape, path)
+    raise PlanningError(CauseCode.PLANNING_FAILED, f"{_ATTEMPTS} paths found, none free when checked finely")
+
+
+class _Budget:
+    """Configurations that may still be checked."""
+
+    def __init__(self, limit: int) -> None:
+        self.limit = self.left = limit
+
+    def spent(self) -> bool:
+        return self.left <= 0
+
+
+class _EdgeCheck(ob.MotionValidator):
+    """Straight joint motions checked in one call, and counted. States are joints times `WEIGHTS`."""
+
+    def __init__(self, space: ob.SpaceInformation, model: CollisionModel, margin: float, budget: _Budget) -> None:
+        super().__init__(space)
+        self._model, self._margin, self._budget = model, margin, budget
+
+    def checkMotion(self, a: ob.State, b: ob.State) -> bool:  # noqa: N802 (OMPL's name)
+        """Whether the motion between two states is free."""
+        qa, qb = _joints(a), _joints(b)
+        self._budget.left -= 1 + int(np.abs(qb - qa).max() / COARSE_STEP)
+        return self._model.edge_free(qa, qb, self._margin)
+
+
+def _joints(state: ob.State) -> FloatArray:
+    return np.array(state[0:6]) / WEIGHTS  # iterating over a state crashes the process (OMPL 2.0.1)
+
+
+def _search(
+    model: CollisionModel, start: FloatArray, goals: FloatArray, seed: int, budget: _Budget, margin: float
+) -> FloatArray:
+    """Waypoints (k, 6) by RRTConnect; PlanningError when the budget runs out."""
+    space = ob.RealVectorStateSpace(6)
+    bounds = ob.RealVectorBounds(6)
+    for i in range(6):
+        bounds.setLow(i, float(LOWER[i] * WEIGHTS[i]))
+        bounds.setHigh(i, float(UPPER[i] * WEIGHTS[i]))
+    space.setBounds(bounds)
+    ou.RNG.setSeed(seed + 1)  # OMPL takes no 0
+    setup = og.SimpleSetup(space)
+    information = setup.getSpaceInformation()
+
+    def valid(state: ob.State) -> bool:
+        budget.left -= 1
+        return model.free(_joints(state), margin)
+
+    check = _EdgeCheck(information, model, margin, budget)
+    setup.setStateValidityChecker(valid)
+    information.setMotionValidator(check)
+    first = space.allocState()
+    first[0:6] = (start * WEIGHTS).tolist()
+    setup.addStartState(first)
+    targets = ob.GoalStates(information)
+    for goal in goals:
+        target = space.allocState()
+        target[0:6] = (goal * WEIGHTS).tolist()
+        targets.addState(target)
+    setup.setGoal(targets)
+    setup.setPlanner(og.RRTConnect(information))
+    setup.solve(ob.PlannerTerminationCondition(budget.spent))
+    if not setup.haveExactSolutionPath():  # a status is true for an approximate solution, too
+        raise PlanningError(
+            CauseCode.PLANNING_FAILED,
+            f"no path to {len(goals)} goals at {margin * 1e3:.0f} mm margin in {budget.limit} checked configurations",
+        )
+    path = np.array([_joints(state) for state in setup.getSolutionPath().getStates()])
+    path[0] = start
+    path[-1] = goals[np.argmin(np.abs(goals - path[-1]).max(axis=1))]  # as given, without the rounding of the weights
+    return path
+
+
+def _free_goals(model: CollisionModel, goals: FloatArray, margin: float) -> FloatArray:
+    """The goals that keep the margin; PlanningError with the best one's trouble when there is none."""
+    if not len(goals):
+        raise PlanningError(CauseCode.OUT_OF_REACH, "no joint angles reach the goal")
+    free = goals[[model.free(goal, margin) for goal in goals]]
+    if not len(free):
+        distance, what = max(model.nearest(goal) for goal in goals)
+        message = (
+            f"none of {len(goals)} goals keeps {margin * 1e3:.0f} mm: the best has {distance * 1e3:.0f} mm to {what}"
+        )
+        raise PlanningError(CauseCode.NO_COLLISION_FREE_GOAL, message)
+    return free
+
+
+def _escape(model: CollisionModel, start: FloatArray, margin: float, rng: np.random.Generator) -> FloatArray:
+    """Small steps (k, 6) from the start to where the margin is kept, each with more clearance than the one before."""
+    q = start
+    steps = [q]
+    clearance, what = model.nearest(q)
+    if clearance < 0:
+        message = f"the arm touches {what}, {-clearance * 1e3:.0f} mm deep"
+        raise PlanningError(CauseCode.MOTION_BLOCKED, message)
+    while not model.free(q, margin):
+        candidates = np.clip(q + _directions(rng) * _ESCAPE_STEP, LOWER, UPPER)
+        best = max(candidates, key=model.clearance)
+        if model.clearance(best) <= clearance or len(steps) > _ESCAPE_STEPS:
+            message = f"no way out to {margin * 1e3:.0f} mm clearance from {what}, {clearance * 1e3:.0f} mm away"
+            raise PlanningError(CauseCode.MOTION_BLOCKED, message)
+        q, clearance = best, model.clearance(best)
+        steps.append(q)
+    return np.array(steps)
+
+
+def _directions(rng: np.random.Generator) -> FloatArray:
+    """Joint directions (44, 6), largest entry 1: each joint both ways, and random mixtures."""
+    mixed = rng.normal(size=(32, 6))
+    mixed /= np.abs(mixed).max(axis=1, keepdims=True)
+    return np.vstack([np.eye(6), -np.eye(6), mixed])
+
+
+def _shortened(model: CollisionModel, path: FloatArray, margin: float, rng: np.random.Generator) -> FloatArray:
+    """Path with random stretches replaced by straight lines wherever these are free and shorter."""
+    for _ in range(_SHORTCUTS):
+        if len(path) < 3:
+            break
+        i, j = np.sort(rng.uniform(0, len(path) - 1, 2))
+        a, b = _at(path, i), _at(path, j)
+        if int(j) > int(i) and model.edge_free(a, b, margin):
+            path = np.vstack([path[: int(i) + 1], a, b, path[int(j) + 1 :]])
+            path = path[np.append(True, np.abs(np.diff(path, axis=0)).max(axis=1) > 1e-6)]
+            path = _without_middles(model, path, margin)
+    return path
+
+
+def _without_middles(model: CollisionModel, path: FloatArray, margin: float) -> FloatArray:
+    """Path without the waypoints that a straight line between their neighbours makes needless."""
+    i = 1
+    while i < len(path) - 1:
+        if model.edge_free(path[i - 1], path[i + 1], margin):
+            path = np.delete(path, i, axis=0)
+        else:
+            i += 1
+    return path
+
+
+def _at(path: FloatArray, s: float) -> FloatArray:
+    """Point of the path at the fractional index `s`."""
+    i = min(int(s), len(path) - 2)
+    point: FloatArray = path[i] + (s - i) * (path[i + 1] - path[i])
+    return point
+
+
+def _joined(escape: FloatArray, path: FloatArray) -> FloatArray:
+    return np.vstack([escape[:-1], path])

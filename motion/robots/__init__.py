@@ -1,0 +1,1 @@
+"""The arms: kinematics, shape, and how they follow."""

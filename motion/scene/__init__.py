@@ -1,0 +1,1 @@
+"""What the arms must not touch."""

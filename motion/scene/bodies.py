@@ -1,0 +1,153 @@
+"""Where the arms' bodies are, and what they must not touch."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import RigidTransform
+
+from regrasp.interfaces.cell import Connector, KnownCell, WristMount
+from regrasp.interfaces.devices import Arm, Gripper
+from regrasp.interfaces.frame import RgbdFrame
+from regrasp.motion.robots.kinematics import ArmKinematics
+from regrasp.motion.scene.collision import CollisionModel
+from regrasp.motion.scene.distance_grid import DistanceGrid
+
+FloatArray = NDArray[np.float64]
+
+NO_POINTS = np.empty((0, 3))
+TOUCHING = 0.005  # m: seen points so near to a standing arm were none
+GRID_BORDER = 0.2  # m around the voxels: no sphere of an arm is thicker
+ARM_MARGIN = 0.025  # m round an arm where seen points are its own: 13 mm of depth, half a voxel's diagonal, 5 mm of arm
+
+
+class Bodies:
+    """The two arms as read, the cell as known, and the voxels and the cable as seen."""
+
+    def __init__(self, known: KnownCell, arms: Mapping[str, Arm], grippers: Mapping[str, Gripper]) -> None:
+        self.known, self.arms, self.grippers = known, arms, grippers
+        self.kinematics: dict[str, ArmKinematics] = {
+            spec.name: ArmKinematics(RigidTransform.from_translation(spec.base)) for spec in known.arms
+        }
+        self._cameras: dict[str, WristMount] = {
+            c.mount.arm: c.mount for c in known.cameras if isinstance(c.mount, WristMount)
+        }
+        self._boxes = known.solids()
+        self._grid: DistanceGrid | None = None
+        self._points = self._cable = NO_POINTS
+        self._spacing = 0.01
+
+    def set_obstacles(self, points: FloatArray, spacing: float) -> None:
+        """Keep clear of occupied voxels from now on: centres (n, 3) m and edge m.
+
+        Points where an arm is now, or sleeps, do not count: what was seen there was an arm.
+        """
+        self._points, self._spacing = points, spacing
+        for spec in self.known.arms:
+            for q in (self.joints(spec.name), np.array(spec.sleep)):
+                self._points = _away_from(self._points, self.model(spec.name, others=False).spheres(q), ARM_MARGIN)
+        self._rebuild_grid()
+
+    def keep_clear(self, points: FloatArray) -> None:
+        """Keep clear of these points (n, 3) m too, in place of an earlier call's: a cable, a stowed connector."""
+        self._cable = points
+        self._rebuild_grid()
+
+    def _rebuild_grid(self) -> None:
+        points = np.vstack([self._points, self._cable])
+        if not len(points):
+            self._grid = None
+            return
+        lower, upper = points.min(axis=0) - GRID_BORDER, points.max(axis=0) + GRID_BORDER
+        self._grid = DistanceGrid.from_points(points, lower, upper, self._spacing)
+
+    def start_model(
+        self, arm: str, held: RigidTransform | None = None, *, clip: bool = True, opening: float | None = None
+    ) -> CollisionModel:
+        """`model` for a motion that begins now: seen points that the arm touches where it stands were none.
+
+        Voxels are coarse and cameras err by millimetres; a hand that came in beside an obstacle must get out again.
+        """
+        model = self.model(arm, held=held, clip=clip, opening=opening)
+        distance, what = model.nearest(self.joints(arm))
+        if what == "seen surface" and distance < TOUCHING:
+            spheres = model.spheres(self.joints(arm))
+            self._points = _away_from(self._points, spheres, TOUCHING + 2 * self._spacing)
+            self._cable = _away_from(self._cable, spheres, TOUCHING + 2 * self._spacing)
+            self._rebuild_grid()
+            model = self.model(arm, held=held, clip=clip, opening=opening)
+        return model
+
+    def joints(self, arm: str) -> FloatArray:
+        """The arm's joints (6,) rad as read."""
+        return self.arms[arm].reading().positions
+
+    def tool(self, arm: str) -> RigidTransform:
+        """world_from_tool as read."""
+        return self.kinematics[arm].tool(self.joints(arm))
+
+    def camera_pose(self, frame: RgbdFrame) -> RigidTransform:
+        """world_from_camera of a frame as the robot believes it."""
+        mount = self.known.camera(frame.camera).mount
+        if isinstance(mount, WristMount):
+            assert frame.joints is not None
+            return self.kinematics[mount.arm].wrist(frame.joints) * mount.wrist_from_camera
+        return mount.world_from_camera
+
+    def spheres(self) -> list[tuple[FloatArray, FloatArray]]:
+        """The arms' bodies now: centres (n, 3) m and radii (n,) m of each."""
+        both = [self.model(name, others=False).spheres(self.joints(name)) for name in self.arms]
+        return [(s[:, :3], s[:, 3]) for s in both]
+
+    def model(
+        self,
+        arm: str,
+        *,
+        held: RigidTransform | None = None,
+        others: bool = True,
+        clip: bool = True,
+        opening: float | None = None,
+    ) -> CollisionModel:
+        """What `arm` must not touch now.
+
+        `held` is tool_from_connector while it carries the connector; without `clip` the clip's bracket may be touched.
+        The jaw is as the fingers read, or `opening` m wide.
+        """
+        other = None
+        if others:
+            name = next(n for n in self.arms if n != arm)
+            other = self.model(name, others=False).spheres(self.joints(name))
+        boxes = self._boxes if clip else [b for b in self._boxes if b not in self.known.clip.bracket]
+        camera = self._cameras.get(arm)
+        return CollisionModel(
+            self.kinematics[arm],
+            boxes,
+            camera_offset=camera.offset if camera else None,
+            other_arm=other,
+            grid=self._grid if others else None,
+            carried=None if held is None else _connector_spheres(held, self.known.connector),
+            opening=self.grippers[arm].reading().gap if opening is None else opening,
+        )
+
+    def sees(self, world_from_camera: RigidTransform, points: FloatArray) -> bool:
+        """Whether nothing known or seen stands between a camera and any of the points (n, 3) m."""
+        eye = world_from_camera.translation
+        shares = np.linspace(0.15, 0.85, 24)[:, None, None]
+        rays = (eye + shares * (points - eye)).reshape(-1, 3)
+        for box in self._boxes:
+            if np.any(np.all(np.abs(rays - box.center) < 0.5 * np.array(box.size), axis=1)):
+                return False
+        return self._grid is None or bool(np.min(self._grid.at(rays)) > 0.0)
+
+
+def _connector_spheres(held: RigidTransform, connector: Connector) -> FloatArray:
+    """Spheres (3, 4) that cover a carried connector, in the tool frame."""
+    along = (0.5 * connector.length - connector.radius) * np.array([-1.0, 0.0, 1.0])
+    centers = held.apply(np.column_stack([along, np.zeros(3), np.zeros(3)]))
+    return np.column_stack([centers, np.full(3, 1.2 * connector.radius)])
+
+
+def _away_from(points: FloatArray, spheres: FloatArray, margin: float) -> FloatArray:
+    """The points (n, 3) further than `margin` m from the spheres (m, 4)."""
+    distance = np.linalg.norm(points[:, None] - spheres[None, :, :3], axis=2)
+    return points[np.all(distance > spheres[:, 3] + margin, axis=1)]

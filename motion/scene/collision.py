@@ -1,0 +1,226 @@
+"""Whether an arm touches something: spheres against boxes, another arm, seen surfaces and the arm itself."""
+
+from collections.abc import Sequence
+from functools import cache
+from itertools import pairwise
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from regrasp.interfaces.cell import Box
+from regrasp.motion.robots.kinematics import LOWER, TOOL_OFFSET, UPPER, ArmKinematics, FloatArray, world_spheres
+from regrasp.motion.robots.spheres import CAMERA_ACROSS, CAMERA_RADIUS, JAW_OPENING, LINKS, spheres_at
+from regrasp.motion.scene.distance_grid import FAR, DistanceGrid
+
+IntArray = NDArray[np.int64]
+
+COARSE_STEP = 0.02  # rad of the joint that moves most, between two checks of an edge
+FINE_STEP = 0.01  # the same for a path that will be driven
+_FIRST_MOVING_LINK = 2  # base and shoulder only turn on the spot: no box, surface or arm can be met by moving them
+
+# Spheres stand out of the meshes: 15 mm between shoulder and wrist in the sleep pose look like 1 mm.
+_SELF_SLACK = 0.008
+
+_ITSELF, _GRID, _OTHER_ARM = -1, -2, -3  # what a clearance is to, when it is not a box
+
+
+@nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
+def _square(a: FloatArray, b: FloatArray) -> float:
+    """Squared distance of two points."""
+    return (a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2
+
+
+@nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
+def _box_distance(p: FloatArray, box: FloatArray) -> float:
+    """Signed distance of a point (3,) to a box (6,): centre and half edges."""
+    outside, inside = 0.0, -1e9
+    for a in range(3):
+        d = abs(p[a] - box[a]) - box[3 + a]
+        inside = max(inside, d)
+        if d > 0:
+            outside += d * d
+    return np.sqrt(outside) if outside > 0 else inside
+
+
+@nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
+def _grid_distance(p: FloatArray, distance: NDArray[np.float32], lower: FloatArray, h: float) -> float:
+    i, j, k = np.floor((p[0] - lower[0]) / h), np.floor((p[1] - lower[1]) / h), np.floor((p[2] - lower[2]) / h)
+    shape = distance.shape
+    if i < 0 or j < 0 or k < 0 or i >= shape[0] or j >= shape[1] or k >= shape[2]:
+        return FAR
+    return distance[int(i), int(j), int(k)]
+
+
+@nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
+def _nearest(q, base, links, local, pairs, boxes, others, distance, lower, h):  # type: ignore[no-untyped-def]
+    """(clearance, what) over everything."""
+    world = world_spheres(base, q, links, local)
+    best, what = FAR, _ITSELF
+    for n in range(world.shape[0]):
+        if links[n] < _FIRST_MOVING_LINK:
+            continue
+        p, r = world[n, :3], world[n, 3]
+        for b in range(boxes.shape[0]):
+            d = _box_distance(p, boxes[b]) - r
+            if d < best:
+                best, what = d, b
+        for m in range(others.shape[0]):
+            d = np.sqrt(_square(p, others[m])) - r - others[m, 3]
+            if d < best:
+                best, what = d, _OTHER_ARM
+        d = _grid_distance(p, distance, lower, h) - r
+        if d < best:
+            best, what = d, _GRID
+    for m in range(pairs.shape[0]):
+        a, c = world[pairs[m, 0]], world[pairs[m, 1]]
+        d = np.sqrt(_square(a, c)) - a[3] - c[3] + _SELF_SLACK
+        if d < best:
+            best, what = d, _ITSELF
+    return best, what
+
+
+@nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
+def _meets_box(p, reach, boxes):  # type: ignore[no-untyped-def]
+    """Whether a point is nearer than `reach` to a box; most boxes are ruled out by the first axis."""
+    for b in range(boxes.shape[0]):
+        square = 0.0
+        for a in range(3):
+            d = abs(p[a] - boxes[b, a]) - boxes[b, 3 + a]
+            if d >= reach:
+                square = np.inf
+                break
+            if d > 0:
+                square += d * d
+        if square < reach * reach:
+            return True
+    return False
+
+
+@nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
+def _free(q, base, links, local, pairs, boxes, others, distance, lower, h, margin):  # type: ignore[no-untyped-def]
+    """Whether `_nearest` would keep `margin` (own links: 0), at a fifth of the cost."""
+    world = world_spheres(base, q, links, local)
+    for n in range(world.shape[0] - 1, -1, -1):  # gripper first: it meets things most often
+        if links[n] < _FIRST_MOVING_LINK:
+            continue
+        p, reach = world[n], world[n, 3] + margin
+        if _meets_box(p, reach, boxes) or _grid_distance(p, distance, lower, h) < reach:
+            return False
+        for m in range(others.shape[0]):
+            if _square(p, others[m]) < (reach + others[m, 3]) ** 2:
+                return False
+    for m in range(pairs.shape[0]):
+        a, c = world[pairs[m, 0]], world[pairs[m, 1]]
+        if _square(a, c) < (a[3] + c[3] - _SELF_SLACK) ** 2:
+            return False
+    return True
+
+
+@nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
+def _edge_free(qa, qb, step, base, links, local, pairs, boxes, others, distance, lower, h, margin):  # type: ignore[no-untyped-def]
+    """Checks the end, then the middle, then the quarters: an obstacle shows early."""
+    n = int(np.ceil(np.abs(qb - qa).max() / step))
+    if not _free(qb, base, links, local, pairs, boxes, others, distance, lower, h, margin):
+        return False
+    stride = 1
+    while stride * 2 <= n:
+        stride *= 2
+    while stride >= 1:
+        for k in range(stride, n, 2 * stride):
+            q = qa + (qb - qa) * (k / n)
+            if not _free(q, base, links, local, pairs, boxes, others, distance, lower, h, margin):
+                return False
+        stride //= 2
+    return True
+
+
+@cache
+def _self_pairs(with_camera: bool) -> tuple[tuple[int, int], ...]:
+    """Pairs of spheres of one arm that can meet: link 0-1 with 4-6, link 2 with 5-6, the camera also with 3-4.
+
+    Neighbouring links are left out: joint limits keep them apart.
+    """
+    links = [*LINKS.tolist(), *([5] * len(CAMERA_ACROSS) if with_camera else [])]
+    camera = len(LINKS)
+    return tuple(
+        (i, j)
+        for i, a in enumerate(links)
+        for j, b in enumerate(links)
+        if (a <= 1 and b >= 4) or (a == 2 and b >= 5) or (j >= camera and a in (3, 4))
+    )
+
+
+class CollisionModel:
+    """One arm, and all that it must not touch. Does not change; make a new one when the surroundings do.
+
+    `camera_offset` (3,) m is where a wrist camera sits in the wrist link's frame. `other_arm` (m, 4) are another arm's
+    spheres in world (`spheres` of its model). `carried` (m, 4) are spheres fixed in the tool frame; the pads stand
+    `opening` m apart. A `margin` is metres between surfaces; the arm's own links must only not touch, whatever the
+    margin.
+    """
+
+    def __init__(
+        self,
+        kinematics: ArmKinematics,
+        boxes: Sequence[Box],
+        camera_offset: Sequence[float] | None = None,
+        other_arm: FloatArray | None = None,
+        grid: DistanceGrid | None = None,
+        carried: FloatArray | None = None,
+        opening: float = JAW_OPENING,
+    ) -> None:
+        self.kinematics = kinematics
+        self._names = [box.name for box in boxes]
+        links, local = [LINKS], [spheres_at(opening)]
+        pairs = list(_self_pairs(camera_offset is not None))
+        if camera_offset is not None:
+            links.append(np.full(len(CAMERA_ACROSS), 5))
+            x, y, z = camera_offset
+            local.append(np.array([[x, y + across, z, CAMERA_RADIUS] for across in CAMERA_ACROSS]))
+        if carried is not None and len(carried):
+            first = sum(map(len, links))
+            pairs += [(i, first + n) for i in np.flatnonzero(LINKS <= 3).tolist() for n in range(len(carried))]
+            links.append(np.full(len(carried), 6))
+            local.append(np.asarray(carried, float) + np.append(TOOL_OFFSET, 0.0))
+        distance = grid or DistanceGrid(np.full((1, 1, 1), FAR, np.float32), np.zeros(3), 1e-3)
+        self._arguments = (
+            kinematics.base,
+            np.concatenate(links).astype(np.int64),
+            np.ascontiguousarray(np.concatenate(local)),
+            np.array(pairs, dtype=np.int64).reshape(-1, 2),
+            np.array([[*b.center, *(0.5 * s for s in b.size)] for b in boxes], float).reshape(-1, 6),
+            np.ascontiguousarray(np.empty((0, 4)) if other_arm is None else other_arm, float),
+            np.ascontiguousarray(distance.distance),
+            distance.lower,
+            float(distance.h),
+        )
+
+    def free(self, q: FloatArray, margin: float) -> bool:
+        """Whether the arm at joints (6,) rad lies within its limits and keeps `margin` metres from everything."""
+        inside = bool(np.all((q >= LOWER) & (q <= UPPER)))
+        return inside and bool(_free(np.asarray(q, float), *self._arguments, margin))
+
+    def edge_free(self, qa: FloatArray, qb: FloatArray, margin: float, step: float = COARSE_STEP) -> bool:
+        """Whether the straight joint motion is free, its end included (not its start), checked every `step` rad."""
+        return bool(_edge_free(np.asarray(qa, float), np.asarray(qb, float), step, *self._arguments, margin))
+
+    def path_free(self, path: FloatArray, margin: float) -> bool:
+        """Whether the joint path (k, 6) is free from its first row to its last, checked finely."""
+        edges = pairwise(np.asarray(path, float))
+        return self.free(path[0], margin) and all(self.edge_free(a, b, margin, FINE_STEP) for a, b in edges)
+
+    def clearance(self, q: FloatArray) -> float:
+        """Least distance in metres to anything, the arm's own links included; negative is the depth of the touch."""
+        return self.nearest(q)[0]
+
+    def nearest(self, q: FloatArray) -> tuple[float, str]:
+        """`clearance`, and the name of what is that near: a box's, 'other arm', 'seen surface' or 'itself'."""
+        distance, what = _nearest(np.asarray(q, float), *self._arguments)
+        names = {_ITSELF: "itself", _GRID: "seen surface", _OTHER_ARM: "other arm"}
+        return float(distance), names[what] if what < 0 else self._names[what]
+
+    def spheres(self, q: FloatArray) -> FloatArray:
+        """The arm's spheres (n, 4) in world at joints (6,) rad, for another arm's model."""
+        base, links, local = self._arguments[:3]
+        return np.asarray(world_spheres(base, np.asarray(q, float), links, local))

@@ -1,0 +1,1 @@
+"""Obstacles from depth images."""

@@ -1,0 +1,1 @@
+"""The connector's pose from a frame: the techniques, and how their estimates are fused."""

@@ -1,0 +1,1 @@
+"""The technique `fused`: all the evidence at once."""

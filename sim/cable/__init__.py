@@ -1,0 +1,1 @@
+"""The cable task's objects: cable, socket, clip, and how far the job is."""

@@ -1,0 +1,215 @@
+"""The cable: one chain of capsules with spherical joints and an explicit spring-damper torque at every step.
+
+Discretised rod: bending stiffness k = EI / l between links, 2 k at the clamp. An explicit spring is stable only while
+k dt^2 / I is small, so each link's inertia has a floor, and its joint damping a cap, both from the step (measured:
+without the joint damping the explicit spring gains energy). Material damping is Rayleigh's mass-proportional term.
+"""
+
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+import pybullet as p
+from numpy.typing import NDArray
+from scipy.spatial.transform import RigidTransform, Rotation
+
+from regrasp.interfaces.cell import Cable, Connector, pose_along
+from regrasp.sim.render.printed import tag_boxes, visual
+
+FloatArray = NDArray[np.float64]
+
+STABILITY = 0.7  # sf: the fastest joint mode turns by sf radians a step
+JOINT_DAMPING = 0.6  # share of the critical step damping
+_IDENTITY = [0.0, 0.0, 0.0, 1.0]
+
+
+@numba.njit(cache=True)
+def spring_torques(rotations: FloatArray, rates: FloatArray, stiffness: FloatArray, damping: FloatArray) -> FloatArray:
+    """Joint torques (n, 3) N m of linear springs on the rotation vectors.
+
+    `rotations` (n, 4) are the joints' quaternions x, y, z, w; `rates` (n, 3) rad/s and the result are in the child
+    frames; `stiffness` (n,) N m/rad, `damping` (n,) N m s/rad.
+    """
+    torques = np.empty_like(rates)
+    for i in range(rotations.shape[0]):
+        x, y, z, w = rotations[i]
+        if w < 0.0:
+            x, y, z, w = -x, -y, -z, -w
+        sine = np.sqrt(x * x + y * y + z * z)
+        factor = 2.0 if sine < 1e-9 else 2.0 * np.arctan2(sine, w) / sine
+        torques[i, 0] = -stiffness[i] * factor * x - damping[i] * rates[i, 0]
+        torques[i, 1] = -stiffness[i] * factor * y - damping[i] * rates[i, 1]
+        torques[i, 2] = -stiffness[i] * factor * z - damping[i] * rates[i, 2]
+    return torques
+
+
+def first_frequency(stiffness: float, length: float, mass_per_length: float, tip_mass: float) -> float:
+    """First bending frequency, rad/s, of a cantilever with a tip mass (Rayleigh: 0.243 of the beam's mass joins it)."""
+    return float(np.sqrt(3 * stiffness / ((tip_mass + 0.243 * mass_per_length * length) * length**3)))
+
+
+@dataclass(frozen=True)
+class CableBody:
+    """The chain in a PyBullet client. Links 0..n-1 are cable, link n is the connector (its frame at the centre)."""
+
+    client: int
+    body: int
+    links: int
+    link_length: float
+    stiffness: FloatArray  # (n,) N m/rad
+    damping: FloatArray  # (n,) N m s/rad
+    connector_inertia: float  # kg m2, across the connector's axis
+
+    @property
+    def connector_link(self) -> int:
+        """Index of the connector's link."""
+        return self.links
+
+    def apply_springs(self) -> None:
+        """Set the joint torques for the next step from the present bend."""
+        states = p.getJointStatesMultiDof(self.body, range(self.links), physicsClientId=self.client)
+        rotations = np.array([s[0] for s in states])
+        rates = np.array([s[1] for s in states])
+        torques = spring_torques(rotations, rates, self.stiffness, self.damping)
+        p.setJointMotorControlMultiDofArray(
+            self.body,
+            range(self.links),
+            p.TORQUE_CONTROL,
+            targetPositions=[_IDENTITY] * self.links,
+            forces=torques.tolist(),
+            physicsClientId=self.client,
+        )
+
+    def connector_state(self) -> tuple[RigidTransform, FloatArray, FloatArray]:
+        """world_from_connector, its centre's velocity (3,) m/s and its rate of turn (3,) rad/s, in the world."""
+        s = p.getLinkState(self.body, self.connector_link, 1, 1, physicsClientId=self.client)
+        return RigidTransform.from_components(s[4], Rotation.from_quat(s[5])), np.array(s[6]), np.array(s[7])
+
+    def energy(self) -> float:
+        """Kinetic plus bending energy in J (without gravity); the links' inertia floor counts, as in the motion."""
+        return self._kinetic_energy() + self._bending_energy()
+
+    def _kinetic_energy(self) -> float:
+        links = range(self.links + 1)
+        energy = 0.0
+        for link, s in zip(links, p.getLinkStates(self.body, links, 1, 1, physicsClientId=self.client), strict=True):
+            mass, _, inertia = p.getDynamicsInfo(self.body, link, physicsClientId=self.client)[:3]
+            turn = np.array(p.getMatrixFromQuaternion(s[1])).reshape(3, 3)
+            rate = turn.T @ np.array(s[7])
+            energy += 0.5 * mass * float(np.dot(s[6], s[6])) + 0.5 * float(np.dot(inertia, rate**2))
+        return energy
+
+    def _bending_energy(self) -> float:
+        states = p.getJointStatesMultiDof(self.body, range(self.links), physicsClientId=self.client)
+        bend = Rotation.from_quat([s[0] for s in states]).magnitude()
+        return 0.5 * float(np.sum(self.stiffness * bend**2))
+
+
+def build_cable(
+    client: int, cable: Cable, connector: Connector, connector_mass: float, stiffness: float, step: float
+) -> CableBody:
+    """Create the chain, straight and at rest. `stiffness` is EI in N m2, `step` the physics step in s."""
+    n, length = cable.links, cable.length / cable.links
+    bend = stiffness / length
+    inertia = max(4 * bend * step**2 / STABILITY**2, cable.mass_per_length * length**3 / 12)
+    body = _create_chain(client, cable, connector, connector_mass)
+    across = _set_inertias(client, body, n, inertia, connector, connector_mass)
+    first = first_frequency(stiffness, cable.length, cable.mass_per_length, connector_mass)
+    for link in range(-1, n + 1):
+        p.changeDynamics(
+            body,
+            link,
+            linearDamping=2 * cable.damping_ratio * first,
+            angularDamping=0,
+            jointDamping=0,
+            physicsClientId=client,
+        )
+    _switch_motors_off(client, body, n)
+    springs = np.full(n, bend)
+    springs[0] *= 2
+    damping_time = JOINT_DAMPING / (step * 4 * bend / inertia)
+    return CableBody(client, body, n, length, springs, springs * damping_time, across)
+
+
+def _create_chain(client: int, cable: Cable, connector: Connector, connector_mass: float) -> int:
+    n, length = cable.links, cable.length / cable.links
+    link = _shapes(client, p.GEOM_CAPSULE, cable.radius, length, length / 2, cable.color)
+    end = _shapes(client, p.GEOM_CYLINDER, connector.radius, connector.length, 0.0, connector.color)
+    if connector.tag is not None:
+        body = (connector.radius, connector.length, connector.color)
+        end = end[0], visual(client, tag_boxes(connector.tag), connector.tag.body_from_tag, body)
+    collisions, visuals = zip(*[link] * n, end, strict=True)
+    origin = pose_along(cable.anchor, cable.anchor_axis)
+    return int(
+        p.createMultiBody(
+            0,
+            -1,
+            -1,
+            origin.translation.tolist(),
+            origin.rotation.as_quat().tolist(),
+            linkMasses=[cable.mass_per_length * length] * n + [connector_mass],
+            linkCollisionShapeIndices=collisions,
+            linkVisualShapeIndices=visuals,
+            linkPositions=[[0, 0, 0]] + [[length, 0, 0]] * (n - 1) + [[length + connector.length / 2, 0, 0]],
+            linkOrientations=[_IDENTITY] * (n + 1),
+            linkInertialFramePositions=[[length / 2, 0, 0]] * n + [[0, 0, 0]],
+            linkInertialFrameOrientations=[_IDENTITY] * (n + 1),
+            linkParentIndices=list(range(n + 1)),
+            linkJointTypes=[p.JOINT_SPHERICAL] * n + [p.JOINT_FIXED],
+            linkJointAxis=[[0, 0, 1]] * (n + 1),
+            physicsClientId=client,
+        )
+    )
+
+
+def _shapes(
+    client: int, kind: int, radius: float, length: float, offset: float, color: tuple[float, float, float]
+) -> tuple[int, int]:
+    """Collision and visual shape of a capsule or cylinder along x, its middle `offset` metres ahead of the frame."""
+    place, turn = [offset, 0, 0], p.getQuaternionFromEuler([0.0, np.pi / 2, 0.0])
+    collision = p.createCollisionShape(
+        kind,
+        radius=radius,
+        height=length,
+        collisionFramePosition=place,
+        collisionFrameOrientation=turn,
+        physicsClientId=client,
+    )
+    visual = p.createVisualShape(
+        kind,
+        radius=radius,
+        length=length,
+        rgbaColor=[*color, 1],
+        visualFramePosition=place,
+        visualFrameOrientation=turn,
+        physicsClientId=client,
+    )
+    return collision, visual
+
+
+def _set_inertias(
+    client: int, body: int, links: int, link_inertia: float, connector: Connector, connector_mass: float
+) -> float:
+    """Set the links' inertia (kg m2, about every axis) and the connector's; returns the latter's across its axis."""
+    for link in range(links):
+        p.changeDynamics(body, link, localInertiaDiagonal=[link_inertia] * 3, physicsClientId=client)
+    r, h = connector.radius, connector.length
+    across = connector_mass * (3 * r**2 + h**2) / 12
+    diagonal = [connector_mass * r**2 / 2, across, across]
+    p.changeDynamics(body, links, localInertiaDiagonal=diagonal, physicsClientId=client)
+    return across
+
+
+def _switch_motors_off(client: int, body: int, links: int) -> None:
+    """Take out the default motors of the spherical joints: they cost forty times a step and hold the joints."""
+    p.setJointMotorControlMultiDofArray(
+        body,
+        range(links),
+        p.POSITION_CONTROL,
+        targetPositions=[_IDENTITY] * links,
+        targetVelocities=[[0, 0, 0]] * links,
+        positionGains=[0] * links,
+        velocityGains=[0] * links,
+        forces=[[0, 0, 0]] * links,
+        physicsClientId=client,
+    )

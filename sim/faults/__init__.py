@@ -1,0 +1,1 @@
+"""Faults: when they begin, and what they do."""

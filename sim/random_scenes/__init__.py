@@ -1,0 +1,1 @@
+"""Random pictures for the detector."""

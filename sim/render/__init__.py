@@ -1,0 +1,1 @@
+"""What the cameras see: shapes, and the two renderers."""

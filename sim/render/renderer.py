@@ -1,0 +1,49 @@
+"""The renderers' common face, and the choice between them."""
+
+from typing import Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import RigidTransform
+
+from regrasp.interfaces.frame import Intrinsics
+from regrasp.sim.render.opengl import GlRenderer
+from regrasp.sim.render.picture import Image, LightState
+from regrasp.sim.render.tiny import TinyRenderer
+from regrasp.sim.render.visuals import Visuals
+
+__all__ = ["Image", "LightState", "Renderer", "RendererName", "make_renderer"]
+
+RendererName = Literal["auto", "moderngl", "tiny"]
+
+
+class Renderer(Protocol):
+    """Draws the items of one `Visuals`. `reason` says in words why this one was chosen."""
+
+    name: str
+    reason: str
+
+    def render(
+        self, poses: NDArray[np.float32], world_from_camera: RigidTransform, intrinsics: Intrinsics, light: LightState
+    ) -> Image:
+        """What an OpenCV optical frame sees of the items at `poses` (n, 3, 4), as from `Visuals.snapshot`."""
+        ...
+
+    def close(self) -> None:
+        """Free what the renderer holds."""
+        ...
+
+
+def make_renderer(visuals: Visuals, choice: RendererName = "auto") -> Renderer:
+    """The renderer asked for; "auto" takes moderngl where a GL context can be made, else TinyRenderer.
+
+    Raises whatever moderngl raises if it is asked for by name and no context can be made.
+    """
+    if choice == "tiny":
+        return TinyRenderer(visuals, "asked for")
+    if choice == "moderngl":
+        return GlRenderer(visuals, "asked for")
+    try:
+        return GlRenderer(visuals, "an EGL context can be made here")
+    except Exception as error:  # moderngl and glcontext raise bare Exception
+        return TinyRenderer(visuals, f"no EGL context can be made here ({error})")

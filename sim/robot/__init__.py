@@ -1,0 +1,1 @@
+"""The arms: their model, servos and jaws."""

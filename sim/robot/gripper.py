@@ -1,0 +1,151 @@
+"""The ViperX's jaw: two coupled fingers that hold by friction only, and their noisy encoder."""
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+import pybullet as p
+
+from regrasp.interfaces.cell import Errors, GripperSpec
+from regrasp.interfaces.reading import GripperReading
+from regrasp.sim.robot.model import finger_position, pad_gap
+
+OPEN_FORCE = 40.0  # N a finger while opening or holding a gap
+CLOSED_GAP = 0.003  # m between the pads of a closed jaw: the jaw's lower stop
+
+
+class SimGripper:
+    """Fulfils `regrasp.interfaces.devices.Gripper` on the fingers and pads among the `links` of an arm's `body`.
+
+    `now` gives the arm's simulated seconds. The arm calls `step()` before every physics step.
+    """
+
+    def __init__(
+        self,
+        client: int,
+        body: int,
+        links: Mapping[str, int],
+        now: Callable[[], float],
+        spec: GripperSpec,
+        errors: Errors,
+        rng: np.random.Generator,
+    ) -> None:
+        self._client, self._body, self._now = client, body, now
+        self._spec, self._errors = spec, errors
+        self._fingers = (links["left_finger_link"], links["right_finger_link"])
+        self.pads = (links["left_pad"], links["right_pad"])
+        self._noise_key = int(rng.integers(2**31))
+        self._build(links["gripper_prop_link"])
+        self._gap_command = CLOSED_GAP
+        self._force: float | None = None
+        self._forced_open, self._stuck, self._force_share = False, False, 1.0
+        self._play = self.true_gap()
+        self._samples = 0
+        self._reading = self._sample(0)
+        self._drive()
+
+    def open(self, gap: float) -> None:
+        """See `regrasp.interfaces.devices.Gripper`."""
+        self._gap_command, self._force = gap, None
+        self._drive()
+
+    def close(self, force: float) -> None:
+        """See `regrasp.interfaces.devices.Gripper`; `force` is capped at the jaw's maximum."""
+        self._force = min(force, self._spec.max_force)
+        self._drive()
+
+    def reading(self) -> GripperReading:
+        """The newest sample of the finger encoder, taken at the errors' `finger_rate`."""
+        return self._reading
+
+    def set_fault(
+        self, *, forced_open: bool | None = None, stuck: bool | None = None, force_share: float | None = None
+    ) -> None:
+        """Switch faults on and off; those that are not given stay.
+
+        `forced_open`: it drives open whatever it is told. `stuck`: it goes on with what it was told last and takes no
+        new command. `force_share`: the share of the closing force that it still makes.
+        """
+        self._forced_open = self._forced_open if forced_open is None else forced_open
+        self._stuck = self._stuck if stuck is None else stuck
+        self._force_share = self._force_share if force_share is None else force_share
+        self._drive()
+
+    def true_gap(self) -> float:
+        """The true distance between the pads in metres."""
+        states = p.getJointStates(self._body, self._fingers, physicsClientId=self._client)
+        return pad_gap(states[0][0], states[1][0], self._spec.pad_thickness)
+
+    def restart_clock(self) -> None:
+        """Call the present instant zero."""
+        self._samples = 0
+        self._reading = self._sample(0)
+
+    def step(self) -> None:
+        """Sample the encoder when due."""
+        due = int(self._now() * self._errors.finger_rate + 1e-6)
+        if due > self._samples:
+            self._samples = due
+            self._reading = self._sample(due)
+
+    def _sample(self, number: int) -> GripperReading:
+        half = self._errors.finger_backlash / 2
+        gap = self.true_gap()
+        self._play = min(max(self._play, gap - half), gap + half)
+        noise = np.random.default_rng([self._noise_key, number]).normal(0.0, self._errors.finger_noise)
+        step = self._errors.finger_resolution
+        return GripperReading(self._now(), max(0.0, round((self._play + noise) / step) * step))
+
+    def _build(self, prop: int) -> None:
+        """Couple the fingers, give the pads their friction, still the propeller, and close the jaw."""
+        body, client = self._body, self._client
+        for pad in self.pads:
+            p.changeDynamics(
+                body, pad, lateralFriction=self._spec.friction, spinningFriction=0.005, physicsClientId=client
+            )
+        left, right = self._fingers
+        gear = p.createConstraint(
+            body, left, body, right, p.JOINT_GEAR, [0, 1, 0], [0, 0, 0], [0, 0, 0], physicsClientId=client
+        )
+        # One servo moves both fingers: the URDF's right finger runs the other way.
+        p.changeConstraint(gear, gearRatio=1, maxForce=500, erp=0.3, physicsClientId=client)
+        p.setJointMotorControl2(body, prop, p.VELOCITY_CONTROL, targetVelocity=0, force=1, physicsClientId=client)
+        closed = finger_position(CLOSED_GAP, self._spec.pad_thickness)
+        p.resetJointState(body, left, closed, physicsClientId=client)
+        p.resetJointState(body, right, -closed, physicsClientId=client)
+
+    def _drive(self) -> None:
+        if self._stuck:
+            return
+        if self._forced_open:
+            self._drive_at(self._spec.speed, self._spec.max_force)
+        elif self._force is not None:
+            self._drive_at(-self._spec.speed, self._force_share * self._force)
+        else:
+            self._drive_to(finger_position(self._gap_command, self._spec.pad_thickness))
+
+    def _drive_at(self, speed: float, force: float) -> None:
+        """Open (speed > 0) or close at `speed` m/s a finger, with at most `force` N a finger."""
+        for finger, side in zip(self._fingers, (1, -1), strict=True):
+            p.setJointMotorControl2(
+                self._body,
+                finger,
+                p.VELOCITY_CONTROL,
+                targetVelocity=side * speed,
+                force=force,
+                physicsClientId=self._client,
+            )
+
+    def _drive_to(self, position: float) -> None:
+        """Bring the finger joints to `position` metres and hold them there."""
+        for finger, side in zip(self._fingers, (1, -1), strict=True):
+            p.setJointMotorControl2(
+                self._body,
+                finger,
+                p.POSITION_CONTROL,
+                targetPosition=side * position,
+                positionGain=0.1,
+                velocityGain=1.0,
+                force=OPEN_FORCE,
+                maxVelocity=self._spec.speed,
+                physicsClientId=self._client,
+            )

@@ -1,0 +1,67 @@
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
+
+import cv2
+import numpy as np
+import pytest
+
+from regrasp.app.run.film import RATE, Film
+from regrasp.app.run.video import OVERVIEW_SIZE, SIZE
+from regrasp.sim.world import World
+
+TICK = 0.05
+
+
+def a_world(rear: Any = None) -> Any:
+    """As much of a world as a film looks at: it turns from black to green over two seconds."""
+    world = SimpleNamespace(t=0.0, gravity="zero", light=None)
+    world.now = lambda: world.t
+    world.visuals = SimpleNamespace(snapshot=lambda: None)
+    world.cameras = {name: SimpleNamespace(latest=lambda: rear) for name in ("rear", "wrist")}
+
+    def render(_poses: Any, _pose: Any, intrinsics: Any, _light: Any) -> Any:
+        rgb = np.zeros((intrinsics.height, intrinsics.width, 3), np.uint8)
+        rgb[..., 1] = min(255, int(100 * world.t))
+        return SimpleNamespace(rgb=rgb)
+
+    world.renderer = SimpleNamespace(render=render, name="toy")
+    return world
+
+
+def green(path: Path) -> list[float]:
+    """Mean green of the overview in each frame."""
+    video, found = cv2.VideoCapture(str(path)), []
+    while (read := video.read())[0]:
+        assert read[1].shape == (SIZE[1], SIZE[0], 3)
+        found.append(float(read[1][: OVERVIEW_SIZE[1], : OVERVIEW_SIZE[0], 1].mean()))
+    return found
+
+
+def test_two_seconds_give_frames_at_the_films_rate_in_their_order(tmp_path: Path) -> None:
+    world = a_world()
+    with Film(tmp_path / "video.mp4", cast(World, world)) as film:
+        for i in range(round(2.0 / TICK)):
+            world.t = i * TICK
+            film.show("carry")
+            film.show("carry")  # the same instant once more
+    shades = green(tmp_path / "video.mp4")
+    assert len(shades) == 2 * RATE
+    assert shades == sorted(shades)
+    assert shades[-1] == pytest.approx(190, abs=8)
+
+
+def test_a_film_cut_short_by_an_error_can_be_seen(tmp_path: Path) -> None:
+    world = a_world()
+    film = Film(tmp_path / "video.mp4", cast(World, world)).__enter__()
+    film.show("carry")
+    film.__exit__(ZeroDivisionError, ZeroDivisionError(), None)
+    assert len(green(tmp_path / "video.mp4")) == 1
+
+
+def test_without_a_path_nothing_is_drawn(tmp_path: Path) -> None:
+    world = a_world()
+    del world.renderer
+    with Film(None, cast(World, world)) as film:
+        film.show("carry")
+    assert list(tmp_path.iterdir()) == []

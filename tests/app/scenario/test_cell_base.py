@@ -1,0 +1,81 @@
+"""Cells that rest on another."""
+
+from pathlib import Path
+
+import pytest
+
+from regrasp.app.files.findings import Findings
+from regrasp.app.files.resources import shipped
+from regrasp.app.scenario.cell_file import load_cell
+
+
+def cell(folder: Path, text: str) -> Path:
+    path = folder / "mine.yaml"
+    path.write_text(text)
+    return path
+
+
+def findings(path: Path) -> list[str]:
+    with pytest.raises(Findings) as raised:
+        load_cell(path)
+    return [str(item).replace(f"{path.parent}/", "") for item in raised.value.items]
+
+
+def test_the_tagged_cell_is_the_thesiss_with_two_tags() -> None:
+    plain, tagged = (load_cell(shipped("cell")[name]) for name in ("thesis", "thesis_tags"))
+    connector, clip = tagged.known.connector, tagged.known.clip
+    assert connector.tag is not None
+    assert clip.tag is not None
+    assert connector.tag.number != clip.tag.number
+    bare = {"connector": connector.model_copy(update={"tag": None}), "clip": clip.model_copy(update={"tag": None})}
+    assert tagged.model_copy(update={"known": tagged.known.model_copy(update=bare)}) == plain
+
+
+def test_mappings_are_joined_and_lists_replaced(tmp_path: Path) -> None:
+    box = "{name: back_panel, center: [1, 0, 0], size: [1, 1, 1]}"
+    text = f"base: thesis\nknown:\n  connector: {{radius: 0.012}}\n  boxes:\n    - {box}\n"
+    plain, mine = load_cell(shipped("cell")["thesis"]), load_cell(cell(tmp_path, text))
+    assert mine.known.connector == plain.known.connector.model_copy(update={"radius": 0.012})
+    assert [box.name for box in mine.known.boxes] == ["back_panel"]
+    assert mine.hidden == plain.hidden
+
+
+def test_a_base_may_be_a_file_beside_the_cell(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "below.yaml").write_text(shipped("cell")["thesis"].read_text())
+    path = cell(tmp_path, "base: below.yaml\nknown: {cable_length: 0.5}\n")
+    monkeypatch.chdir("/")
+    assert load_cell(path).known.cable_length == 0.5
+
+
+def test_what_is_wrong_is_told_where_it_stands(tmp_path: Path) -> None:
+    source = shipped("cell")["thesis"].read_text()
+    (tmp_path / "below.yaml").write_text(source.replace("cable_length: 0.513", "cable_length: long"))
+    line = 1 + next(i for i, text in enumerate(source.splitlines()) if "cable_length" in text)
+    text = "base: below.yaml\nknown:\n  connector: {radius: -1, tag: {number: 50, size: 1e3}}\n  clip: 3\n"
+    assert findings(cell(tmp_path, text)) == [
+        f"below.yaml:{line}: known.cable_length is 'long'; expected a number (at least 0.0001, at most 10)",
+        "mine.yaml:3: '1e3' is text to YAML, not a number; write 1.0e+3",
+        "mine.yaml:3: key 'center' is missing in known.connector.tag; "
+        "expected 3 values, each a number in metres, such as 0.3 (at least -5, at most 5)",
+        "mine.yaml:3: key 'plate' is missing in known.connector.tag; expected a number (at least 0.0001, at most 10)",
+        "mine.yaml:3: known.connector.radius is -1; "
+        "expected a number in metres, such as 0.3 (at least 0.0001, at most 10)",
+        "mine.yaml:3: known.connector.tag.number is 50; expected a whole number (at least 0, at most 49)",
+        "mine.yaml:4: known.clip is 3; "
+        "expected a mapping of seat, axis, capture_distance, capture_angle_deg, hold_force, bracket, tag",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("base", "told"),
+    [
+        ("thesi", "mine.yaml:1: no cell named 'thesi'; did you mean 'thesis'? (a path ends in .yaml)"),
+        ("gone.yaml", "mine.yaml:1: 'gone.yaml' does not exist; name a file"),
+        ("3", "mine.yaml:1: base is 3; expected the name of a cell or a path to its file"),
+        ("", "mine.yaml:1: base is None; expected the name of a cell or a path to its file"),
+        ("thesis_tags", "thesis_tags.yaml' has a base itself; name that one, and give here what it adds"),
+    ],
+)
+def test_a_wrong_base_is_a_finding(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, base: str, told: str) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert findings(cell(tmp_path, f"base: {base}\n"))[0].endswith(told)

@@ -1,0 +1,52 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fake_services import Stage, seen, unseen
+from py_trees.common import Status
+from scipy.spatial.transform import RigidTransform, Rotation
+
+from regrasp.interfaces.cell import KnownCell
+from regrasp.perception.tracking.track import TrackState
+
+MONITOR = '<Monitor name="monitor" period="0.2"/>'
+
+
+@pytest.fixture
+def stage(known: KnownCell, tmp_path: Path) -> Stage:
+    stage = Stage(known, tmp_path)
+    stage.belief.held = RigidTransform.from_rotation(Rotation.from_euler("z", 90, degrees=True))
+    stage.perception.shows = lambda _, t: seen(t, stage.motion.hand.translation)
+    return stage
+
+
+def test_it_looks_at_its_period_and_always_succeeds(stage: Stage) -> None:
+    tree = stage.tree(MONITOR)
+    for _ in range(21):
+        assert stage.run(tree, 0.0) is Status.SUCCESS
+        stage.clock.t += 0.05
+    assert stage.perception.looks == pytest.approx([0.0, 0.2, 0.4, 0.6, 0.8, 1.0])
+
+
+def test_the_eye_is_told_which_way_the_held_tip_points(stage: Stage) -> None:
+    stage.run(stage.tree(MONITOR), 0.0)
+    assert stage.perception.hint == pytest.approx([0.0, 1.0, 0.0])
+
+
+def test_what_the_hand_hides_is_not_lost_until_the_watch_ends(stage: Stage) -> None:
+    stage.run(tree := stage.tree(MONITOR), 0.0)
+    stage.perception.shows = lambda _, t: unseen(t)
+    stage.clock.t = 2.0
+    stage.run(tree, 0.0)
+    assert stage.perception.track.state(2.0)[0] is TrackState.HIDDEN_BY_HAND
+    assert tree.root.feedback_message.startswith("hidden_by_hand")
+    tree.root.stop(Status.INVALID)
+    assert stage.perception.track.state(2.0)[0] is TrackState.LOST
+    assert stage.perception.hint is None
+
+
+def test_nothing_held_gives_no_hint(stage: Stage) -> None:
+    stage.belief.held = None
+    stage.perception.hint = np.array([1.0, 0.0, 0.0])
+    stage.run(stage.tree(MONITOR), 0.0)
+    assert stage.perception.hint is None

@@ -1,0 +1,67 @@
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from regrasp.interfaces.trajectory import Trajectory
+from regrasp.motion.planning.timing import STOP_TIME, brake, time_path
+from regrasp.motion.robots.kinematics import ACCELERATION_LIMIT, FloatArray
+
+paths = st.integers(2, 6).flatmap(lambda k: arrays(float, (k, 6), elements=st.floats(-2, 2, width=32)))
+
+
+def finely(trajectory: Trajectory) -> tuple[FloatArray, FloatArray]:
+    samples = [trajectory.sample(t) for t in np.arange(0.0, trajectory.duration, 0.002)]
+    return np.array([p for p, _ in samples]), np.array([v for _, v in samples])
+
+
+def distance_to_path(point: FloatArray, path: FloatArray) -> float:
+    best = np.inf
+    for a, b in pairwise(path):
+        s = np.clip((point - a) @ (b - a) / max((b - a) @ (b - a), 1e-12), 0, 1)
+        best = min(best, float(np.linalg.norm(a + s * (b - a) - point)))
+    return best
+
+
+@settings(max_examples=40, deadline=None)
+@given(paths)
+def test_within_limits_at_rest_at_the_ends_and_near_the_path(path: FloatArray) -> None:
+    trajectory = time_path(path)
+    assert trajectory.positions[0] == pytest.approx(path[0], abs=1e-6)
+    assert trajectory.positions[-1] == pytest.approx(path[-1], abs=1e-6)
+    assert not trajectory.velocities[[0, -1]].any()
+    assert np.all(np.diff(trajectory.times) > 0)
+    assert np.all(np.diff(trajectory.times) <= 0.02)
+    positions, velocities = finely(trajectory)
+    if len(positions) > 2:
+        acceleration = np.abs(np.diff(velocities, axis=0)) / 0.002
+        assert np.all(acceleration < ACCELERATION_LIMIT * 1.01)
+        assert np.all(np.abs(velocities) <= ACCELERATION_LIMIT * STOP_TIME * 1.01)
+    assert max((distance_to_path(p, path) for p in positions[::10]), default=0.0) < 0.06
+
+
+def test_one_row_is_a_trajectory_that_stays() -> None:
+    q = np.arange(6.0)
+    trajectory = time_path(q[None])
+    assert trajectory.duration == 0.0
+    assert trajectory.sample(0.5)[0] == pytest.approx(q)
+
+
+def test_half_the_speed_takes_twice_as_long() -> None:
+    path = np.array([np.zeros(6), np.ones(6), [1, 1, 1, 0, 0, 0.0]])
+    assert time_path(path, speed=0.5).duration == pytest.approx(2 * time_path(path).duration, rel=0.05)
+
+
+@given(arrays(float, 6, elements=st.floats(-1.5, 1.5)))
+def test_brake_comes_to_rest_in_time_within_the_limits(qd: FloatArray) -> None:
+    trajectory = brake(np.ones(6), qd)
+    assert trajectory.duration <= STOP_TIME + 1e-9
+    assert trajectory.velocities[-1] == pytest.approx(np.zeros(6), abs=1e-9)
+    if trajectory.duration > 0:
+        assert trajectory.velocities[0] == pytest.approx(qd)
+        _, velocities = finely(trajectory)
+        assert np.all(np.abs(np.diff(velocities, axis=0)) / 0.002 <= ACCELERATION_LIMIT + 1e-6)
+        assert trajectory.positions[-1] == pytest.approx(1 + qd * trajectory.duration / 2)

@@ -1,0 +1,192 @@
+"""The socket and the clip on a free connector without gravity."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pybullet as p
+import pytest
+from numpy.typing import NDArray
+from scipy.spatial.transform import RigidTransform, Rotation
+
+from regrasp.interfaces.cell import Cell
+from regrasp.sim.cable.fixtures import LIP_TRAVEL, STAND_FORCE, ClipHold, Hold, SocketHold
+
+RAMP = 2.0  # N/s
+LET_GO = 1.0  # N around the stated force
+SEATED = 0.0005  # m
+FloatArray = NDArray[np.float64]
+
+
+@dataclass
+class Plug:
+    """A connector alone."""
+
+    client: int
+    body: int
+    step: float
+
+    def state(self) -> tuple[RigidTransform, FloatArray, FloatArray]:
+        position, turn = p.getBasePositionAndOrientation(self.body, physicsClientId=self.client)
+        velocity, rate = p.getBaseVelocity(self.body, physicsClientId=self.client)
+        return RigidTransform.from_components(position, Rotation.from_quat(turn)), np.array(velocity), np.array(rate)
+
+    def put(self, pose: RigidTransform, velocity: FloatArray | None = None) -> None:
+        p.resetBasePositionAndOrientation(
+            self.body, pose.translation.tolist(), pose.rotation.as_quat().tolist(), physicsClientId=self.client
+        )
+        p.resetBaseVelocity(
+            self.body, [0, 0, 0] if velocity is None else velocity.tolist(), [0, 0, 0], physicsClientId=self.client
+        )
+
+    def advance(self, seconds: float, clip: ClipHold | None = None, force: FloatArray | None = None) -> None:
+        for _ in range(round(seconds / self.step)):
+            state = self.state()
+            if clip is not None:
+                clip.step(*state)
+            if force is not None:
+                at = state[0].translation.tolist()
+                p.applyExternalForce(self.body, -1, force.tolist(), at, p.WORLD_FRAME, physicsClientId=self.client)
+            p.stepSimulation(physicsClientId=self.client)
+
+
+@pytest.fixture
+def plug(cell: Cell, client: int) -> Plug:
+    radius, length, mass = cell.known.connector.radius, cell.known.connector.length, cell.hidden.connector_mass
+    body = p.createMultiBody(mass, -1, -1, physicsClientId=client)
+    inertia = [mass * radius**2 / 2] + [mass * (3 * radius**2 + length**2) / 12] * 2
+    p.changeDynamics(body, -1, localInertiaDiagonal=inertia, linearDamping=0, angularDamping=0, physicsClientId=client)
+    return Plug(client, body, 1.0 / cell.hidden.step_rate)
+
+
+@pytest.fixture
+def clip(cell: Cell, plug: Plug) -> ClipHold:
+    mass, length, radius = cell.hidden.connector_mass, cell.known.connector.length, cell.known.connector.radius
+    across = mass * (3 * radius**2 + length**2) / 12
+    return ClipHold(plug.client, plug.body, -1, cell.known.clip, mass, across, plug.step)
+
+
+def near_seat(cell: Cell, distance: float, angle_deg: float) -> RigidTransform:
+    """A pose so far from the clip's seat, in a slanted direction."""
+    seat = cell.known.clip.world_from_seat
+    offset = distance * np.array([2.0, -1.0, 2.0]) / 3.0
+    tilt = Rotation.from_euler("y", angle_deg, degrees=True)
+    return RigidTransform.from_components(seat.translation + offset, seat.rotation * tilt)
+
+
+def seated(cell: Cell, plug: Plug, clip: ClipHold) -> None:
+    plug.put(cell.known.clip.world_from_seat)
+    plug.advance(0.5, clip)
+    assert clip.holds
+
+
+@pytest.mark.parametrize(
+    ("distance", "angle_deg", "caught"),
+    [
+        (0.0, 0.0, True),
+        (0.019, 0.0, True),
+        (0.0, 19.0, True),
+        (0.019, 19.0, True),
+        (0.021, 0.0, False),
+        (0.0, 21.0, False),
+        (0.0, 180.0, False),
+    ],
+)
+def test_it_takes_an_end_that_rests_in_its_mouth(
+    cell: Cell, plug: Plug, clip: ClipHold, distance: float, angle_deg: float, caught: bool
+) -> None:
+    plug.put(near_seat(cell, distance, angle_deg))
+    plug.advance(1.5, clip)
+    assert clip.holds == caught
+    if caught:
+        off = cell.known.clip.world_from_seat.inv() * plug.state()[0]
+        assert float(np.linalg.norm(off.translation)) < SEATED
+        assert float(off.rotation.apply([1, 0, 0])[0]) > np.cos(np.deg2rad(1.0))
+
+
+@pytest.mark.parametrize("speed", [0.03, 0.5])
+def test_it_does_not_take_a_passing_end(cell: Cell, plug: Plug, clip: ClipHold, speed: float) -> None:
+    plug.put(near_seat(cell, 0.04, 0.0), -speed * np.array([2.0, -1.0, 2.0]) / 3.0)
+    closest = np.inf
+    for _ in range(round(0.1 / speed / 0.01)):
+        plug.advance(0.01, clip)
+        off = plug.state()[0].translation - cell.known.clip.world_from_seat.translation
+        closest = min(closest, float(np.linalg.norm(off)))
+        assert not clip.holds
+    assert closest < 0.01  # m: it did pass through the mouth
+
+
+def test_it_does_not_take_an_end_that_rests_for_too_short_a_time(cell: Cell, plug: Plug, clip: ClipHold) -> None:
+    plug.put(near_seat(cell, 0.005, 0.0))
+    plug.advance(0.15, clip)
+    assert not clip.holds
+
+
+DIRECTIONS = [(1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.6, -0.8)]
+
+
+@pytest.mark.parametrize("direction", DIRECTIONS)
+def test_it_holds_ten_newtons(cell: Cell, plug: Plug, clip: ClipHold, direction: tuple[float, float, float]) -> None:
+    seated(cell, plug, clip)
+    plug.advance(3.0, clip, 10.0 * np.asarray(direction))
+    off = plug.state()[0].translation - cell.known.clip.world_from_seat.translation
+    assert clip.holds
+    np.testing.assert_allclose(off, 10.0 / cell.known.clip.hold_force * LIP_TRAVEL * np.asarray(direction), atol=2e-4)
+
+
+@pytest.mark.parametrize("direction", DIRECTIONS)
+def test_it_lets_go_above_its_force(
+    cell: Cell, plug: Plug, clip: ClipHold, direction: tuple[float, float, float]
+) -> None:
+    seated(cell, plug, clip)
+    force = 10.0
+    while clip.holds and force < 30.0:
+        force += RAMP * 0.01
+        plug.advance(0.01, clip, force * np.asarray(direction))
+    assert force == pytest.approx(cell.known.clip.hold_force, abs=LET_GO)
+
+
+def test_what_was_pulled_out_is_taken_again_only_after_it_left(cell: Cell, plug: Plug, clip: ClipHold) -> None:
+    seated(cell, plug, clip)
+    plug.put(near_seat(cell, 0.021, 0.0))
+    plug.advance(0.01, clip)
+    assert not clip.holds
+    plug.put(near_seat(cell, 0.01, 0.0))
+    plug.advance(0.5, clip)
+    assert not clip.holds
+    plug.put(near_seat(cell, 0.04, 0.0))
+    plug.advance(0.01, clip)
+    plug.put(near_seat(cell, 0.01, 0.0))
+    plug.advance(0.5, clip)
+    assert clip.holds
+
+
+@pytest.mark.parametrize(("force", "stays"), [(5.0, True), (9.5, True), (10.5, False), (15.0, False)])
+def test_a_socket_lets_go_at_its_pull_out_force(plug: Plug, force: float, stays: bool) -> None:
+    socket = SocketHold(Hold(plug.client, plug.body, -1, RigidTransform.identity()), np.array([0.0, 1.0, 0.0]), 10.0)
+    for _ in range(480):
+        plug.advance(plug.step, force=np.array([0.0, -force, 0.0]))
+        socket.step()
+    moved = float(np.linalg.norm(plug.state()[0].translation))
+    assert socket.holds == stays
+    assert (moved < 1e-4) == stays  # m
+
+
+def test_a_single_steps_spike_does_not_unplug(plug: Plug) -> None:
+    socket = SocketHold(Hold(plug.client, plug.body, -1, RigidTransform.identity()), np.array([0.0, 1.0, 0.0]), 10.0)
+    for i in range(100):
+        plug.advance(plug.step, force=np.array([40.0 if i == 50 else 0.0, 0.0, 0.0]))
+        socket.step()
+    assert socket.holds
+
+
+@pytest.mark.parametrize("direction", [*DIRECTIONS, (0.0, 1.0, 0.0), (0.0, -1.0, 0.0)])
+@pytest.mark.parametrize(("share", "stays"), [(0.95, True), (1.05, False)])
+def test_a_stand_lets_go_at_its_force_whichever_way(
+    plug: Plug, direction: tuple[float, float, float], share: float, stays: bool
+) -> None:
+    stand = SocketHold(Hold(plug.client, plug.body, -1, RigidTransform.identity()), None, STAND_FORCE)
+    for _ in range(480):
+        plug.advance(plug.step, force=share * STAND_FORCE * np.asarray(direction))
+        stand.step()
+    assert stand.holds == stays
+    assert (float(np.linalg.norm(plug.state()[0].translation)) < 1e-4) == stays  # m
