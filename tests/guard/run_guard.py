@@ -2,6 +2,7 @@
 
     python tests/guard/run_guard.py record       # write what the runs come to into tests/guard/runs.json
     python tests/guard/run_guard.py check        # run them again and say where the first one parts; exit code 1
+    python tests/guard/run_guard.py check --only "no_obstacle zero seed 0"
 
 A run comes to the digests of its ticks.jsonl, of its events.jsonl, of its result.json without wall times and versions,
 and of its state at every tick, unrounded: joints and fingers as read, the connector's true pose and velocities, the
@@ -90,9 +91,9 @@ def digests(scenario: str, gravity: str, seed: int) -> dict[str, Any]:
     return found | {"outcome": result["outcome"], "renderer": result["renderer"], "states": traces[0].finish()}
 
 
-def runs(jobs: int) -> dict[str, dict[str, Any]]:
-    """What each run comes to, by its name."""
-    cases = list(product(SCENARIOS, ("zero", "earth"), SEEDS))
+def runs(jobs: int, only: str) -> dict[str, dict[str, Any]]:
+    """What each run comes to, by its name; of the runs whose names hold `only`."""
+    cases = [case for case in product(SCENARIOS, ("zero", "earth"), SEEDS) if only in "{} {} seed {}".format(*case)]
     found: dict[str, dict[str, Any]] = {}
     for done in run_each([partial(digests, *case) for case in cases], jobs):
         name = "{} {} seed {}".format(*cases[done.number])
@@ -121,8 +122,11 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("what", choices=("record", "check"))
     parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--only", default="", metavar="WORDS", help="check: those runs whose names hold these words")
     options = parser.parse_args()
-    found = runs(options.jobs)
+    if options.what == "record" and options.only:
+        parser.error("--only is for check: a record holds every run")
+    found = runs(options.jobs, options.only)
     if options.what == "record":
         KEPT.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
         return 0
