@@ -1,1 +1,260 @@
-"""Behaviour-tree autonomy that anyone can run, test and measure."""
+"""Behaviour-tree autonomy that anyone can run, test and measure: the interface for Python programs.
+
+docs/python.md shows it at work. What is not named in `__all__` may change without notice.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, Protocol
+
+if TYPE_CHECKING:  # at run time `__getattr__` brings these when they are asked for: `import regrasp` costs nothing
+    from scipy.spatial.transform import RigidTransform
+
+    from regrasp.app.files.findings import Finding as Finding
+    from regrasp.app.files.findings import Findings as Findings
+    from regrasp.app.records.reader import RunRecord as RunRecord
+    from regrasp.app.records.record import OnEvent, Progress
+    from regrasp.app.records.result import Result as Result
+    from regrasp.app.scenario.load import Scenario as Scenario
+    from regrasp.interfaces.cell import Cell as Cell
+    from regrasp.interfaces.frame import Intrinsics as Intrinsics
+    from regrasp.interfaces.frame import RgbdFrame as RgbdFrame
+    from regrasp.perception.pose.estimate import Estimate as Estimate
+    from regrasp.perception.pose.estimate import NoEstimate as NoEstimate
+
+_TYPES = {
+    "Cell": "regrasp.interfaces.cell",
+    "Estimate": "regrasp.perception.pose.estimate",
+    "Finding": "regrasp.app.files.findings",
+    "Findings": "regrasp.app.files.findings",
+    "Intrinsics": "regrasp.interfaces.frame",
+    "NoEstimate": "regrasp.perception.pose.estimate",
+    "Result": "regrasp.app.records.result",
+    "RgbdFrame": "regrasp.interfaces.frame",
+    "RunRecord": "regrasp.app.records.reader",
+    "Scenario": "regrasp.app.scenario.load",
+}
+__all__ = [
+    "Cell",
+    "Estimate",
+    "Finding",
+    "Findings",
+    "Interrupted",
+    "Intrinsics",
+    "NoEstimate",
+    "Result",
+    "RgbdFrame",
+    "RunRecord",
+    "Scenario",
+    "estimate_pose",
+    "load_cases",
+    "load_cell",
+    "load_frame",
+    "load_scenario",
+    "read_record",
+    "run",
+]
+
+
+class Interrupted(KeyboardInterrupt):
+    """Ctrl-C ended a run. The run's record is complete, and `result` says how far the run came."""
+
+    def __init__(self, result: Result) -> None:
+        super().__init__(result.outcome)
+        self.result = result
+
+
+class StopRequest(Protocol):
+    """Asks a run to stop, as a `threading.Event` does."""
+
+    def is_set(self) -> bool:
+        """Whether the run shall stop."""
+
+
+def load_scenario(scenario: str | Path, overrides: Sequence[str] = (), case: str | None = None) -> Scenario:
+    """Read and check one case of a scenario, with the cell and the tree that it names.
+
+    Args:
+        scenario: the name of a shipped scenario, or the path of a .yaml file.
+        overrides: assignments such as "gravity=earth" or "cell.known.cable_length=0.5", as `--set` takes them.
+        case: the name of the case, such as "gravity=earth"; by default the case of the first values of `vary`.
+
+    Raises:
+        Findings: something in the files or the overrides is wrong; `items` names all of it with file and line.
+    """
+    from regrasp.app.scenario.load import load_scenario
+
+    return load_scenario(str(scenario), overrides, case)
+
+
+def load_cases(scenario: str | Path, overrides: Sequence[str] = ()) -> list[Scenario]:
+    """Read and check every case of a scenario; arguments and errors as in `load_scenario`."""
+    from regrasp.app.scenario.load import cases
+
+    return cases(str(scenario), overrides)
+
+
+def run(
+    scenario: str | Path | Scenario,
+    *,
+    seed: int | None = None,
+    out: str | Path | None = None,
+    video: bool = False,
+    gui: bool = False,
+    renderer: Literal["auto", "moderngl", "tiny"] = "auto",
+    on_tick: Progress | None = None,
+    on_event: OnEvent | None = None,
+    stop: StopRequest | None = None,
+) -> Result:
+    """Run a scenario to its end, in this process. One run at a time: py_trees keeps one blackboard a process.
+
+    Args:
+        scenario: a loaded one, or what `load_scenario` takes.
+        seed: draws every error, noise and jitter; by default the scenario's.
+        out: the folder for the record, which is made; None keeps no record.
+        video: film the run into the record.
+        gui: show PyBullet's window.
+        renderer: what draws the cameras' pictures; auto takes OpenGL (moderngl) where it works, else PyBullet's.
+        on_tick: called after each tick of the tree with the simulated second and the active leaf's name, "" for none.
+        on_event: called with each event of the run, a mapping as in events.jsonl.
+        stop: a `threading.Event` or the like. Once it is set, the run ends after the tick with the outcome
+            "interrupted".
+
+    Raises:
+        Findings: the scenario is wrong, or the folder cannot take a record.
+        Interrupted: Ctrl-C; the record is complete. While the world is still being built, a plain KeyboardInterrupt.
+        Exception: what a callback raised, once the record is complete.
+    """
+    from regrasp.app.interrupts import late_imports
+
+    loaded = load_scenario(scenario) if isinstance(scenario, (str, Path)) else scenario
+    if video and out is None:
+        raise ValueError("video is filmed into the record; name a folder with out")
+    with late_imports():
+        from regrasp.app.run.episode import run_episode  # brings the planner, the compiler and the physics: seconds
+
+    failures: list[Exception] = []
+
+    def call(callback: Any, *values: Any) -> None:
+        try:
+            if callback is not None and not failures:
+                callback(*values)
+        except Exception as error:
+            failures.append(error)
+            raise KeyboardInterrupt from error  # which ends the run, and blames no leaf
+
+    def tick(seconds: float, leaf: str) -> None:
+        call(on_tick, seconds, leaf)
+        if stop is not None and stop.is_set():
+            raise KeyboardInterrupt
+
+    try:
+        result = run_episode(
+            loaded,
+            None if out is None else Path(out),
+            seed=loaded.file.seed if seed is None else seed,
+            video=video,
+            gui=gui,
+            renderer=renderer,
+            progress=tick,
+            on_event=lambda event: call(on_event, event),
+        )
+    finally:
+        if failures:
+            raise failures[0]
+    if result.outcome in ("interrupted", "wall_limit") and not (stop is not None and stop.is_set()):
+        raise Interrupted(result)
+    return result
+
+
+def read_record(folder: str | Path) -> RunRecord:
+    """Read and check the folder that a run left: its result, its events, and every change of a node's status.
+
+    Raises:
+        Findings: the folder holds no run, or a file in it is broken.
+    """
+    from regrasp.app.records.reader import read_record
+
+    return read_record(Path(folder))
+
+
+def load_cell(cell: str | Path = "thesis", overrides: Sequence[str] = ()) -> Cell:
+    """Read and check a cell: a shipped one by its name, or a .yaml file by its path.
+
+    `overrides` are assignments such as "known.connector.length=0.08".
+
+    Raises:
+        Findings: something in the file or the overrides is wrong.
+    """
+    from regrasp.app.files.overrides import read
+    from regrasp.app.files.resources import resolve
+    from regrasp.app.scenario.cell_file import load_cell
+
+    assignments, wrong = read(overrides)
+    if wrong:
+        from regrasp.app.files.findings import Findings
+
+        raise Findings(wrong)
+    return load_cell(resolve("cell", str(cell), Path()), assignments)
+
+
+def load_frame(
+    rgb: str | Path, depth: str | Path | None, intrinsics: str | Path, *, depth_unit: float = 0.001
+) -> RgbdFrame:
+    """Read a colour picture and its depth, with the lens distortion taken out.
+
+    Args:
+        rgb: a colour picture (H, W).
+        depth: depth aligned to it: a 16-bit PNG that counts `depth_unit` metres, or a .npy file of metres; None for
+            none, which the technique `fiducial` alone does without.
+        intrinsics: the camera's calibration file, as `regrasp calibrate` writes it.
+        depth_unit: metres.
+
+    Raises:
+        Findings: a file cannot be read, or they do not fit together.
+    """
+    from regrasp.app.frames.perceive import load_frame
+
+    return load_frame(Path(rgb), None if depth is None else Path(depth), Path(intrinsics), depth_unit)
+
+
+def estimate_pose(
+    frame: RgbdFrame,
+    world_from_camera: RigidTransform | None = None,
+    *,
+    technique: Literal["rgbd", "fiducial", "detector", "fused"] = "fused",
+    cell: Cell | None = None,
+) -> Estimate | NoEstimate:
+    """Find the connector in a frame.
+
+    Args:
+        frame: colour and aligned depth; see `load_frame`.
+        world_from_camera: where the camera stands (x right, y down, z forward). Without it the pose is told in the
+            camera's frame, and the cell's floor and panels are not used.
+        technique: how; app/studies/pose/POSE.md compares them.
+        cell: says how long, how thick and of which colour the connector is; by default the cell "thesis".
+
+    Returns:
+        A pose with its covariance, or the reason why there is none.
+
+    Raises:
+        ValueError: the cell lacks what the technique needs, such as a tag on the connector.
+    """
+    from regrasp.app.frames.perceive import make_estimator
+
+    known = (cell or load_cell()).known
+    return make_estimator(technique, known, world_from_camera).estimate(frame)
+
+
+def __getattr__(name: str) -> Any:
+    if name in _TYPES:
+        from importlib import import_module
+
+        return getattr(import_module(_TYPES[name]), name)
+    raise AttributeError(f"module 'regrasp' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -1,7 +1,8 @@
-"""The README's commands are commands of ours, and its samples are what the program prints; `make readme` runs them."""
+"""README and tutorial: their commands are ours, their samples right, their links alive. `make readme` runs the README's."""
 
 import re
 import shlex
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -13,10 +14,13 @@ from regrasp.app.scenario.load import cases
 
 TEXT = README.read_text(encoding="utf-8")
 OURS = [command for command in commands(TEXT) if command.startswith("regrasp ")]
+TUTORIAL = README.parent / "docs" / "tutorial.md"
+TAUGHT = [command for command in commands(TUTORIAL.read_text(encoding="utf-8")) if command.startswith("regrasp ")]
+PAGES = [README, *sorted(TUTORIAL.parent.glob("*.md"))]
 
 
-@pytest.mark.parametrize("command", OURS)
-def test_a_command_of_the_readme_is_one_of_ours(command: str) -> None:
+@pytest.mark.parametrize("command", [*OURS, *TAUGHT])
+def test_a_command_is_one_of_ours(command: str) -> None:
     """All of its options and values are taken."""
     group: Any = typer.main.get_command(app)
     words = shlex.split(command)[1:]
@@ -42,12 +46,20 @@ def test_runs_are_made_before_they_are_looked_at() -> None:
             made[name] = made.get(name, 0) + 1
 
 
-def test_the_readme_s_scenario_is_right(tmp_path: Any) -> None:
-    _, _, rest = TEXT.partition("```yaml\n")
+@pytest.mark.parametrize(("page", "count"), [(README, 30), (TUTORIAL, 2)], ids=["README", "tutorial"])
+def test_a_scenario_that_is_shown_is_right(page: Path, count: int, tmp_path: Path) -> None:
+    _, _, rest = page.read_text(encoding="utf-8").partition("```yaml\n")
     (tmp_path / "mine.yaml").write_text(rest.partition("```")[0])
-    assert len(cases(str(tmp_path / "mine.yaml"))) == 30
+    assert len(cases(str(tmp_path / "mine.yaml"))) == count
 
 
-def test_every_link_leads_somewhere() -> None:
-    for link in re.findall(r"\]\(([^)]+)\)", TEXT):
-        assert link.startswith("https://") or (README.parent / link).exists(), link
+def test_the_tutorial_s_test_passes(pytester: pytest.Pytester) -> None:
+    [example] = re.findall(r"```python\n(.*?)```", TUTORIAL.read_text(encoding="utf-8"), re.DOTALL)
+    pytester.makepyfile(example)
+    pytester.runpytest_inprocess("-p", "regrasp.app.pytest_plugin", "-p", "no:cacheprovider").assert_outcomes(passed=1)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_every_link_leads_somewhere(page: Path) -> None:
+    for link in re.findall(r"\]\(([^)]+)\)", page.read_text(encoding="utf-8")):
+        assert link.startswith("https://") or (page.parent / link).exists(), link
