@@ -1,4 +1,4 @@
-"""README and tutorial: their commands are ours, their samples right, their links alive. `make readme` runs the README's."""
+"""README and tutorial: commands are ours, samples right, links alive. `make readme` runs the README's commands."""
 
 import re
 import shlex
