@@ -10,12 +10,12 @@ from py_trees.ports import BehaviourWithPorts, PortInformation
 from regrasp.behaviors.services import Services
 from regrasp.interfaces.cause import Cause, CauseCode, ServiceError
 from regrasp.motion.failure import PlanningError
-from regrasp.motion.task import Task
+from regrasp.motion.task import MotionTask
 
-Steps = Generator[Task | None, None, None]
+LeafSteps = Generator[MotionTask | None, None, None]
 
 
-class Failed(Exception):  # noqa: N818 - said inside `steps`: the leaf fails with this cause
+class LeafFailed(Exception):  # noqa: N818 - said inside `steps`: the leaf fails with this cause
     """Raised inside `steps`: the leaf fails with this cause."""
 
     def __init__(self, code: CauseCode, message: str) -> None:
@@ -24,7 +24,7 @@ class Failed(Exception):  # noqa: N818 - said inside `steps`: the leaf fails wit
 
 
 @dataclass(frozen=True)
-class Port(PortInformation):
+class LeafPort(PortInformation):
     """A port with limits that the check of a tree file enforces.
 
     A number is more than `above`; a string is one of the `names` that the cell gives to this kind of thing.
@@ -83,16 +83,16 @@ class Leaf(BehaviourWithPorts):
 
 
 class StepsLeaf(Leaf):
-    """A leaf whose work is a sequence of steps: `steps()` yields a `Task` to be done, or None to wait for a tick.
+    """A leaf whose work is a sequence of steps: `steps()` yields a `MotionTask` to be done, or None to wait for a tick.
 
-    It ends in SUCCESS when the steps end. `Failed` raised in them, or a motion that cannot be, ends it in FAILURE.
+    It ends in SUCCESS when the steps end. `LeafFailed` raised in them, or a motion that cannot be, ends it in FAILURE.
     """
 
     INPUT_PORTS: ClassVar[dict[str, Any]] = {}
     OUTPUT_PORTS: ClassVar[dict[str, Any]] = {}
-    _task: Task | None = None
+    _task: MotionTask | None = None
 
-    def steps(self) -> Steps:
+    def steps(self) -> LeafSteps:
         """The work, as a generator."""
         raise NotImplementedError
 
@@ -109,7 +109,7 @@ class StepsLeaf(Leaf):
                     return Status.RUNNING
         except StopIteration:
             return Status.SUCCESS
-        except (PlanningError, Failed) as error:
+        except (PlanningError, LeafFailed) as error:
             return self.fail(error.code, str(error))
         return Status.RUNNING
 
@@ -120,8 +120,8 @@ class StepsLeaf(Leaf):
                 self._task.cancel()
             self._work.close()
 
-    def follow(self, task: Task) -> Steps:
-        """Steps that do a task, for a leaf that handles its PlanningError itself; stopped with the leaf."""
+    def follow(self, task: MotionTask) -> LeafSteps:
+        """LeafSteps that do a task, for a leaf that handles its PlanningError itself; stopped with the leaf."""
         try:
             while not task.poll():
                 yield None
@@ -129,8 +129,8 @@ class StepsLeaf(Leaf):
             task.cancel()
             raise
 
-    def wait(self, seconds: float) -> Steps:
-        """Steps that let so many simulated seconds pass."""
+    def wait(self, seconds: float) -> LeafSteps:
+        """LeafSteps that let so many simulated seconds pass."""
         end = self.services.clock.now() + seconds
         while self.services.clock.now() < end - 1e-9:
             yield None

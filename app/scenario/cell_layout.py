@@ -87,9 +87,9 @@ def _overlaps(document: Document, known: KnownCell) -> Iterator[Finding]:
 
 def _between_the_arms(known: KnownCell) -> float:
     """How deep (m) the arms asleep reach into each other, by the spheres that fill their moving links."""
-    from regrasp.motion.robots.spheres import LINKS, SPHERES  # late: they bring the compiler
+    from regrasp.motion.robots.spheres import SPHERE_LINKS, SPHERES  # late: they bring the compiler
 
-    moving = LINKS > 0
+    moving = SPHERE_LINKS > 0
     radii = SPHERES[moving, 3]
     bodies = [asleep(arm)[0][moving] for arm in known.arms]
     deepest = [
@@ -194,14 +194,14 @@ def _cable(document: Document, cell: Cell) -> Iterator[Finding]:
 
 
 def _clip(document: Document, known: KnownCell) -> Iterator[Finding]:
-    from regrasp.behaviors.cable.hand import HAND  # late: it brings the planner and the compiler
+    from regrasp.behaviors.cable.hand import HANDLING_ARM  # late: it brings the planner and the compiler
     from regrasp.motion.robots.kinematics import ORIGINS, TOOL_OFFSET
 
-    shoulder = np.asarray(known.arm(HAND).base) + ORIGINS[0] + ORIGINS[1]
+    shoulder = np.asarray(known.arm(HANDLING_ARM).base) + ORIGINS[0] + ORIGINS[1]
     reach = float(np.linalg.norm(ORIGINS[2:], axis=1).sum() + np.linalg.norm(TOOL_OFFSET))
     way = float(np.linalg.norm(np.asarray(known.clip.seat) - shoulder))
     if way > reach:
-        message = f"the clip is {way:.2f} m from the {HAND} arm's shoulder, which reaches {reach:.2f} m"
+        message = f"the clip is {way:.2f} m from the {HANDLING_ARM} arm's shoulder, which reaches {reach:.2f} m"
         yield Finding(*document.place(("known", "clip", "seat")), f"{message}; move it nearer")
 
 
@@ -222,7 +222,7 @@ def _plug(document: Document, known: KnownCell) -> Iterator[Finding]:
 @lru_cache(maxsize=64)
 def _no_grasp(known: KnownCell) -> str | None:
     """Why the hand cannot take hold of the plugged connector among the known boxes; None when it can."""
-    from regrasp.behaviors.cable.hand import HAND  # late: they bring the planner and the compiler
+    from regrasp.behaviors.cable.hand import HANDLING_ARM  # late: they bring the planner and the compiler
     from regrasp.behaviors.cable.unplug import SHALLOW
     from regrasp.motion.failure import PlanningError
     from regrasp.motion.grasping.grasps import choose_grasp, grasp_candidates
@@ -234,17 +234,21 @@ def _no_grasp(known: KnownCell) -> str | None:
         arm.name: ArmKinematics(RigidTransform.from_translation(arm.base)) for arm in known.arms
     }
     boxes, connector = known.solids(), known.connector
-    others = [CollisionModel(arms[a.name], boxes).spheres(np.array(a.sleep)) for a in known.arms if a.name != HAND]
-    model = CollisionModel(arms[HAND], boxes, other_arm=np.vstack(others), opening=OPEN_GAP)
+    others = [
+        CollisionModel(arms[a.name], boxes).spheres(np.array(a.sleep)) for a in known.arms if a.name != HANDLING_ARM
+    ]
+    model = CollisionModel(arms[HANDLING_ARM], boxes, other_arm=np.vstack(others), opening=OPEN_GAP)
     plug = known.socket(PLUGGED_INTO).world_from_plug(connector.length)
-    asleep_at = np.array(known.arm(HAND).sleep)
+    asleep_at = np.array(known.arm(HANDLING_ARM).sleep)
     try:
         candidates = [
             grasp
             for offset in GRIP_OFFSETS
             for grasp in grasp_candidates(plug, connector.length, connector.radius, offset, shallow=SHALLOW)
         ]
-        choose_grasp(arms[HAND], model, asleep_at, candidates, margin=TIGHT_MARGIN, near_margin=NEAR_MARGINS[-1])
+        choose_grasp(
+            arms[HANDLING_ARM], model, asleep_at, candidates, margin=TIGHT_MARGIN, near_margin=NEAR_MARGINS[-1]
+        )
     except (PlanningError, ValueError) as error:
         return str(error)
     return None

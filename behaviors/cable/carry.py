@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from regrasp.behaviors.cable.hand import BACK, HAND, HandLeaf
-from regrasp.behaviors.leaf import Failed, Steps
+from regrasp.behaviors.cable.hand import BACK, HANDLING_ARM, HandLeaf
+from regrasp.behaviors.leaf import LeafFailed, LeafSteps
 from regrasp.interfaces.cause import CauseCode
 from regrasp.motion.failure import PlanningError
 from regrasp.motion.planning.straight import straight_line
@@ -30,12 +30,12 @@ TRUSTED_SHIFT = 0.06  # m: what is seen further off its place in the hand than t
 class Carry(HandLeaf):
     """Plans the held connector's way to a place before the clip and follows it."""
 
-    def steps(self) -> Steps:
+    def steps(self) -> LeafSteps:
         """See the class."""
         motion, held = self.services.motion, self.held()
         in_and_out = (BEFORE, BEFORE - BACK[0])
         onward = [RigidTransform.from_translation([x, 0.0, 0.0]) for x in in_and_out]
-        yield motion.carry(HAND, self._goals(held), held, onward=onward, speed=CARRY_SPEED)
+        yield motion.carry(HANDLING_ARM, self._goals(held), held, onward=onward, speed=CARRY_SPEED)
 
     def _goals(self, held: RigidTransform) -> list[RigidTransform]:
         """Hand poses before the clip from which a straight way in is free, any roll about the connector's axis.
@@ -43,8 +43,8 @@ class Carry(HandLeaf):
         Those that turn the hand least come first.
         """
         motion, clip = self.services.motion, self.services.known.clip
-        model, near = motion.model(HAND, held=held), motion.model(HAND, clip=False)
-        kin = motion.kinematics[HAND]
+        model, near = motion.model(HANDLING_ARM, held=held), motion.model(HANDLING_ARM, clip=False)
+        kin = motion.kinematics[HANDLING_ARM]
         goals = []
         for roll in np.linspace(-np.pi, np.pi, ROLLS, endpoint=False):
             seated = clip.world_from_seat * RigidTransform.from_rotation(Rotation.from_euler("x", roll)) * held.inv()
@@ -52,8 +52,8 @@ class Carry(HandLeaf):
             if any(_straight_in(kin, near, q, seated) for q in kin.ik(before) if model.free(q, WAY_MARGIN)):
                 goals.append(before)
         if not goals:
-            raise Failed(CauseCode.OUT_OF_REACH, "no free hand pose brings the held connector into the clip")
-        now = motion.tool(HAND).rotation.inv()
+            raise LeafFailed(CauseCode.OUT_OF_REACH, "no free hand pose brings the held connector into the clip")
+        now = motion.tool(HANDLING_ARM).rotation.inv()
         return sorted(goals, key=lambda pose: float((now * pose.rotation).magnitude()))
 
 
@@ -68,14 +68,14 @@ def _straight_in(kin: ArmKinematics, near: CollisionModel, q: NDArray[np.float64
 class Insert(HandLeaf):
     """Looks how the connector lies in the hand, and brings it straight into the clip."""
 
-    def steps(self) -> Steps:
+    def steps(self) -> LeafSteps:
         """See the class."""
         motion = self.services.motion
         yield from self._look()
-        yield motion.straight(HAND, self._seated(self.held()), speed=INSERT_SPEED)
+        yield motion.straight(HANDLING_ARM, self._seated(self.held()), speed=INSERT_SPEED)
         yield from self.wait(SEATED_SECONDS)
 
-    def _look(self) -> Steps:
+    def _look(self) -> LeafSteps:
         """Correct the belief of how the connector lies in the hand by what the rear camera sees of it."""
         clock, perception, belief = self.services.clock, self.services.perception, self.services.belief
         seen: dict[float, Estimate] = {}
@@ -90,7 +90,7 @@ class Insert(HandLeaf):
             self.say("the hand hides the connector", frames=len(seen))
             return
         mean = fuse(long)
-        found = self.services.motion.tool(HAND).inv() * mean.world_from_connector
+        found = self.services.motion.tool(HANDLING_ARM).inv() * mean.world_from_connector
         if _axis(found) @ _axis(belief.held) < 0:  # a finger was taken for the cable: no connector turns round in a jaw
             found = found * RigidTransform.from_rotation(Rotation.from_euler("z", 180, degrees=True))
         # The fingers end the visible part as an end of its own would: unless all of the length shows, where the part
@@ -107,7 +107,7 @@ class Insert(HandLeaf):
 
     def _seated(self, held: RigidTransform) -> RigidTransform:
         """world_from_tool that seats the held connector, with the roll that turns the hand least."""
-        tool, seat = self.services.motion.tool(HAND), self.services.known.clip.world_from_seat
+        tool, seat = self.services.motion.tool(HANDLING_ARM), self.services.known.clip.world_from_seat
         rolls = [RigidTransform.from_rotation(Rotation.from_euler("x", r)) for r in np.linspace(-np.pi, np.pi, 361)]
         poses = [seat * roll * held.inv() for roll in rolls]
         return min(poses, key=lambda pose: float((tool.rotation.inv() * pose.rotation).magnitude()))

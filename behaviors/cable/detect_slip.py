@@ -4,9 +4,9 @@ from typing import Any, ClassVar
 
 from py_trees.common import Status
 
-from regrasp.behaviors.cable.hand import HAND
+from regrasp.behaviors.cable.hand import HANDLING_ARM
 from regrasp.behaviors.leaf import Leaf
-from regrasp.behaviors.services import Notice
+from regrasp.behaviors.services import LossNotice
 from regrasp.interfaces.cause import CauseCode
 from regrasp.perception.tracking.slip import GapTest, SlipEvidence, distance_slip
 from regrasp.perception.tracking.track import TrackState
@@ -29,11 +29,11 @@ class DetectSlip(Leaf):
 
     def work(self) -> Status:
         """See the class."""
-        self._gap.feed(self.services.motion.grippers[HAND].reading())
+        self._gap.feed(self.services.motion.grippers[HANDLING_ARM].reading())
         for evidence in (self._gap.evidence(), self._distance()):
             if evidence is not None and evidence.detected:
                 self.services.belief.held = None
-                self.services.belief.notices.append(Notice(self.services.clock.now(), evidence.by))
+                self.services.belief.notices.append(LossNotice(self.services.clock.now(), evidence.by))
                 self.say("slip", by=evidence.by, value=round(evidence.value, 4), limit=evidence.limit)
                 return self.fail(CauseCode.SLIPPED, evidence.sentence)
         return Status.RUNNING
@@ -43,4 +43,4 @@ class DetectSlip(Leaf):
         track, now = self.services.perception.track, self.services.clock.now()
         if track.last is None or track.state(now)[0] is not TrackState.VISIBLE:
             return None
-        return distance_slip(self.services.motion.tool(HAND).translation, track.last.position)
+        return distance_slip(self.services.motion.tool(HANDLING_ARM).translation, track.last.position)

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
-from regrasp.behaviors.cable.hand import EYE, HandLeaf
-from regrasp.behaviors.leaf import Steps
+from regrasp.behaviors.cable.hand import CAMERA_ARM, HandLeaf
+from regrasp.behaviors.leaf import LeafSteps
 from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.cell import WristMount
 from regrasp.motion.failure import PlanningError
@@ -28,8 +28,8 @@ class LookLeaf(HandLeaf):
         motion = self.services.motion
         mount = self.services.known.camera("wrist").mount
         assert isinstance(mount, WristMount)
-        model = motion.model(EYE)
-        views = motion.kinematics[EYE].ik_view(world_from_camera, mount.wrist_from_camera)
+        model = motion.model(CAMERA_ARM)
+        views = motion.kinematics[CAMERA_ARM].ik_view(world_from_camera, mount.wrist_from_camera)
         return np.array([q for q in views if model.free(q, LOOK_MARGIN)]).reshape(-1, 6)
 
     def best_view(
@@ -55,7 +55,7 @@ class LookLeaf(HandLeaf):
         seconds: float,
         seen: list[Estimate],
         glimpses: list[NDArray[np.float64]] | None = None,
-    ) -> Steps:
+    ) -> LeafSteps:
         """Move the camera to one of the goals, look for so long, gather estimates in `seen`, map what stands there.
 
         `glimpses`: places (3,) m where something showed that may be the connector.
@@ -63,7 +63,7 @@ class LookLeaf(HandLeaf):
         Unlike a yielded task, a motion that cannot be raises its PlanningError here, to the caller.
         """
         clock, perception, motion = self.services.clock, self.services.perception, self.services.motion
-        yield from self.follow(motion.move(EYE, goals, margin=LOOK_MARGIN, tight=False))
+        yield from self.follow(motion.move(CAMERA_ARM, goals, margin=LOOK_MARGIN, tight=False))
         begin = clock.now() + SETTLE_SECONDS
         stamps: set[float] = set()
         while clock.now() < begin + seconds - 1e-9:

@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from regrasp.behaviors.cable.hand import EYE
+from regrasp.behaviors.cable.hand import CAMERA_ARM
 from regrasp.behaviors.cable.look import LookLeaf
-from regrasp.behaviors.leaf import Steps
+from regrasp.behaviors.leaf import LeafSteps
 from regrasp.motion.failure import PlanningError
 from regrasp.perception.pose.estimate import Estimate
 from regrasp.perception.pose.fusion import fuse
@@ -21,7 +21,7 @@ class LookCloser(LookLeaf):
     when no better one is to be had.
     """
 
-    def steps(self) -> Steps:
+    def steps(self) -> LeafSteps:
         """See the class."""
         belief = self.services.belief
         if belief.found_by == "rear" and belief.sure:
@@ -44,4 +44,4 @@ class LookCloser(LookLeaf):
                 belief.connector, belief.sure = found.world_from_connector, found.whole
                 belief.found_by = "wrist"
                 self.say("looked closer", position=belief.connector.translation.round(4).tolist(), sure=belief.sure)
-        yield from self.go_to_sleep(EYE)
+        yield from self.go_to_sleep(CAMERA_ARM)

@@ -4,8 +4,8 @@ from typing import Any, ClassVar
 
 from py_trees.common import Status
 
-from regrasp.behaviors.cable.hand import HAND
-from regrasp.behaviors.leaf import Leaf, Port
+from regrasp.behaviors.cable.hand import HANDLING_ARM
+from regrasp.behaviors.leaf import Leaf, LeafPort
 
 
 class Monitor(Leaf):
@@ -15,7 +15,7 @@ class Monitor(Leaf):
     """
 
     INPUT_PORTS: ClassVar[dict[str, Any]] = {
-        "period": Port(data_type=float, required=False, default_value=0.1, above=0, description="s between looks")
+        "period": LeafPort(data_type=float, required=False, default_value=0.1, above=0, description="s between looks")
     }
     OUTPUT_PORTS: ClassVar[dict[str, Any]] = {}
     RETURNS = frozenset({Status.SUCCESS})
@@ -25,7 +25,7 @@ class Monitor(Leaf):
     def work(self) -> Status:
         """See the class."""
         perception, now = self.services.perception, self.services.clock.now()
-        tool, held = self.services.motion.tool(HAND), self.services.belief.held
+        tool, held = self.services.motion.tool(HANDLING_ARM), self.services.belief.held
         perception.track.held(tool.translation)
         perception.hint = None if held is None else (tool * held).rotation.apply([1.0, 0.0, 0.0])
         if now >= self._due - 1e-9:

@@ -3,8 +3,8 @@
 from itertools import chain
 from typing import Any, ClassVar
 
-from regrasp.behaviors.cable.hand import HAND, HandLeaf
-from regrasp.behaviors.leaf import Failed, Port, Steps
+from regrasp.behaviors.cable.hand import HANDLING_ARM, HandLeaf
+from regrasp.behaviors.leaf import LeafFailed, LeafPort, LeafSteps
 from regrasp.interfaces.cause import CauseCode
 from regrasp.motion.service import OPEN_GAP
 from regrasp.perception.tracking.stillness import Stillness
@@ -21,11 +21,11 @@ class MakeRoom(HandLeaf):
     First the jaw, then straight back: one that closes may pinch the cable, one that turns away may hook it.
     """
 
-    def steps(self) -> Steps:
+    def steps(self) -> LeafSteps:
         """See the class."""
         self.services.belief.connector = self.services.belief.found_by = None
-        self.services.motion.grippers[HAND].open(OPEN_GAP)
-        for step in chain(self.wait(LEAVE_SECONDS), self.draw_back(), self.go_to_sleep(HAND)):
+        self.services.motion.grippers[HANDLING_ARM].open(OPEN_GAP)
+        for step in chain(self.wait(LEAVE_SECONDS), self.draw_back(), self.go_to_sleep(HANDLING_ARM)):
             self.services.perception.look("rear")  # the search starts where the end was seen last
             yield step
 
@@ -38,10 +38,10 @@ class WaitUntilStill(HandLeaf):
     """
 
     INPUT_PORTS: ClassVar[dict[str, Any]] = {
-        "time_limit": Port(data_type=float, required=False, default_value=30.0, above=0, description="s of waiting")
+        "time_limit": LeafPort(data_type=float, required=False, default_value=30.0, above=0, description="s of waiting")
     }
 
-    def steps(self) -> Steps:
+    def steps(self) -> LeafSteps:
         """See the class."""
         stillness, begin = Stillness(threshold=STILL), self.services.clock.now()
         limit = self.get_input("time_limit")
@@ -60,11 +60,11 @@ class WaitUntilStill(HandLeaf):
                     self.services.motion.set_obstacles(perception.occupancy.occupied_points(), perception.occupancy.h)
                 return
             yield from self.wait(FRAME_PERIOD)
-        raise Failed(CauseCode.NOT_STILL, f"the scene still moved after {limit:.0f} s")
+        raise LeafFailed(CauseCode.NOT_STILL, f"the scene still moved after {limit:.0f} s")
 
-    def _wait_blind(self, trouble: str) -> Steps:
+    def _wait_blind(self, trouble: str) -> LeafSteps:
         other = self.services.perception.trouble("wrist")
         if other is not None:
-            raise Failed(CauseCode.CAMERA_FAILED, f"{trouble}; {other}")
+            raise LeafFailed(CauseCode.CAMERA_FAILED, f"{trouble}; {other}")
         self.say("waiting without the rear camera", seconds=BLIND_SECONDS, why=trouble)
         yield from self.wait(BLIND_SECONDS)

@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
-from regrasp.behaviors.cable.hand import HAND, HandLeaf
-from regrasp.behaviors.leaf import Failed, Steps
+from regrasp.behaviors.cable.hand import HANDLING_ARM, HandLeaf
+from regrasp.behaviors.leaf import LeafFailed, LeafSteps
 from regrasp.motion.service import OPEN_GAP
 from regrasp.perception.pose.cable_shape import cable_course
 
@@ -18,7 +18,7 @@ class Regrasp(HandLeaf):
     A hand that closes on nothing opens and goes back to sleep, and the leaf fails.
     """
 
-    def steps(self) -> Steps:
+    def steps(self) -> LeafSteps:
         """See the class."""
         motion, connector = self.services.motion, self.services.belief.connector
         assert connector is not None
@@ -30,14 +30,14 @@ class Regrasp(HandLeaf):
         far = _distance_to_axis(points, connector, half) > CLEAR
         kept = far | np.array([tuple(p) in seen for p in points.tolist()], bool)
         motion.set_obstacles(points[kept], occupancy.h)
-        yield motion.pick(HAND, connector, cable=cable_course(self.services.known, connector), seen=self.seen)
+        yield motion.pick(HANDLING_ARM, connector, cable=cable_course(self.services.known, connector), seen=self.seen)
         try:
             yield from self.grip(connector)
-        except Failed:
-            motion.grippers[HAND].open(OPEN_GAP)
+        except LeafFailed:
+            motion.grippers[HANDLING_ARM].open(OPEN_GAP)
             yield from self.wait(0.6)
             yield from self.draw_back()
-            yield from self.go_to_sleep(HAND)
+            yield from self.go_to_sleep(HANDLING_ARM)
             raise
 
 

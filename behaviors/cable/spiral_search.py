@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from regrasp.behaviors.cable.hand import EYE
+from regrasp.behaviors.cable.hand import CAMERA_ARM
 from regrasp.behaviors.cable.look import LookLeaf
-from regrasp.behaviors.leaf import Failed, Port, Steps
+from regrasp.behaviors.leaf import LeafFailed, LeafPort, LeafSteps
 from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.cell import FixedMount
 from regrasp.motion.failure import PlanningError
@@ -36,21 +36,23 @@ class SpiralSearch(LookLeaf):
     """
 
     INPUT_PORTS: ClassVar[dict[str, Any]] = {
-        "time_limit": Port(data_type=float, required=False, default_value=300.0, above=0, description="s of searching"),
-        "look_seconds": Port(
+        "time_limit": LeafPort(
+            data_type=float, required=False, default_value=300.0, above=0, description="s of searching"
+        ),
+        "look_seconds": LeafPort(
             data_type=float, required=False, default_value=1.0, above=0, description="s of looking from a stop"
         ),
     }
 
-    def steps(self) -> Steps:
+    def steps(self) -> LeafSteps:
         """See the class."""
         clock, belief = self.services.clock, self.services.belief
         begin, skipped, looked = clock.now(), [], 0
         for stop in self._stops():
             trouble = self.services.perception.trouble("wrist")
             if trouble is not None:
-                yield from self.go_to_sleep(EYE)
-                raise Failed(CauseCode.CAMERA_FAILED, f"{trouble}; the rear camera shows no connector")
+                yield from self.go_to_sleep(CAMERA_ARM)
+                raise LeafFailed(CauseCode.CAMERA_FAILED, f"{trouble}; the rear camera shows no connector")
             if clock.now() > begin + self.get_input("time_limit"):
                 break
             seen: list[Estimate] = []
@@ -72,10 +74,10 @@ class SpiralSearch(LookLeaf):
                 self.say("found", camera="wrist", stop=stop.index, looked=looked, skipped=skipped, position=position)
                 return
         belief.vain_searches += 1
-        yield from self.go_to_sleep(EYE)
+        yield from self.go_to_sleep(CAMERA_ARM)
         seconds = clock.now() - begin
         self.say("not found", looked=looked, skipped=skipped)
-        raise Failed(
+        raise LeafFailed(
             CauseCode.SEARCH_EXHAUSTED,
             f"not seen from {looked} stops in {seconds:.0f} s; {len(skipped)} stops were out of reach or not free",
         )
@@ -90,7 +92,9 @@ class SpiralSearch(LookLeaf):
         self.say("search", start=start.round(3).tolist(), last_seen=from_last)
         return spiral(start, rear.mount.world_from_camera, rear.intrinsics, DISTANCE)
 
-    def _look_there(self, world_from_camera: RigidTransform, place: NDArray[np.float64], seen: list[Estimate]) -> Steps:
+    def _look_there(
+        self, world_from_camera: RigidTransform, place: NDArray[np.float64], seen: list[Estimate]
+    ) -> LeafSteps:
         """Look where something showed that may be the connector: the same way, from before it, else turned."""
         sight = world_from_camera.rotation.apply([0.0, 0.0, 1.0])
         before = RigidTransform.from_components(place - DISTANCE * sight, world_from_camera.rotation)

@@ -1,14 +1,14 @@
 """Leave the connector in the clip, and look whether it stays there."""
 
 import numpy as np
+from regrasp.motion.scene.bodies import NO_POINTS
 
-from regrasp.behaviors.cable.hand import EYE, HAND, HandLeaf
+from regrasp.behaviors.cable.hand import CAMERA_ARM, HANDLING_ARM, HandLeaf
 from regrasp.behaviors.cable.look import LookLeaf
-from regrasp.behaviors.leaf import Failed, Steps
-from regrasp.behaviors.services import Notice
+from regrasp.behaviors.leaf import LeafFailed, LeafSteps
+from regrasp.behaviors.services import LossNotice
 from regrasp.interfaces.cause import CauseCode
 from regrasp.motion.failure import PlanningError
-from regrasp.motion.scene.bodies import NO_POINTS
 from regrasp.perception.pose.cable_shape import cable_course
 from regrasp.perception.pose.estimate import Estimate
 from regrasp.perception.tracking.slip import seen_at
@@ -21,9 +21,9 @@ STOWED_RADIUS = 0.04  # m: 20 mm of the clip, 10 mm of the eye, and a part hidde
 class LetGo(HandLeaf):
     """Opens the jaw, draws it back and brings the arm to its sleep pose."""
 
-    def steps(self) -> Steps:
+    def steps(self) -> LeafSteps:
         """See the class."""
-        yield self.services.motion.release(HAND)
+        yield self.services.motion.release(HANDLING_ARM)
         self.services.belief.held = None
         yield from self.wait(OPEN_SECONDS)
         known, motion = self.services.known, self.services.motion
@@ -32,7 +32,7 @@ class LetGo(HandLeaf):
         yield from self.draw_back()
         # The way to sleep must not sweep the stowed end out of its clip.
         motion.keep_clear(np.vstack([seat.apply(along * [1.0, 0.0, 0.0]), cable_course(known, seat)]))
-        yield from self.go_to_sleep(HAND)
+        yield from self.go_to_sleep(HANDLING_ARM)
         motion.keep_clear(NO_POINTS)
 
 
@@ -42,7 +42,7 @@ class LookAtStow(LookLeaf):
     The wrist camera looks where the rear one is not to be trusted.
     """
 
-    def steps(self) -> Steps:
+    def steps(self) -> LeafSteps:
         """See the class."""
         clock, perception = self.services.clock, self.services.perception
         begin = clock.now()
@@ -63,21 +63,23 @@ class LookAtStow(LookLeaf):
             if not evidence.detected:
                 self._lost(evidence.sentence)
 
-    def _look_from_the_wrist(self, trouble: str, seen: list[Estimate]) -> Steps:
+    def _look_from_the_wrist(self, trouble: str, seen: list[Estimate]) -> LeafSteps:
         self.say("the wrist camera looks at the clip", why=trouble)
         seen.clear()
         if (other := self.services.perception.trouble("wrist")) is not None:
-            raise Failed(CauseCode.CAMERA_FAILED, f"{trouble}; {other}")
+            raise LeafFailed(CauseCode.CAMERA_FAILED, f"{trouble}; {other}")
         try:
             _, goals = self.best_view(self.services.known.clip.world_from_seat)
             yield from self.go_and_look(goals, LOOK_SECONDS, seen)
         except PlanningError as error:
-            raise Failed(CauseCode.CAMERA_FAILED, f"{trouble}; the wrist camera cannot look there: {error}") from None
+            raise LeafFailed(
+                CauseCode.CAMERA_FAILED, f"{trouble}; the wrist camera cannot look there: {error}"
+            ) from None
         other = self.services.perception.trouble("wrist")
-        yield from self.go_to_sleep(EYE)
+        yield from self.go_to_sleep(CAMERA_ARM)
         if other is not None:
-            raise Failed(CauseCode.CAMERA_FAILED, f"{trouble}; {other}")
+            raise LeafFailed(CauseCode.CAMERA_FAILED, f"{trouble}; {other}")
 
     def _lost(self, message: str) -> None:
-        self.services.belief.notices.append(Notice(self.services.clock.now(), "place"))
-        raise Failed(CauseCode.NOT_STOWED, message)
+        self.services.belief.notices.append(LossNotice(self.services.clock.now(), "place"))
+        raise LeafFailed(CauseCode.NOT_STOWED, message)

@@ -4,8 +4,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from regrasp.behaviors.cable.hand import HAND, HandLeaf
-from regrasp.behaviors.leaf import Port, Steps
+from regrasp.behaviors.cable.hand import HANDLING_ARM, HandLeaf
+from regrasp.behaviors.leaf import LeafPort, LeafSteps
 
 DRAW_OUT = 0.05  # m along the plug's axis: the plug sits 0.015 deep
 SHALLOW = (
@@ -18,19 +18,19 @@ class Unplug(HandLeaf):
     """Grips the connector in the `socket` of that name, draws it out along its axis, and away from the panel."""
 
     INPUT_PORTS: ClassVar[dict[str, Any]] = {
-        "socket": Port(
+        "socket": LeafPort(
             data_type=str,
             names="socket",
             description="a socket of the cell; plugged_into: the one that holds the connector at the start",
         )
     }
 
-    def steps(self) -> Steps:
+    def steps(self) -> LeafSteps:
         """See the class."""
         known, motion = self.services.known, self.services.motion
         plug = known.socket(self.get_input("socket")).world_from_plug(known.connector.length)
-        yield motion.pick(HAND, plug, shallow=SHALLOW, seen=self.seen)
+        yield motion.pick(HANDLING_ARM, plug, shallow=SHALLOW, seen=self.seen)
         yield from self.grip(plug)
         axis = plug.rotation.apply([1.0, 0.0, 0.0])
-        yield motion.shift(HAND, -DRAW_OUT * axis, checked=False)
-        yield motion.shift(HAND, np.array([-CLEAR, 0.0, 0.0]), checked=False)
+        yield motion.shift(HANDLING_ARM, -DRAW_OUT * axis, checked=False)
+        yield motion.shift(HANDLING_ARM, np.array([-CLEAR, 0.0, 0.0]), checked=False)

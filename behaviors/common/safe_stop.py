@@ -2,7 +2,7 @@
 
 from py_trees.common import Status
 
-from regrasp.behaviors.leaf import Steps, StepsLeaf
+from regrasp.behaviors.leaf import LeafSteps, StepsLeaf
 from regrasp.interfaces.cause import CauseCode
 
 REST = 0.3  # s within which the arms are at rest (spec)
@@ -16,7 +16,7 @@ class SafeStop(StepsLeaf):
 
     RETURNS = frozenset({Status.RUNNING, Status.FAILURE})
 
-    def steps(self) -> Steps:
+    def steps(self) -> LeafSteps:
         """See the class."""
         self.services.motion.stop()
         yield from self.wait(REST)

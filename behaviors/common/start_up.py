@@ -1,6 +1,6 @@
 """Before the work: see what stands in the cell."""
 
-from regrasp.behaviors.leaf import Failed, Steps, StepsLeaf
+from regrasp.behaviors.leaf import LeafFailed, LeafSteps, StepsLeaf
 from regrasp.interfaces.cause import CauseCode
 
 PATIENCE = 2.0  # s that the camera has to give sound frames
@@ -12,13 +12,13 @@ class StartUp(StepsLeaf):
     FAILURE when the camera is not to be trusted: nobody would know what stands in the cell.
     """
 
-    def steps(self) -> Steps:
+    def steps(self) -> LeafSteps:
         """See the class."""
         perception, motion = self.services.perception, self.services.motion
         end = self.services.clock.now() + PATIENCE
         while perception.frame("rear") is None or perception.trouble("rear") is not None:
             if self.services.clock.now() > end:
-                raise Failed(CauseCode.CAMERA_FAILED, f"{perception.trouble('rear')}; nothing was mapped")
+                raise LeafFailed(CauseCode.CAMERA_FAILED, f"{perception.trouble('rear')}; nothing was mapped")
             yield None
         perception.look("rear")  # the plugged end, while no hand hides it
         voxels = perception.map_obstacles("rear")

@@ -13,7 +13,7 @@ from regrasp.interfaces.frame import Intrinsics, RgbdFrame
 from regrasp.motion.failure import PlanningError
 from regrasp.motion.planning.cable_path import natural_pose
 from regrasp.motion.service import GRIP_OFFSETS, OPEN_GAP, TIGHT_MARGIN, Motion
-from regrasp.motion.task import Task
+from regrasp.motion.task import MotionTask
 
 Points = NDArray[np.float64]
 READY = np.array([0.4, -0.6, 0.6, 0.0, 0.3, 0.0])
@@ -64,12 +64,12 @@ def test_the_nearest_to_hand_of_several_goals_is_reached(rig: Rig) -> None:
 
 @pytest.mark.parametrize("work", [lambda m: m.move("right", READY[None]), lambda m: m.shift("right", [0.0, 0.0, 0.05])])
 def test_an_arm_that_does_not_follow_is_led_on_slower_and_then_given_up(
-    rig: Rig, work: Callable[[Motion], Task]
+    rig: Rig, work: Callable[[Motion], MotionTask]
 ) -> None:
     rig.arms["right"].at = ASIDE
     rig.arms["right"].stuck = 0.0
     remarks: list[str] = []
-    rig.motion.remark = remarks.append
+    rig.motion.execution.on_anomaly = remarks.append
     with pytest.raises(PlanningError, match=r"off its trajectory, limit 0.08, 3 times") as error:
         rig.run(work(rig.motion))
     assert error.value.code is CauseCode.ARM_FAILED

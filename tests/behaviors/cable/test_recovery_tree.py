@@ -23,7 +23,7 @@ from regrasp.behaviors import LEAVES, Leaf
 from regrasp.interfaces.cause import Cause, ServiceError
 from regrasp.interfaces.cell import KnownCell
 from regrasp.interfaces.frame import Intrinsics, RgbdFrame
-from regrasp.motion.task import Task
+from regrasp.motion.task import MotionTask
 from regrasp.trees import in_tree_order, load_tree
 
 Make = Callable[..., "Play"]
@@ -38,13 +38,13 @@ class BusyMotion(FakeMotion):
         super().__init__(clock)
         self.at_work: list[str] = []
 
-    def move(self, arm: str, *_goal: Any, **_options: Any) -> Task:
+    def move(self, arm: str, *_goal: Any, **_options: Any) -> MotionTask:
         def steps() -> Iterator[None]:
             self.at_work.append(arm)
             yield from self._steps()
             self.at_work.remove(arm)
 
-        return Task(steps(), lambda: self.at_work.remove(arm) if arm in self.at_work else None)
+        return MotionTask(steps(), lambda: self.at_work.remove(arm) if arm in self.at_work else None)
 
     carry = straight = pick = shift = release = move
 
@@ -183,7 +183,7 @@ def test_every_failed_leaf_names_a_cause(play: Make, monkeypatch: pytest.MonkeyP
     whole = play(2, trouble == "not found")
     attempts = Attempts(whole.root, whole.services.belief.causes, whole.clock.now)
     if trouble == "no hand":
-        monkeypatch.setattr(whole.motion, "pick", lambda *_, **__: Task(iter([None]), lambda: None))
+        monkeypatch.setattr(whole.motion, "pick", lambda *_, **__: MotionTask(iter([None]), lambda: None))
         monkeypatch.setattr(whole.hand, "close", lambda force: setattr(whole.hand, "gap", 0.0))
     elif trouble == "dark cameras":
         monkeypatch.setattr(whole.eyes, "trouble", lambda camera: f"the {camera} camera is dark")

@@ -8,7 +8,7 @@ from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.cell import Box, KnownCell
 from regrasp.motion.robots.kinematics import LOWER, UPPER, ArmKinematics, FloatArray
-from regrasp.motion.robots.spheres import LINKS, SPHERES
+from regrasp.motion.robots.spheres import SPHERE_LINKS, SPHERES
 from regrasp.motion.scene.collision import CollisionModel
 from regrasp.motion.scene.distance_grid import DistanceGrid
 
@@ -22,7 +22,7 @@ joints = st.tuples(*(st.floats(float(a), float(b)) for a, b in zip(LOWER, UPPER,
 
 def brute_force(kin: ArmKinematics, q: FloatArray, box: Box) -> float:
     """Least distance from the moving links' spheres to points laid densely over the box's surface."""
-    spheres = CollisionModel(kin, []).spheres(q)[LINKS >= 2]
+    spheres = CollisionModel(kin, []).spheres(q)[SPHERE_LINKS >= 2]
     axes = [np.linspace(c - s / 2, c + s / 2, 1 + round(s / 0.01)) for c, s in zip(box.center, box.size, strict=True)]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     gaps = np.linalg.norm(spheres[:, None, :3] - points[None], axis=2) - spheres[:, None, 3]
@@ -122,5 +122,5 @@ def test_edge_sees_what_lies_between_its_free_ends() -> None:
 def test_spheres_move_with_their_links() -> None:
     q = np.array([0.4, -0.3, 0.2, 0.5, -0.6, 0.7])
     frames = KIN.link_frames(q)
-    expected = [frames[k] @ np.append(s[:3], 1.0) for k, s in zip(LINKS, SPHERES, strict=True)]
+    expected = [frames[k] @ np.append(s[:3], 1.0) for k, s in zip(SPHERE_LINKS, SPHERES, strict=True)]
     assert CollisionModel(KIN, []).spheres(q)[:, :3] == pytest.approx(np.array(expected)[:, :3])
