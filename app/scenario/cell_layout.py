@@ -206,12 +206,14 @@ def _clip(document: Document, known: KnownCell) -> Iterator[Finding]:
 
 
 def _plug(document: Document, known: KnownCell) -> Iterator[Finding]:
-    from regrasp.motion.service import JAW_SLACK, OPEN_GAP  # late: it brings the planner and the compiler
+    from regrasp.motion.execution import JawParameters  # late: it brings the planner and the compiler
 
-    thick = 2 * known.connector.radius
-    if thick + 2 * JAW_SLACK > OPEN_GAP:
-        message = f"a connector {1e3 * thick:.0f} mm thick does not fit the jaw, which opens {1e3 * OPEN_GAP:.0f} mm"
-        right = f"write a radius up to {0.5 * OPEN_GAP - JAW_SLACK:.3f}"
+    jaw, thick = JawParameters(), 2 * known.connector.radius
+    if thick + 2 * jaw.slack > jaw.open_gap:
+        message = (
+            f"a connector {1e3 * thick:.0f} mm thick does not fit the jaw, which opens {1e3 * jaw.open_gap:.0f} mm"
+        )
+        right = f"write a radius up to {0.5 * jaw.open_gap - jaw.slack:.3f}"
         yield Finding(*document.place(("known", "connector", "radius")), f"{message} and needs some room; {right}")
         return
     if trouble := _no_grasp(known):
@@ -223,12 +225,13 @@ def _plug(document: Document, known: KnownCell) -> Iterator[Finding]:
 def _no_grasp(known: KnownCell) -> str | None:
     """Why the hand cannot take hold of the plugged connector among the known boxes; None when it can."""
     from regrasp.behaviors.cable.hand import HANDLING_ARM  # late: they bring the planner and the compiler
-    from regrasp.behaviors.cable.unplug import SHALLOW
+    from regrasp.behaviors.cable.unplug import UnplugParameters
+    from regrasp.motion.execution import JawParameters
     from regrasp.motion.failure import PlanningError
-    from regrasp.motion.grasping.grasps import choose_grasp, grasp_candidates
+    from regrasp.motion.grasping.approach import pick_candidates
+    from regrasp.motion.grasping.grasps import ApproachParameters, choose_grasp
     from regrasp.motion.robots.kinematics import ArmKinematics
-    from regrasp.motion.scene.collision import CollisionModel
-    from regrasp.motion.service import GRIP_OFFSETS, NEAR_MARGINS, OPEN_GAP, TIGHT_MARGIN
+    from regrasp.motion.scene.collision import ArmBody, Clearances, CollisionModel
 
     arms: dict[str, ArmKinematics] = {
         arm.name: ArmKinematics(RigidTransform.from_translation(arm.base)) for arm in known.arms
@@ -237,18 +240,15 @@ def _no_grasp(known: KnownCell) -> str | None:
     others = [
         CollisionModel(arms[a.name], boxes).spheres(np.array(a.sleep)) for a in known.arms if a.name != HANDLING_ARM
     ]
-    model = CollisionModel(arms[HANDLING_ARM], boxes, other_arm=np.vstack(others), opening=OPEN_GAP)
+    body = ArmBody(opening=JawParameters().open_gap)
+    model = CollisionModel(arms[HANDLING_ARM], boxes, body, other_arm=np.vstack(others))
     plug = known.socket(PLUGGED_INTO).world_from_plug(connector.length)
     asleep_at = np.array(known.arm(HANDLING_ARM).sleep)
+    clearances = Clearances()
+    approach = ApproachParameters(margin=clearances.tight_margin, near_margin=clearances.near_margins[-1])
     try:
-        candidates = [
-            grasp
-            for offset in GRIP_OFFSETS
-            for grasp in grasp_candidates(plug, connector.length, connector.radius, offset, shallow=SHALLOW)
-        ]
-        choose_grasp(
-            arms[HANDLING_ARM], model, asleep_at, candidates, margin=TIGHT_MARGIN, near_margin=NEAR_MARGINS[-1]
-        )
+        candidates = pick_candidates(plug, connector, UnplugParameters().shallow)
+        choose_grasp(arms[HANDLING_ARM], model, asleep_at, candidates, parameters=approach)
     except (PlanningError, ValueError) as error:
         return str(error)
     return None

@@ -13,10 +13,10 @@ from regrasp.perception.tracking.track import TrackState
 
 
 class DetectSlip(Leaf):
-    """RUNNING while the connector is held; FAILURE, with the test that said so, once it has slipped.
+    """RUNNING while the connector is held; FAILURE, with the test that found it, once it has slipped.
 
-    The thesis's test is the distance between gripper and estimated connector; the finger gap tells at once what the eye
-    may miss, an end that stays near.
+    The thesis's test is the distance between gripper and estimated connector. It misses an end that stays near the
+    jaw; there the finger gap tells at once.
     """
 
     INPUT_PORTS: ClassVar[dict[str, Any]] = {}
@@ -39,7 +39,7 @@ class DetectSlip(Leaf):
         return Status.RUNNING
 
     def _distance(self) -> SlipEvidence | None:
-        """The thesis's test, while the connector is seen; what the hand hides is no slip."""
+        """The thesis's test, only while the connector is seen: one that the hand hides has not slipped."""
         track, now = self.services.perception.track, self.services.clock.now()
         if track.last is None or track.state(now)[0] is not TrackState.VISIBLE:
             return None

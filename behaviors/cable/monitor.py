@@ -1,4 +1,4 @@
-"""Keep an eye on the connector while it is carried."""
+"""Observe the connector while it is carried."""
 
 from typing import Any, ClassVar
 
@@ -11,7 +11,7 @@ from regrasp.behaviors.leaf import Leaf, LeafPort
 class Monitor(Leaf):
     """Looks through the rear camera every `period` seconds and tells the track where the hand is; always SUCCESS.
 
-    It stands before `DetectSlip` in a Sequence without memory, so both come at every tick.
+    It stands before `DetectSlip` in a Sequence without memory, so that both are ticked every time.
     """
 
     INPUT_PORTS: ClassVar[dict[str, Any]] = {
@@ -42,7 +42,7 @@ class Monitor(Leaf):
             self.say("camera", camera="rear", trusted=not self._trouble, why=trouble or "its frames are sound again")
 
     def terminate(self, new_status: Status) -> None:
-        """Stopped from above: the hand no longer carries under watch."""
+        """When the tree stops the leaf, forget the hand and the hint: the carrying is over."""
         if new_status is Status.INVALID:
             self.services.perception.track.held(None)
             self.services.perception.hint = None

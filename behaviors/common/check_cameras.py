@@ -1,4 +1,4 @@
-"""Consult the rear camera before any search."""
+"""Ask the rear camera for the connector before any search."""
 
 from typing import Any, ClassVar
 
@@ -11,8 +11,8 @@ from regrasp.perception.pose.fusion import fuse
 class CheckCameras(StepsLeaf):
     """Looks for `seconds` through the rear camera, then asks the track the thesis's three questions.
 
-    SUCCESS with the connector's mean pose when its frame exists, is fresh and is live; else FAILURE: it must be
-    searched.
+    SUCCESS when the connector's frame exists, is fresh and is live; its mean pose is then in the belief. Else FAILURE:
+    the connector must be searched for.
     """
 
     INPUT_PORTS: ClassVar[dict[str, Any]] = {

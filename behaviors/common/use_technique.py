@@ -8,7 +8,7 @@ from regrasp.behaviors.leaf import Leaf, LeafPort
 
 
 class UseTechnique(Leaf):
-    """From now on every look is by this technique of `regrasp.perception.pose.technique`."""
+    """Makes every look from now on use this technique of `regrasp.perception.pose.technique`; always SUCCESS."""
 
     INPUT_PORTS: ClassVar[dict[str, Any]] = {
         "technique": LeafPort(

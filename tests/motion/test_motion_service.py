@@ -12,10 +12,13 @@ from regrasp.interfaces.cell import KnownCell, pose_along
 from regrasp.interfaces.frame import Intrinsics, RgbdFrame
 from regrasp.motion.failure import PlanningError
 from regrasp.motion.planning.cable_path import natural_pose
-from regrasp.motion.service import GRIP_OFFSETS, OPEN_GAP, TIGHT_MARGIN, Motion
+from regrasp.motion.service import Motion, MotionParameters
 from regrasp.motion.task import MotionTask
 
 Points = NDArray[np.float64]
+PARAMETERS = MotionParameters()
+OPEN_GAP = PARAMETERS.execution.jaw.open_gap
+TIGHT_MARGIN = PARAMETERS.clearances.tight_margin
 READY = np.array([0.4, -0.6, 0.6, 0.0, 0.3, 0.0])
 ASIDE = np.array([-0.5, -0.6, 0.6, 0.0, 0.3, 0.0])
 HELD = RigidTransform.from_components([0.0, 0.0, 0.0], Rotation.from_euler("y", -90, degrees=True))
@@ -229,7 +232,7 @@ def test_a_pick_brings_the_open_jaw_round_the_connector(rig: Rig, shallow: float
     tool, axis = rig.motion.tool("right"), plug.rotation.apply([1.0, 0.0, 0.0])
     pads_middle = tool.translation + tool.rotation.apply([shallow, 0.0, 0.0])
     offset = pads_middle - plug.translation
-    assert min(abs(offset @ axis - known) for known in GRIP_OFFSETS) < 1e-3
+    assert min(abs(offset @ axis - known) for known in PARAMETERS.pick.grip_offsets) < 1e-3
     assert np.linalg.norm(offset - (offset @ axis) * axis) < 1e-3
     assert abs(tool.rotation.apply([0.0, 1.0, 0.0]) @ axis) < 1e-3  # the fingers close across it
 
@@ -244,7 +247,7 @@ def test_an_arm_seen_to_be_off_takes_hold_where_the_connector_is(rig: Rig) -> No
         asked.append(since)
         return surface(kin, rig.motion.joints("right") + off, OPEN_GAP) if rig.clock.t > since + 0.2 else None
 
-    rig.run(rig.motion.pick("right", plug, seen=seen))
+    rig.run(rig.motion.pick("right", plug, point_cloud=seen))
     assert min(asked) == max(asked) > rig.arms["right"].followed[0][0]
     blind = Rig(rig.known)
     blind.run(blind.motion.pick("right", plug))
@@ -257,7 +260,7 @@ def test_an_arm_seen_to_be_off_takes_hold_where_the_connector_is(rig: Rig) -> No
 @pytest.mark.parametrize("points", [None, np.empty((0, 3))])
 def test_a_camera_that_shows_no_arm_changes_nothing(rig: Rig, points: Points | None) -> None:
     plug = rig.known.socket("back_4").world_from_plug(rig.known.connector.length)
-    rig.run(rig.motion.pick("right", plug, seen=lambda _since: points))
+    rig.run(rig.motion.pick("right", plug, point_cloud=lambda _since: points))
     blind = Rig(rig.known)
     blind.run(blind.motion.pick("right", plug))
     assert rig.motion.joints("right") == pytest.approx(blind.motion.joints("right"))

@@ -3,11 +3,12 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from regrasp.motion.robots.arm_offsets import WITHIN
+from regrasp.motion.robots.arm_offsets import JointOffsetParameters
 from regrasp.motion.robots.kinematics import ArmKinematics, world_spheres
 from regrasp.motion.robots.spheres import SPHERE_LINKS, spheres_at
 
 Floats = NDArray[np.float64]
+DEPTH = JointOffsetParameters().surface_depth
 EYE = np.array([-0.3, 0.5, 0.7])
 
 
@@ -20,9 +21,9 @@ def surface(kin: ArmKinematics, q: Floats, opening: float, spacing: float = 0.00
     unit = np.column_stack([flat * np.cos(turn), flat * np.sin(turn), height])
     points = []
     for n, (x, y, z, r) in enumerate(spheres):
-        radius = r - WITHIN
+        radius = r - DEPTH
         mine = np.array([x, y, z]) + radius * unit[:: max(1, int(2000 * spacing**2 / (4 * np.pi * radius**2)))]
         others = np.delete(spheres, n, axis=0)
-        bare = np.linalg.norm(mine[:, None] - others[None, :, :3], axis=2) > others[:, 3] - WITHIN
+        bare = np.linalg.norm(mine[:, None] - others[None, :, :3], axis=2) > others[:, 3] - DEPTH
         points.append(mine[np.all(bare, axis=1) & (((mine - [x, y, z]) * (EYE - mine)).sum(axis=1) > 0)])
     return np.vstack(points)

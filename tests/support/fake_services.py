@@ -19,6 +19,7 @@ from regrasp.interfaces.cell import KnownCell
 from regrasp.interfaces.frame import RgbdFrame
 from regrasp.interfaces.reading import GripperReading
 from regrasp.motion.failure import PlanningError
+from regrasp.motion.service import MotionParameters
 from regrasp.motion.task import MotionTask
 from regrasp.perception.pose.estimate import Estimate, NoEstimate, pose_covariance
 from regrasp.perception.pose.segmentation import NotSeen
@@ -75,6 +76,7 @@ class FakeMotion:
 
     def __init__(self, clock: Clock) -> None:
         self.clock = clock
+        self.parameters = MotionParameters()
         self.seconds = 0.2
         self.error: Exception | None = None
         self.hand = RigidTransform.from_translation([0.3, 0.0, 0.4])

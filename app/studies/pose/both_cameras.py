@@ -8,7 +8,7 @@ from regrasp.app.studies.pose.grasp import done, grasp, services_of
 from regrasp.app.studies.pose.scenes import Scene
 from regrasp.app.studies.pose.trial import MEAN_SECONDS, Looked, Setup, Trial, look, looked, measured
 from regrasp.behaviors.cable.hand import CAMERA_ARM
-from regrasp.behaviors.cable.look import LOOK_MARGIN, LookLeaf
+from regrasp.behaviors.cable.look import LookLeaf
 from regrasp.behaviors.common.start_up import StartUp
 from regrasp.behaviors.leaf import LeafSteps
 from regrasp.behaviors.services import Services
@@ -27,7 +27,7 @@ class BestView(LookLeaf):
         connector = self.services.belief.connector
         assert connector is not None
         _, goals = self.best_view(connector)
-        yield self.services.motion.move(CAMERA_ARM, goals, margin=LOOK_MARGIN, tight=False)
+        yield self.services.motion.move(CAMERA_ARM, goals, margin=self.view.margin, tight=False)
         yield from self.wait(SETTLE_SECONDS)
 
 
