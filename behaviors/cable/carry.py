@@ -114,21 +114,23 @@ class Insert(HandLeaf):
         if not long or belief.held is None:
             self.say("the hand hides the connector", frames=len(seen))
             return
-        mean = fuse(long)
-        found = self.services.motion.tool(HANDLING_ARM).inv() * mean.world_from_connector
-        if _axis(found) @ _axis(belief.held) < 0:  # a finger was taken for the cable: no connector turns round in a jaw
-            found = found * RigidTransform.from_rotation(Rotation.from_euler("z", 180, degrees=True))
-        # Where the fingers hide a part, the visible rest seems to end there. Unless the whole length shows it is not
-        # known where on the connector that rest lies.
-        whole = mean.extent > self.parameters.whole_share * self.services.known.connector.length
-        if not whole:
-            found = _turned_in_the_jaw(belief.held, found)
+        found, whole = self._pose_in_hand(fuse(long), belief.held)
         shift = float(np.linalg.norm(found.translation - belief.held.translation))
         turn = float(np.rad2deg(np.arccos(np.clip(_axis(found) @ _axis(belief.held), -1.0, 1.0))))
         trusted = shift < self.parameters.max_shift
         self.say("connector in the hand", whole=whole, shift=round(shift, 4), turn_deg=round(turn, 1), trusted=trusted)
         if trusted:
             belief.held = found
+
+    def _pose_in_hand(self, seen: Estimate, held: RigidTransform) -> tuple[RigidTransform, bool]:
+        """tool_from_connector by what is seen of one that was `held` so, and whether the whole of it was seen."""
+        found = self.services.motion.tool(HANDLING_ARM).inv() * seen.world_from_connector
+        if _axis(found) @ _axis(held) < 0:  # a finger was taken for the cable: no connector turns round in a jaw
+            found = found * RigidTransform.from_rotation(Rotation.from_euler("z", 180, degrees=True))
+        # Where the fingers hide a part, the visible rest seems to end there. Unless the whole length shows it is not
+        # known where on the connector that rest lies.
+        whole = seen.extent > self.parameters.whole_share * self.services.known.connector.length
+        return (found if whole else _turned_in_the_jaw(held, found)), whole
 
     def _estimates(self) -> Generator[MotionTask | None, None, list[Estimate]]:
         """Estimates by the rear camera, one a frame, of the frames taken while it looks."""

@@ -1,6 +1,6 @@
 """Search for the connector with the wrist camera: the thesis's spiral (Hwang 2024, section 3.4.3)."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 from typing import Any, ClassVar
@@ -16,6 +16,7 @@ from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.cell import FixedMount
 from regrasp.motion.failure import PlanningError
 from regrasp.motion.planning.viewpoints import SpiralParameters, Viewpoint, spiral
+from regrasp.motion.task import MotionTask
 from regrasp.perception.pose.estimate import Estimate
 from regrasp.perception.pose.fusion import fuse
 
@@ -51,44 +52,31 @@ class SpiralSearch(LookLeaf):
             data_type=float, required=False, default_value=300.0, above=0, description="s of searching"
         ),
         "look_seconds": LeafPort(
-            data_type=float, required=False, default_value=1.0, above=0, description="s of looking from a stop"
+            data_type=float, required=False, default_value=1.0, above=0, description="s of looking from a viewpoint"
         ),
     }
 
     def steps(self) -> LeafSteps:
         """See the class."""
-        clock, belief = self.services.clock, self.services.belief
-        begin, skipped, looked = clock.now(), [], 0
+        clock, begin = self.services.clock, self.services.clock.now()
+        skipped: list[int] = []
+        looked = 0
         for viewpoint in self._viewpoints():
-            trouble = self.services.perception.trouble("wrist")
-            if trouble is not None:
-                yield from self.go_to_sleep(CAMERA_ARM)
-                raise LeafFailed(CauseCode.CAMERA_FAILED, f"{trouble}; the rear camera shows no connector")
+            yield from self._check_camera()
             if clock.now() > begin + self.get_input("time_limit"):
                 break
-            seen: list[Estimate] = []
-            weak_detections: list[NDArray[np.float64]] = []
             try:
-                goals = self._goals([viewpoint.world_from_camera])
-                yield from self.go_and_look(goals, self.get_input("look_seconds"), seen, weak_detections)
+                seen = yield from self._look_from(viewpoint.world_from_camera)
             except PlanningError:
                 skipped.append(viewpoint.index)
                 continue
             looked += 1
-            enough = self.parameters.min_estimates
-            if len(seen) < enough <= len(weak_detections):
-                place = np.median(weak_detections, axis=0)
-                yield from self._look_there(viewpoint.world_from_camera, place, seen)
-            if len(seen) >= enough:
-                found = fuse(seen)
-                belief.connector, belief.sure = found.world_from_connector, found.whole
-                belief.found_by, belief.vain_searches = "wrist", 0
-                position = found.position.round(4).tolist()
-                self.say(
-                    "found", camera="wrist", stop=viewpoint.index, looked=looked, skipped=skipped, position=position
-                )
+            if len(seen) >= self.parameters.min_estimates:
+                position = self._believe(fuse(seen))
+                stop = viewpoint.index
+                self.say("found", camera="wrist", stop=stop, looked=looked, skipped=skipped, position=position)
                 return
-        belief.vain_searches += 1
+        self.services.belief.vain_searches += 1
         yield from self.go_to_sleep(CAMERA_ARM)
         seconds = clock.now() - begin
         self.say("not found", looked=looked, skipped=skipped)
@@ -96,6 +84,31 @@ class SpiralSearch(LookLeaf):
             CauseCode.SEARCH_EXHAUSTED,
             f"not seen from {looked} stops in {seconds:.0f} s; {len(skipped)} stops were out of reach or not free",
         )
+
+    def _check_camera(self) -> LeafSteps:
+        """Steps that bring the arm to sleep and fail when the wrist camera is not to be trusted."""
+        trouble = self.services.perception.trouble("wrist")
+        if trouble is not None:
+            yield from self.go_to_sleep(CAMERA_ARM)
+            raise LeafFailed(CauseCode.CAMERA_FAILED, f"{trouble}; the rear camera shows no connector")
+
+    def _look_from(self, world_from_camera: RigidTransform) -> Generator[MotionTask | None, None, list[Estimate]]:
+        """Estimates from a viewpoint, and from nearer after a weak detection. Raises PlanningError out of reach."""
+        seen: list[Estimate] = []
+        weak_detections: list[NDArray[np.float64]] = []
+        goals = self._goals([world_from_camera])
+        yield from self.go_and_look(goals, self.get_input("look_seconds"), seen, weak_detections)
+        if len(seen) < self.parameters.min_estimates <= len(weak_detections):
+            yield from self._look_there(world_from_camera, np.median(weak_detections, axis=0), seen)
+        return seen
+
+    def _believe(self, found: Estimate) -> list[float]:
+        """Take the found connector into the belief; its position (m in the world) for the log."""
+        belief = self.services.belief
+        belief.connector, belief.sure = found.world_from_connector, found.whole
+        belief.found_by, belief.vain_searches = "wrist", 0
+        position: list[float] = found.position.round(4).tolist()
+        return position
 
     def _viewpoints(self) -> Iterator[Viewpoint]:
         known, last = self.services.known, self.services.perception.track.last

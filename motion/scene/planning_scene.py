@@ -9,7 +9,7 @@ from scipy.spatial.transform import RigidTransform
 from regrasp.interfaces.cell import Connector, KnownCell, WristMount
 from regrasp.interfaces.devices import Arm, Gripper
 from regrasp.interfaces.frame import RgbdFrame
-from regrasp.motion.robots.kinematics import ArmKinematics, FloatArray
+from regrasp.motion.robots.kinematics import ArmKinematics, FloatArray, InverseKinematicsParameters
 from regrasp.motion.scene.collision import ArmBody, CollisionModel, CollisionParameters
 from regrasp.motion.scene.distance_grid import DistanceGrid
 
@@ -28,6 +28,7 @@ class PlanningSceneParameters:
     sight_samples: int = 24  # points on a line of sight that must be free; choice
     sight_range: tuple[float, float] = (0.15, 0.85)  # shares of a line of sight that are checked: not its ends; choice
     collision: CollisionParameters = field(default_factory=CollisionParameters)
+    kinematics: InverseKinematicsParameters = field(default_factory=InverseKinematicsParameters)
 
 
 class PlanningScene:
@@ -43,7 +44,8 @@ class PlanningScene:
         self.known, self.arms, self.grippers = known, arms, grippers
         self._scene_parameters = parameters
         self.kinematics: dict[str, ArmKinematics] = {
-            spec.name: ArmKinematics(RigidTransform.from_translation(spec.base)) for spec in known.arms
+            spec.name: ArmKinematics(RigidTransform.from_translation(spec.base), parameters.kinematics)
+            for spec in known.arms
         }
         self._cameras: dict[str, WristMount] = {
             c.mount.arm: c.mount for c in known.cameras if isinstance(c.mount, WristMount)

@@ -8,7 +8,7 @@ from fake_services import Stage, seen
 from py_trees.common import Status
 
 from regrasp.behaviors.cable.hand import HandParameters
-from regrasp.behaviors.cable.recover import WaitUntilStillParameters
+from regrasp.behaviors.cable.recover import WaitUntilStill, WaitUntilStillParameters
 from regrasp.interfaces.cause import CauseCode, ServiceError
 from regrasp.interfaces.cell import KnownCell
 
@@ -45,6 +45,13 @@ def test_without_the_rear_camera_it_waits_as_long_as_a_cable_swings(stage: Stage
     stage.perception.troubles["rear"] = REAR
     assert stage.run(stage.tree(LEAF.format("WaitUntilStill")), 20.0) is Status.SUCCESS
     assert stage.clock.t == pytest.approx(WaitUntilStillParameters().blind_time, abs=0.11)
+
+
+def test_a_leaf_takes_other_parameters(stage: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(WaitUntilStill, "parameters", WaitUntilStillParameters(blind_time=1.0))
+    stage.perception.troubles["rear"] = REAR
+    assert stage.run(stage.tree(LEAF.format("WaitUntilStill")), 20.0) is Status.SUCCESS
+    assert stage.clock.t == pytest.approx(1.0, abs=0.11)
 
 
 @pytest.mark.parametrize("leaf", ["WaitUntilStill", "LookAtStow"])

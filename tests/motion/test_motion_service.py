@@ -10,6 +10,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.cell import KnownCell, pose_along
 from regrasp.interfaces.frame import Intrinsics, RgbdFrame
+from regrasp.motion.execution import ExecutionParameters, JawParameters
 from regrasp.motion.failure import PlanningError
 from regrasp.motion.planning.cable_path import natural_pose
 from regrasp.motion.service import Motion, MotionParameters
@@ -131,6 +132,15 @@ def test_a_jaw_that_does_not_open_is_told_three_times_and_then_given_up(rig: Rig
         rig.run(rig.motion.release("right"))
     assert error.value.code is CauseCode.GRIPPER_FAILED
     assert len(rig.grippers["right"].told) == 3
+
+
+def test_parameters_of_every_part_come_through_the_service(rig: Rig) -> None:
+    jaw = JawParameters(attempts=2, open_gap=0.06)
+    parameters = MotionParameters(execution=ExecutionParameters(jaw=jaw))
+    deaf = {"left": rig.grippers["left"], "right": Deaf(rig.clock, gap=0.02)}
+    motion = Motion(rig.known, rig.arms, deaf, rig.clock, 0, parameters)
+    with pytest.raises(PlanningError, match="told 2 times to open to 60 mm"):
+        rig.run(motion.release("right"))
 
 
 def test_cancel_stops_the_arm_where_it_is(rig: Rig) -> None:
