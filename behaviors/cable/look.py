@@ -1,7 +1,7 @@
 """Looking with the wrist camera from a viewpoint, which the search and the closer look share."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
@@ -13,7 +13,7 @@ from regrasp.behaviors.leaf import LeafSteps
 from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.cell import WristMount
 from regrasp.motion.failure import PlanningError
-from regrasp.motion.planning.viewpoints import closer_views
+from regrasp.motion.planning.viewpoints import CloseViewParameters, closer_views
 from regrasp.perception.pose.estimate import Estimate
 
 
@@ -25,6 +25,7 @@ class LookParameters:
     max_cosine: float = 0.77  # of the angle between lines of sight from different sides: at least 40 degrees
     frames_before_mapping: int = 3  # a frozen camera is noticed after so many frames
     settle_time: float = 0.1  # s after a motion; frames exposed while the arm still swings do not count
+    close_views: CloseViewParameters = field(default_factory=CloseViewParameters)
 
 
 class LookLeaf(HandLeaf):
@@ -51,7 +52,7 @@ class LookLeaf(HandLeaf):
         """
         half = 0.5 * self.services.known.connector.length
         points = connector.apply([[-half, 0.0, 0.0], [0.0, 0.0, 0.0], [half, 0.0, 0.0]])
-        for view in closer_views(connector):
+        for view in closer_views(connector, self.view.close_views):
             sight = view.rotation.apply([0.0, 0.0, 1.0])
             if any(float(sight @ other) > self.view.max_cosine for other in taken):
                 continue

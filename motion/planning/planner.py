@@ -27,8 +27,8 @@ class PlannerParameters:
 
     max_checks: int = 20000  # configurations that all searches together may check; choice
     searches: int = 4  # another search begins when the fine check of a path fails; choice
-    # m; the fine check of a path allows so much less: between two coarse checks, 0.02 rad apart, a hand 0.3 m off the
-    # joint's axis comes no nearer
+    # m by which a path may fall short of the margin in its fine check: between two coarse checks, 0.02 rad apart, a
+    # hand 0.3 m off the joint's axis comes nearer by no more
     fine_slack: float = 0.003
     shortcuts: int = 80  # tries to shorten a path; choice
     escape_step: float = 0.02  # rad of a step away from something near; choice: the step of a coarse check

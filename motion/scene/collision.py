@@ -54,7 +54,7 @@ class ArmBody:
 
 @nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
 def _square(a: FloatArray, b: FloatArray) -> float:
-    """Squared distance of two points."""
+    """Squared distance (m2) of two points (3,)."""
     return (a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2
 
 
@@ -228,7 +228,7 @@ class CollisionModel:
         return self.free(path[0], margin) and all(self._edge_free(a, b, margin, self._fine_step) for a, b in edges)
 
     def clearance(self, q: FloatArray) -> float:
-        """Least distance in metres to anything, the arm's own links included; negative is the depth of the touch."""
+        """Least distance (m) to anything, the arm's own links included; a negative one is a penetration depth."""
         return self.nearest(q)[0]
 
     def nearest(self, q: FloatArray) -> tuple[float, str]:

@@ -125,7 +125,7 @@ def play(known: KnownCell, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> I
     # Geometry that takes long and that no motion here looks at.
     monkeypatch.setattr("regrasp.behaviors.cable.carry.Carry._goals", lambda *_arguments: [])
     monkeypatch.setattr("regrasp.behaviors.cable.carry.Insert._seated", lambda *_arguments: None)
-    monkeypatch.setattr("regrasp.behaviors.cable.look.closer_views", lambda connector: [connector] * 2)
+    monkeypatch.setattr("regrasp.behaviors.cable.look.closer_views", lambda connector, _: [connector] * 2)
     yield lambda slip, gone=False: Play(known, tmp_path, slip, gone)
     Blackboard.clear()
 
