@@ -58,11 +58,6 @@ class GraspChoice:
     grasp: Grasp
     paths: tuple[FloatArray, ...]
 
-    @property
-    def standoffs(self) -> FloatArray:
-        """Where the paths begin, (n, 6) rad: goals for a planner."""
-        return np.array([path[0] for path in self.paths])
-
 
 def grasp_candidates(
     world_from_connector: RigidTransform,

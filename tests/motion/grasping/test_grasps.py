@@ -79,7 +79,7 @@ def test_the_right_arm_grasps_the_connector_of_the_thesis_cell(
     model = CollisionModel(right_arm, boxes, other_arm=other)
     sleep = np.array(known.arm("right").sleep)
     choice = choose_grasp(right_arm, model, sleep, grasp_candidates(connector, LENGTH, RADIUS))
-    assert choice.standoffs.shape == (len(choice.paths), 6)
+    assert choice.paths
     for path in choice.paths:
         tool = right_arm.tool(path[-1])
         assert tool.translation == pytest.approx(choice.grasp.world_from_tool.translation, abs=1e-4)
