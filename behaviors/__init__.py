@@ -1,4 +1,4 @@
-"""py_trees leaves, one module per state of the task. `LEAVES` is what a tree file may name."""
+"""Leaves of the behaviour trees (py_trees), one module for each state of a task. A tree file may name the `LEAVES`."""
 
 from regrasp.behaviors.cable.carry import Carry, Insert
 from regrasp.behaviors.cable.detect_slip import DetectSlip

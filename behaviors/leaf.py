@@ -1,4 +1,4 @@
-"""The common ground of all leaves."""
+"""Base classes of all leaves, and their ports."""
 
 from collections.abc import Generator
 from dataclasses import dataclass
@@ -10,13 +10,13 @@ from py_trees.ports import BehaviourWithPorts, PortInformation
 from regrasp.behaviors.services import Services
 from regrasp.interfaces.cause import Cause, CauseCode, ServiceError
 from regrasp.motion.failure import PlanningError
-from regrasp.motion.task import Task
+from regrasp.motion.task import MotionTask
 
-Steps = Generator[Task | None, None, None]
+LeafSteps = Generator[MotionTask | None, None, None]
 
 
-class Failed(Exception):  # noqa: N818 - said inside `steps`: the leaf fails with this cause
-    """Raised inside `steps`: the leaf fails with this cause."""
+class LeafFailed(Exception):  # noqa: N818 - it names the leaf's outcome
+    """Raised inside `steps`: the leaf ends in FAILURE with this cause."""
 
     def __init__(self, code: CauseCode, message: str) -> None:
         super().__init__(message)
@@ -24,7 +24,7 @@ class Failed(Exception):  # noqa: N818 - said inside `steps`: the leaf fails wit
 
 
 @dataclass(frozen=True)
-class Port(PortInformation):
+class LeafPort(PortInformation):
     """A port with limits that the check of a tree file enforces.
 
     A number is more than `above`; a string is one of the `names` that the cell gives to this kind of thing.
@@ -35,21 +35,22 @@ class Port(PortInformation):
 
 
 class Leaf(BehaviourWithPorts):
-    """A leaf with services; it says why it fails. `work` is what py_trees calls update.
+    """A leaf with services, which says why it fails. Override `work`; py_trees calls it through `update`.
 
-    A service that breaks off stops the arms and fails the leaf; any other exception is a mistake and ends the run.
+    When a service raises ServiceError the arms stop and the leaf fails. Any other exception is a programming error and
+    ends the run.
     """
 
-    # The statuses that `update` may return: to the check, what only comes after another one is out of reach.
+    # The statuses that `update` may return. The tree's check needs them to find nodes that are never reached.
     RETURNS: ClassVar[frozenset[Status]] = frozenset({Status.SUCCESS, Status.FAILURE, Status.RUNNING})
     services: Services
 
     def work(self) -> Status:
-        """One tick of the work."""
+        """Do one tick of the work."""
         raise NotImplementedError
 
     def update(self) -> Status:
-        """See the class."""
+        """Tick, and fail when a service breaks off."""
         try:
             return self.work()
         except ServiceError as error:
@@ -57,20 +58,20 @@ class Leaf(BehaviourWithPorts):
             return self.fail(CauseCode.SERVICE_FAILED, str(error))
 
     def setup(self, **kwargs: Any) -> None:
-        """Take the services that `BehaviourTree.setup(services=...)` hands round."""
+        """Keep the services that `BehaviourTree.setup(services=...)` passes to every leaf."""
         self.services = kwargs["services"]
 
     @property
     def path(self) -> str:
-        """Where the leaf stands in its tree: root/carry/move."""
+        """Where the leaf stands in its tree, such as root/carry/move."""
         return str(self.name.replace(".", "/"))
 
     def fail(self, code: CauseCode, message: str) -> Status:
-        """Note the cause, and FAILURE."""
+        """Record the cause and return FAILURE."""
         return self.fail_with(Cause(code, message, self.path))
 
     def fail_with(self, cause: Cause) -> Status:
-        """Note a cause, which may be another leaf's, and FAILURE."""
+        """Record a cause, which may be another leaf's, and return FAILURE."""
         self.services.belief.causes.append(cause)
         self.feedback_message = cause.message
         values = {} if cause.node == self.path else {"of": cause.node}
@@ -78,22 +79,22 @@ class Leaf(BehaviourWithPorts):
         return Status.FAILURE
 
     def say(self, event: str, **values: Any) -> None:
-        """An event of this leaf into the run's log."""
+        """Write an event of this leaf into the run's log."""
         self.services.log.info(event, node=self.path, **values)
 
 
 class StepsLeaf(Leaf):
-    """A leaf whose work is a sequence of steps: `steps()` yields a `Task` to be done, or None to wait for a tick.
+    """A leaf whose work is a sequence: `steps()` yields a `MotionTask` to be done, or None to wait for a tick.
 
-    It ends in SUCCESS when the steps end. `Failed` raised in them, or a motion that cannot be, ends it in FAILURE.
+    It ends in SUCCESS when the steps end, and in FAILURE when they raise `LeafFailed` or a task raises PlanningError.
     """
 
     INPUT_PORTS: ClassVar[dict[str, Any]] = {}
     OUTPUT_PORTS: ClassVar[dict[str, Any]] = {}
-    _task: Task | None = None
+    _task: MotionTask | None = None
 
-    def steps(self) -> Steps:
-        """The work, as a generator."""
+    def steps(self) -> LeafSteps:
+        """The work, as a generator that goes on when the task it yielded is done."""
         raise NotImplementedError
 
     def initialise(self) -> None:
@@ -109,19 +110,19 @@ class StepsLeaf(Leaf):
                     return Status.RUNNING
         except StopIteration:
             return Status.SUCCESS
-        except (PlanningError, Failed) as error:
+        except (PlanningError, LeafFailed) as error:
             return self.fail(error.code, str(error))
         return Status.RUNNING
 
     def terminate(self, new_status: Status) -> None:
-        """Stop the arm if this leaf was at work; one that had completed has nothing to stop."""
+        """Stop the arm if this leaf was RUNNING; one that had ended has nothing to stop."""
         if self.status is Status.RUNNING and new_status is Status.INVALID:
             if self._task is not None:
                 self._task.cancel()
             self._work.close()
 
-    def follow(self, task: Task) -> Steps:
-        """Steps that do a task, for a leaf that handles its PlanningError itself; stopped with the leaf."""
+    def follow(self, task: MotionTask) -> LeafSteps:
+        """Steps that do a task, for a leaf that handles its PlanningError itself. The task stops with the leaf."""
         try:
             while not task.poll():
                 yield None
@@ -129,7 +130,7 @@ class StepsLeaf(Leaf):
             task.cancel()
             raise
 
-    def wait(self, seconds: float) -> Steps:
+    def wait(self, seconds: float) -> LeafSteps:
         """Steps that let so many simulated seconds pass."""
         end = self.services.clock.now() + seconds
         while self.services.clock.now() < end - 1e-9:

@@ -1,4 +1,4 @@
-"""What leaves are given at `setup`, and what the robot believes between them."""
+"""The services that leaves are given at `setup`, and the belief that they share."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -13,8 +13,8 @@ from regrasp.perception.service import Perception
 
 
 @dataclass
-class Notice:
-    """A loss of the connector that the robot noticed: when (simulated s), and by which test."""
+class LossNotice:
+    """A loss of the connector that the robot noticed: `at` which simulated second, `by` which test."""
 
     at: float
     by: str
@@ -22,15 +22,15 @@ class Notice:
 
 @dataclass
 class Belief:
-    """What the robot holds to be so. Leaves write it, the run's record reads it."""
+    """What the robot believes. Leaves write it, the run's record reads it; its names are those of the record."""
 
     held: RigidTransform | None = None  # tool_from_connector of the right hand, None when it holds nothing
     connector: RigidTransform | None = None  # world_from_connector as last found for a grasp
-    sure: bool = False  # whether the whole of it was seen there
+    sure: bool = False  # whether the whole of the connector was seen there
     found_by: str | None = None  # the camera that found it last
-    vain_searches: int = 0  # since the connector was found last
-    notices: list[Notice] = field(default_factory=list)
-    causes: list[Cause] = field(default_factory=list)
+    vain_searches: int = 0  # searches that failed since the connector was found last
+    notices: list[LossNotice] = field(default_factory=list)
+    causes: list[Cause] = field(default_factory=list)  # of the leaves that failed, the latest last
 
 
 @dataclass

@@ -1,10 +1,10 @@
-"""The error of everything in this room that looks for a motion."""
+"""The error of this room: no motion was found, or an arm cannot carry it out."""
 
 from regrasp.interfaces.cause import CauseCode
 
 
 class PlanningError(Exception):
-    """No motion was found; `code` is the cause, the message says why with the numbers."""
+    """No motion was found, or it could not be carried out; `code` is the cause, the message says why, with numbers."""
 
     def __init__(self, code: CauseCode, message: str) -> None:
         super().__init__(message)

@@ -1,16 +1,19 @@
-"""Work of an arm under way."""
+"""A motion under way, as the leaves poll it."""
 
 from collections.abc import Callable, Iterator
 
 
-class Task:
-    """Work of an arm under way, one step a `poll`."""
+class MotionTask:
+    """A motion of an arm or its jaw under way; every `poll` does one step of it.
+
+    `stop` is called by `cancel` and stops the arm.
+    """
 
     def __init__(self, steps: Iterator[None], stop: Callable[[], None]) -> None:
         self._steps, self._stop = steps, stop
 
     def poll(self) -> bool:
-        """Whether it is done. Raises PlanningError with the cause when it cannot be."""
+        """Whether it is done. Raises PlanningError with the cause when it cannot be done."""
         try:
             next(self._steps)
         except StopIteration:
@@ -18,6 +21,6 @@ class Task:
         return False
 
     def cancel(self) -> None:
-        """Stop the arm where it is."""
+        """Stop the arm where it is; the task counts as done."""
         self._steps = iter(())
         self._stop()

@@ -145,8 +145,8 @@ def nearest(word: str, known: Collection[str]) -> str:
 def kinds(leaves: Mapping[str, type], names: Names | None = None) -> dict[str, Kind]:
     """Every element but SubTree: the built-in ones and the leaves.
 
-    A leaf may say more than py_trees asks: a port `above` and `names` (see `regrasp.behaviors.leaf.Port`), the class
-    `RETURNS`. A port for a name takes those in `names`, or any string where there are none.
+    A leaf may say more than py_trees asks: a port `above` and `names` (see `regrasp.behaviors.leaf.LeafPort`), the
+    class `RETURNS`. A port for a name takes those in `names`, or any string where there are none.
 
     Raises:
         TypeError: a leaf class without ports, which the parser could not build.

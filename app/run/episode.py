@@ -122,7 +122,7 @@ def _assemble(scenario: Scenario, world: World, seed: int, log: Any) -> Episode:
     known = scenario.cell.known
     grippers = {name: arm.gripper for name, arm in world.arms.items()}
     motion = Motion(known, world.arms, grippers, world, seed * 1000)
-    motion.remark = lambda sentence: log.warning("does not follow", why=sentence)
+    motion.execution.on_anomaly = lambda sentence: log.warning("does not follow", why=sentence)
     perception = Perception(known, world.cameras, world, motion.camera_pose, motion.spheres)
     services = Services(known, world, motion, perception, log)
     break_services(services, world.faults, world.now)

@@ -87,9 +87,9 @@ def _overlaps(document: Document, known: KnownCell) -> Iterator[Finding]:
 
 def _between_the_arms(known: KnownCell) -> float:
     """How deep (m) the arms asleep reach into each other, by the spheres that fill their moving links."""
-    from regrasp.motion.robots.spheres import LINKS, SPHERES  # late: they bring the compiler
+    from regrasp.motion.robots.spheres import SPHERE_LINKS, SPHERES  # late: they bring the compiler
 
-    moving = LINKS > 0
+    moving = SPHERE_LINKS > 0
     radii = SPHERES[moving, 3]
     bodies = [asleep(arm)[0][moving] for arm in known.arms]
     deepest = [
@@ -194,24 +194,26 @@ def _cable(document: Document, cell: Cell) -> Iterator[Finding]:
 
 
 def _clip(document: Document, known: KnownCell) -> Iterator[Finding]:
-    from regrasp.behaviors.cable.hand import HAND  # late: it brings the planner and the compiler
+    from regrasp.behaviors.cable.hand import HANDLING_ARM  # late: it brings the planner and the compiler
     from regrasp.motion.robots.kinematics import ORIGINS, TOOL_OFFSET
 
-    shoulder = np.asarray(known.arm(HAND).base) + ORIGINS[0] + ORIGINS[1]
+    shoulder = np.asarray(known.arm(HANDLING_ARM).base) + ORIGINS[0] + ORIGINS[1]
     reach = float(np.linalg.norm(ORIGINS[2:], axis=1).sum() + np.linalg.norm(TOOL_OFFSET))
     way = float(np.linalg.norm(np.asarray(known.clip.seat) - shoulder))
     if way > reach:
-        message = f"the clip is {way:.2f} m from the {HAND} arm's shoulder, which reaches {reach:.2f} m"
+        message = f"the clip is {way:.2f} m from the {HANDLING_ARM} arm's shoulder, which reaches {reach:.2f} m"
         yield Finding(*document.place(("known", "clip", "seat")), f"{message}; move it nearer")
 
 
 def _plug(document: Document, known: KnownCell) -> Iterator[Finding]:
-    from regrasp.motion.service import JAW_SLACK, OPEN_GAP  # late: it brings the planner and the compiler
+    from regrasp.motion.execution import JawParameters  # late: it brings the planner and the compiler
 
-    thick = 2 * known.connector.radius
-    if thick + 2 * JAW_SLACK > OPEN_GAP:
-        message = f"a connector {1e3 * thick:.0f} mm thick does not fit the jaw, which opens {1e3 * OPEN_GAP:.0f} mm"
-        right = f"write a radius up to {0.5 * OPEN_GAP - JAW_SLACK:.3f}"
+    jaw, thick = JawParameters(), 2 * known.connector.radius
+    if thick + 2 * jaw.slack > jaw.open_gap:
+        message = (
+            f"a connector {1e3 * thick:.0f} mm thick does not fit the jaw, which opens {1e3 * jaw.open_gap:.0f} mm"
+        )
+        right = f"write a radius up to {0.5 * jaw.open_gap - jaw.slack:.3f}"
         yield Finding(*document.place(("known", "connector", "radius")), f"{message} and needs some room; {right}")
         return
     if trouble := _no_grasp(known):
@@ -222,29 +224,31 @@ def _plug(document: Document, known: KnownCell) -> Iterator[Finding]:
 @lru_cache(maxsize=64)
 def _no_grasp(known: KnownCell) -> str | None:
     """Why the hand cannot take hold of the plugged connector among the known boxes; None when it can."""
-    from regrasp.behaviors.cable.hand import HAND  # late: they bring the planner and the compiler
-    from regrasp.behaviors.cable.unplug import SHALLOW
+    from regrasp.behaviors.cable.hand import HANDLING_ARM  # late: they bring the planner and the compiler
+    from regrasp.behaviors.cable.unplug import UnplugParameters
+    from regrasp.motion.execution import JawParameters
     from regrasp.motion.failure import PlanningError
-    from regrasp.motion.grasping.grasps import choose_grasp, grasp_candidates
+    from regrasp.motion.grasping.approach import pick_candidates
+    from regrasp.motion.grasping.grasps import ApproachParameters, choose_grasp
     from regrasp.motion.robots.kinematics import ArmKinematics
-    from regrasp.motion.scene.collision import CollisionModel
-    from regrasp.motion.service import GRIP_OFFSETS, NEAR_MARGINS, OPEN_GAP, TIGHT_MARGIN
+    from regrasp.motion.scene.collision import ArmBody, Clearances, CollisionModel
 
     arms: dict[str, ArmKinematics] = {
         arm.name: ArmKinematics(RigidTransform.from_translation(arm.base)) for arm in known.arms
     }
     boxes, connector = known.solids(), known.connector
-    others = [CollisionModel(arms[a.name], boxes).spheres(np.array(a.sleep)) for a in known.arms if a.name != HAND]
-    model = CollisionModel(arms[HAND], boxes, other_arm=np.vstack(others), opening=OPEN_GAP)
+    others = [
+        CollisionModel(arms[a.name], boxes).spheres(np.array(a.sleep)) for a in known.arms if a.name != HANDLING_ARM
+    ]
+    body = ArmBody(opening=JawParameters().open_gap)
+    model = CollisionModel(arms[HANDLING_ARM], boxes, body, other_arm=np.vstack(others))
     plug = known.socket(PLUGGED_INTO).world_from_plug(connector.length)
-    asleep_at = np.array(known.arm(HAND).sleep)
+    asleep_at = np.array(known.arm(HANDLING_ARM).sleep)
+    clearances = Clearances()
+    approach = ApproachParameters(margin=clearances.tight_margin, near_margin=clearances.near_margins[-1])
     try:
-        candidates = [
-            grasp
-            for offset in GRIP_OFFSETS
-            for grasp in grasp_candidates(plug, connector.length, connector.radius, offset, shallow=SHALLOW)
-        ]
-        choose_grasp(arms[HAND], model, asleep_at, candidates, margin=TIGHT_MARGIN, near_margin=NEAR_MARGINS[-1])
+        candidates = pick_candidates(plug, connector, UnplugParameters().shallow)
+        choose_grasp(arms[HANDLING_ARM], model, asleep_at, candidates, parameters=approach)
     except (PlanningError, ValueError) as error:
         return str(error)
     return None

@@ -234,8 +234,8 @@ def _camera_points(cell: KnownCell) -> list[tuple[str, FloatArray, FloatArray]]:
 def asleep(arm: ArmSpec) -> tuple[FloatArray, FloatArray]:
     """Centres (n, 3) and half edges (n,), m, of the cubes inside the spheres that fill an arm in its sleep pose."""
     from regrasp.motion.robots.kinematics import ArmKinematics  # late: it brings the compiler
-    from regrasp.motion.robots.spheres import LINKS, SPHERES
+    from regrasp.motion.robots.spheres import SPHERE_LINKS, SPHERES
 
-    frames = ArmKinematics(RigidTransform.from_translation(arm.base)).link_frames(np.array(arm.sleep))[LINKS]
+    frames = ArmKinematics(RigidTransform.from_translation(arm.base)).link_frames(np.array(arm.sleep))[SPHERE_LINKS]
     centers = np.einsum("nij,nj->ni", frames[:, :3, :3], SPHERES[:, :3]) + frames[:, :3, 3]
     return centers, SPHERES[:, 3] / np.sqrt(3)

@@ -1,66 +1,95 @@
-"""Bring the held connector before the stow clip, and into it."""
+"""Bring the held connector in front of the stow clip, and into it."""
+
+from collections.abc import Generator
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from regrasp.behaviors.cable.hand import BACK, HAND, HandLeaf
-from regrasp.behaviors.leaf import Failed, Steps
+from regrasp.behaviors.cable.hand import HANDLING_ARM, HandLeaf
+from regrasp.behaviors.leaf import LeafFailed, LeafSteps
 from regrasp.interfaces.cause import CauseCode
 from regrasp.motion.failure import PlanningError
 from regrasp.motion.planning.straight import straight_line
 from regrasp.motion.robots.kinematics import ArmKinematics
 from regrasp.motion.scene.collision import CollisionModel
+from regrasp.motion.task import MotionTask
 from regrasp.perception.pose.estimate import Estimate
 from regrasp.perception.pose.fusion import fuse
 
-# m before the clip along the hand's own axis, from where it goes straight in; more would press the cable
-BEFORE = 0.025
-CARRY_SPEED = 0.5
-INSERT_SPEED = 0.2
-LOOK_SECONDS = 0.8
-SEATED_SECONDS = 0.6  # the clip's lips take 0.2 s to close
-WAY_MARGIN = 0.0
-ROLLS = 36
-WHOLE_SHARE = 0.9  # of the length; choice: the visible part's middle is then within 5 mm of the whole's
-LONG_ENOUGH = 0.04  # m: a shorter visible part says too little of the axis
-TRUSTED_SHIFT = 0.06  # m: what is seen further off its place in the hand than this is a false look
+
+@dataclass(frozen=True)
+class CarryParameters:
+    """Where the hand stops in front of the clip, and how fast it goes there."""
+
+    # m in front of the clip along the hand's own axis, from where it goes straight in; more would press the cable
+    insert_distance: float = 0.025
+    speed: float = 0.5  # share of the joints' speed; choice
+    margin: float = 0.0  # m of clearance in front of the clip and on the straight path in; choice
+    rolls: int = 36  # angles about the connector's axis that are tried; choice: every 10 degrees
+    line_step: float = 0.01  # m between the waypoints of the straight path in that is checked; choice
+
+
+@dataclass(frozen=True)
+class InsertParameters:
+    """How the connector is looked at in the hand, and how it is inserted."""
+
+    speed: float = 0.2  # share of the joints' speed; choice
+    look_time: float = 0.8  # s of looking; choice
+    seat_time: float = 0.6  # s of waiting; the clip's lips take 0.2 s to close
+    rolls: int = 361  # angles about the connector's axis from which the roll is chosen; choice: every degree
+    whole_share: float = 0.9  # of the length; choice: the visible part's middle is then within 5 mm of the whole's
+    min_extent: float = 0.04  # m; a shorter visible part says too little of the axis
+    max_shift: float = 0.06  # m; what is seen further off its believed place in the hand is a false detection
 
 
 class Carry(HandLeaf):
-    """Plans the held connector's way to a place before the clip and follows it."""
+    """Plans the held connector's path to a place in front of the clip and follows it."""
 
-    def steps(self) -> Steps:
+    parameters: ClassVar[CarryParameters] = CarryParameters()
+
+    def steps(self) -> LeafSteps:
         """See the class."""
         motion, held = self.services.motion, self.held()
-        in_and_out = (BEFORE, BEFORE - BACK[0])
+        distance = self.parameters.insert_distance
+        in_and_out = (distance, distance - self.hand.retreats[0])
         onward = [RigidTransform.from_translation([x, 0.0, 0.0]) for x in in_and_out]
-        yield motion.carry(HAND, self._goals(held), held, onward=onward, speed=CARRY_SPEED)
+        yield motion.carry(HANDLING_ARM, self._goals(held), held, onward=onward, speed=self.parameters.speed)
 
     def _goals(self, held: RigidTransform) -> list[RigidTransform]:
-        """Hand poses before the clip from which a straight way in is free, any roll about the connector's axis.
+        """Hand poses (world_from_tool) in front of the clip from which a straight path in is free.
 
-        Those that turn the hand least come first.
+        Every roll about the connector's axis is tried. Those that turn the hand least come first. Raises LeafFailed
+        OUT_OF_REACH when there is none.
         """
-        motion, clip = self.services.motion, self.services.known.clip
-        model, near = motion.model(HAND, held=held), motion.model(HAND, clip=False)
-        kin = motion.kinematics[HAND]
+        motion, clip, parameters = self.services.motion, self.services.known.clip, self.parameters
+        model, near = motion.model(HANDLING_ARM, held=held), motion.model(HANDLING_ARM, clip=False)
+        kin = motion.kinematics[HANDLING_ARM]
         goals = []
-        for roll in np.linspace(-np.pi, np.pi, ROLLS, endpoint=False):
+        for roll in np.linspace(-np.pi, np.pi, parameters.rolls, endpoint=False):
             seated = clip.world_from_seat * RigidTransform.from_rotation(Rotation.from_euler("x", roll)) * held.inv()
-            before = seated * RigidTransform.from_translation([-BEFORE, 0.0, 0.0])
-            if any(_straight_in(kin, near, q, seated) for q in kin.ik(before) if model.free(q, WAY_MARGIN)):
+            before = seated * RigidTransform.from_translation([-parameters.insert_distance, 0.0, 0.0])
+            starts = (q for q in kin.ik(before) if model.free(q, parameters.margin))
+            if any(_straight_in(kin, near, q, seated, parameters) for q in starts):
                 goals.append(before)
         if not goals:
-            raise Failed(CauseCode.OUT_OF_REACH, "no free hand pose brings the held connector into the clip")
-        now = motion.tool(HAND).rotation.inv()
+            raise LeafFailed(CauseCode.OUT_OF_REACH, "no free hand pose brings the held connector into the clip")
+        now = motion.tool(HANDLING_ARM).rotation.inv()
         return sorted(goals, key=lambda pose: float((now * pose.rotation).magnitude()))
 
 
-def _straight_in(kin: ArmKinematics, near: CollisionModel, q: NDArray[np.float64], seated: RigidTransform) -> bool:
-    """Whether a free straight way leads from joints (6,) to the pose that seats the connector."""
+def _straight_in(
+    kin: ArmKinematics,
+    near: CollisionModel,
+    q: NDArray[np.float64],
+    seated: RigidTransform,
+    parameters: CarryParameters,
+) -> bool:
+    """Whether a free straight path leads from joints (6,) to the pose that seats the connector."""
     try:
-        return near.path_free(straight_line(kin, q, seated, 0.01), WAY_MARGIN)
+        return near.path_free(straight_line(kin, q, seated, parameters.line_step), parameters.margin)
     except PlanningError:
         return False
 
@@ -68,56 +97,67 @@ def _straight_in(kin: ArmKinematics, near: CollisionModel, q: NDArray[np.float64
 class Insert(HandLeaf):
     """Looks how the connector lies in the hand, and brings it straight into the clip."""
 
-    def steps(self) -> Steps:
+    parameters: ClassVar[InsertParameters] = InsertParameters()
+
+    def steps(self) -> LeafSteps:
         """See the class."""
         motion = self.services.motion
         yield from self._look()
-        yield motion.straight(HAND, self._seated(self.held()), speed=INSERT_SPEED)
-        yield from self.wait(SEATED_SECONDS)
+        yield motion.straight(HANDLING_ARM, self._seated(self.held()), speed=self.parameters.speed)
+        yield from self.wait(self.parameters.seat_time)
 
-    def _look(self) -> Steps:
+    def _look(self) -> LeafSteps:
         """Correct the belief of how the connector lies in the hand by what the rear camera sees of it."""
-        clock, perception, belief = self.services.clock, self.services.perception, self.services.belief
-        seen: dict[float, Estimate] = {}
-        end = clock.now() + LOOK_SECONDS
-        while clock.now() < end - 1e-9:
-            yield None
-            result = perception.look("rear")
-            if isinstance(result, Estimate) and result.stamp > end - LOOK_SECONDS:
-                seen[result.stamp] = result
-        long = [e for e in seen.values() if e.extent >= LONG_ENOUGH]
+        belief = self.services.belief
+        seen = yield from self._estimates()
+        long = [e for e in seen if e.extent >= self.parameters.min_extent]
         if not long or belief.held is None:
             self.say("the hand hides the connector", frames=len(seen))
             return
-        mean = fuse(long)
-        found = self.services.motion.tool(HAND).inv() * mean.world_from_connector
-        if _axis(found) @ _axis(belief.held) < 0:  # a finger was taken for the cable: no connector turns round in a jaw
-            found = found * RigidTransform.from_rotation(Rotation.from_euler("z", 180, degrees=True))
-        # The fingers end the visible part as an end of its own would: unless all of the length shows, where the part
-        # lies on it is a guess.
-        whole = mean.extent > WHOLE_SHARE * self.services.known.connector.length
-        if not whole:
-            found = _turned_in_the_jaw(belief.held, found)
+        found, whole = self._pose_in_hand(fuse(long), belief.held)
         shift = float(np.linalg.norm(found.translation - belief.held.translation))
         turn = float(np.rad2deg(np.arccos(np.clip(_axis(found) @ _axis(belief.held), -1.0, 1.0))))
-        trusted = shift < TRUSTED_SHIFT
+        trusted = shift < self.parameters.max_shift
         self.say("connector in the hand", whole=whole, shift=round(shift, 4), turn_deg=round(turn, 1), trusted=trusted)
         if trusted:
             belief.held = found
 
+    def _pose_in_hand(self, seen: Estimate, held: RigidTransform) -> tuple[RigidTransform, bool]:
+        """tool_from_connector by what is seen of one that was `held` so, and whether the whole of it was seen."""
+        found = self.services.motion.tool(HANDLING_ARM).inv() * seen.world_from_connector
+        if _axis(found) @ _axis(held) < 0:  # a finger was taken for the cable: no connector turns round in a jaw
+            found = found * RigidTransform.from_rotation(Rotation.from_euler("z", 180, degrees=True))
+        # Where the fingers hide a part, the visible rest seems to end there. Unless the whole length shows it is not
+        # known where on the connector that rest lies.
+        whole = seen.extent > self.parameters.whole_share * self.services.known.connector.length
+        return (found if whole else _turned_in_the_jaw(held, found)), whole
+
+    def _estimates(self) -> Generator[MotionTask | None, None, list[Estimate]]:
+        """Estimates by the rear camera, one a frame, of the frames taken while it looks."""
+        clock, perception, seconds = self.services.clock, self.services.perception, self.parameters.look_time
+        seen: dict[float, Estimate] = {}
+        end = clock.now() + seconds
+        while clock.now() < end - 1e-9:
+            yield None
+            result = perception.look("rear")
+            if isinstance(result, Estimate) and result.stamp > end - seconds:
+                seen[result.stamp] = result
+        return list(seen.values())
+
     def _seated(self, held: RigidTransform) -> RigidTransform:
         """world_from_tool that seats the held connector, with the roll that turns the hand least."""
-        tool, seat = self.services.motion.tool(HAND), self.services.known.clip.world_from_seat
-        rolls = [RigidTransform.from_rotation(Rotation.from_euler("x", r)) for r in np.linspace(-np.pi, np.pi, 361)]
+        tool, seat = self.services.motion.tool(HANDLING_ARM), self.services.known.clip.world_from_seat
+        angles = np.linspace(-np.pi, np.pi, self.parameters.rolls)
+        rolls = [RigidTransform.from_rotation(Rotation.from_euler("x", angle)) for angle in angles]
         poses = [seat * roll * held.inv() for roll in rolls]
         return min(poses, key=lambda pose: float((tool.rotation.inv() * pose.rotation).magnitude()))
 
 
 def _turned_in_the_jaw(held: RigidTransform, seen: RigidTransform) -> RigidTransform:
-    """tool_from_connector when only a part is `seen`, so that its axis is known but not where its centre lies on it.
+    """tool_from_connector when only a part of the connector is `seen`: its axis is known, its centre on it is not.
 
-    A cable turns the connector between the pads and does not draw it through: the pads stay at the place along it where
-    they were believed to be, `held`.
+    A cable turns the connector between the pads and does not draw it through. So the pads stay at the place along the
+    connector where they are by `held`.
     """
     axis = _axis(seen)
     nearest = seen.translation - (seen.translation @ axis) * axis
@@ -126,4 +166,5 @@ def _turned_in_the_jaw(held: RigidTransform, seen: RigidTransform) -> RigidTrans
 
 
 def _axis(pose: RigidTransform) -> NDArray[np.float64]:
+    """The connector's axis (3,), from cable to tip, in the pose's target frame."""
     return np.asarray(pose.rotation.apply([1.0, 0.0, 0.0]))

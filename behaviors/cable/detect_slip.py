@@ -4,19 +4,19 @@ from typing import Any, ClassVar
 
 from py_trees.common import Status
 
-from regrasp.behaviors.cable.hand import HAND
+from regrasp.behaviors.cable.hand import HANDLING_ARM
 from regrasp.behaviors.leaf import Leaf
-from regrasp.behaviors.services import Notice
+from regrasp.behaviors.services import LossNotice
 from regrasp.interfaces.cause import CauseCode
 from regrasp.perception.tracking.slip import GapTest, SlipEvidence, distance_slip
 from regrasp.perception.tracking.track import TrackState
 
 
 class DetectSlip(Leaf):
-    """RUNNING while the connector is held; FAILURE, with the test that said so, once it has slipped.
+    """RUNNING while the connector is held; FAILURE, with the test that found it, once it has slipped.
 
-    The thesis's test is the distance between gripper and estimated connector; the finger gap tells at once what the eye
-    may miss, an end that stays near.
+    The thesis's test is the distance between gripper and estimated connector. It misses an end that stays near the
+    jaw; there the finger gap tells at once.
     """
 
     INPUT_PORTS: ClassVar[dict[str, Any]] = {}
@@ -29,18 +29,18 @@ class DetectSlip(Leaf):
 
     def work(self) -> Status:
         """See the class."""
-        self._gap.feed(self.services.motion.grippers[HAND].reading())
+        self._gap.feed(self.services.motion.grippers[HANDLING_ARM].reading())
         for evidence in (self._gap.evidence(), self._distance()):
             if evidence is not None and evidence.detected:
                 self.services.belief.held = None
-                self.services.belief.notices.append(Notice(self.services.clock.now(), evidence.by))
+                self.services.belief.notices.append(LossNotice(self.services.clock.now(), evidence.by))
                 self.say("slip", by=evidence.by, value=round(evidence.value, 4), limit=evidence.limit)
                 return self.fail(CauseCode.SLIPPED, evidence.sentence)
         return Status.RUNNING
 
     def _distance(self) -> SlipEvidence | None:
-        """The thesis's test, while the connector is seen; what the hand hides is no slip."""
+        """The thesis's test, only while the connector is seen: one that the hand hides has not slipped."""
         track, now = self.services.perception.track, self.services.clock.now()
         if track.last is None or track.state(now)[0] is not TrackState.VISIBLE:
             return None
-        return distance_slip(self.services.motion.tool(HAND).translation, track.last.position)
+        return distance_slip(self.services.motion.tool(HANDLING_ARM).translation, track.last.position)

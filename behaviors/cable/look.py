@@ -1,49 +1,60 @@
-"""Looking with the wrist camera from a place, which the search and the closer look share."""
+"""Looking with the wrist camera from a viewpoint, which the search and the closer look share."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
-from regrasp.behaviors.cable.hand import EYE, HandLeaf
-from regrasp.behaviors.leaf import Steps
+from regrasp.behaviors.cable.hand import CAMERA_ARM, HandLeaf
+from regrasp.behaviors.leaf import LeafSteps
 from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.cell import WristMount
 from regrasp.motion.failure import PlanningError
-from regrasp.motion.planning.viewpoints import closer_views
+from regrasp.motion.planning.viewpoints import CloseViewParameters, closer_views
 from regrasp.perception.pose.estimate import Estimate
 
-LOOK_MARGIN = 0.02  # m: the searching arm moves among things that it has seen from one side only
-OTHER_SIDE = 0.77  # cosine of the 40 degrees between two lines of sight from different sides
-SOUND = 3  # frames from a place before one is mapped: by then a frozen camera shows
-SETTLE_SECONDS = 0.1  # frames exposed while the arm still swings do not count
+
+@dataclass(frozen=True)
+class LookParameters:
+    """How the camera arm moves and looks."""
+
+    margin: float = 0.02  # m of clearance: the arm moves among things that were seen from one side only
+    max_cosine: float = 0.77  # of the angle between lines of sight from different sides: at least 40 degrees
+    frames_before_mapping: int = 3  # a frozen camera is noticed after so many frames
+    settle_time: float = 0.1  # s after a motion; frames exposed while the arm still swings do not count
+    close_views: CloseViewParameters = field(default_factory=CloseViewParameters)
 
 
 class LookLeaf(HandLeaf):
-    """A state in which the left arm's camera looks round."""
+    """A leaf in which the camera arm looks round."""
+
+    view: ClassVar[LookParameters] = LookParameters()
 
     def view_goals(self, world_from_camera: RigidTransform) -> NDArray[np.float64]:
-        """Joints (n, 6) of the left arm, free, that bring its camera there."""
+        """Free joint vectors (n, 6) rad of the camera arm that bring its camera there."""
         motion = self.services.motion
         mount = self.services.known.camera("wrist").mount
         assert isinstance(mount, WristMount)
-        model = motion.model(EYE)
-        views = motion.kinematics[EYE].ik_view(world_from_camera, mount.wrist_from_camera)
-        return np.array([q for q in views if model.free(q, LOOK_MARGIN)]).reshape(-1, 6)
+        model = motion.model(CAMERA_ARM)
+        views = motion.kinematics[CAMERA_ARM].ik_view(world_from_camera, mount.wrist_from_camera)
+        return np.array([q for q in views if model.free(q, self.view.margin)]).reshape(-1, 6)
 
     def best_view(
         self, connector: RigidTransform, taken: Sequence[NDArray[np.float64]] = ()
     ) -> tuple[RigidTransform, NDArray[np.float64]]:
-        """The best free place that has the whole connector in sight, from another side than the lines of sight `taken`.
+        """The best viewpoint (world_from_camera) that shows the whole connector, with free joints (n, 6) rad for it.
 
-        With joints (n, 6) for it. Raises PlanningError when there is none.
+        It looks from another side than the lines of sight `taken`, unit vectors (3,) in the world. `connector` is
+        world_from_connector. Raises PlanningError when there is none.
         """
         half = 0.5 * self.services.known.connector.length
         points = connector.apply([[-half, 0.0, 0.0], [0.0, 0.0, 0.0], [half, 0.0, 0.0]])
-        for view in closer_views(connector):
+        for view in closer_views(connector, self.view.close_views):
             sight = view.rotation.apply([0.0, 0.0, 1.0])
-            if any(float(sight @ other) > OTHER_SIDE for other in taken):
+            if any(float(sight @ other) > self.view.max_cosine for other in taken):
                 continue
             if self.services.motion.sees(view, points) and len(goals := self.view_goals(view)):
                 return view, goals
@@ -54,17 +65,16 @@ class LookLeaf(HandLeaf):
         goals: NDArray[np.float64],
         seconds: float,
         seen: list[Estimate],
-        glimpses: list[NDArray[np.float64]] | None = None,
-    ) -> Steps:
-        """Move the camera to one of the goals, look for so long, gather estimates in `seen`, map what stands there.
+        weak_detections: list[NDArray[np.float64]] | None = None,
+    ) -> LeafSteps:
+        """Move the camera to one of the goals (n, 6) rad, look for `seconds`, and map the obstacles that it sees.
 
-        `glimpses`: places (3,) m where something showed that may be the connector.
-
-        Unlike a yielded task, a motion that cannot be raises its PlanningError here, to the caller.
+        Estimates are appended to `seen`. To `weak_detections` are appended places (3,) m in the world where something
+        showed that may be the connector. Raises PlanningError to the caller when no motion leads there.
         """
         clock, perception, motion = self.services.clock, self.services.perception, self.services.motion
-        yield from self.follow(motion.move(EYE, goals, margin=LOOK_MARGIN, tight=False))
-        begin = clock.now() + SETTLE_SECONDS
+        yield from self.follow(motion.move(CAMERA_ARM, goals, margin=self.view.margin, tight=False))
+        begin = clock.now() + self.view.settle_time
         stamps: set[float] = set()
         while clock.now() < begin + seconds - 1e-9:
             yield None
@@ -72,10 +82,10 @@ class LookLeaf(HandLeaf):
             if result is None or result.stamp < begin or result.stamp in stamps:
                 continue
             stamps.add(result.stamp)
-            if len(stamps) == SOUND and perception.trouble("wrist") is None:
+            if len(stamps) == self.view.frames_before_mapping and perception.trouble("wrist") is None:
                 perception.map_obstacles("wrist")
                 motion.set_obstacles(perception.occupancy.occupied_points(), perception.occupancy.h)
             if isinstance(result, Estimate):
                 seen.append(result)
-            elif glimpses is not None and result.glimpse is not None:
-                glimpses.append(result.glimpse)
+            elif weak_detections is not None and result.glimpse is not None:
+                weak_detections.append(result.glimpse)

@@ -1,21 +1,21 @@
-"""Keep an eye on the connector while it is carried."""
+"""Observe the connector while it is carried."""
 
 from typing import Any, ClassVar
 
 from py_trees.common import Status
 
-from regrasp.behaviors.cable.hand import HAND
-from regrasp.behaviors.leaf import Leaf, Port
+from regrasp.behaviors.cable.hand import HANDLING_ARM
+from regrasp.behaviors.leaf import Leaf, LeafPort
 
 
 class Monitor(Leaf):
     """Looks through the rear camera every `period` seconds and tells the track where the hand is; always SUCCESS.
 
-    It stands before `DetectSlip` in a Sequence without memory, so both come at every tick.
+    It stands before `DetectSlip` in a Sequence without memory, so that both are ticked every time.
     """
 
     INPUT_PORTS: ClassVar[dict[str, Any]] = {
-        "period": Port(data_type=float, required=False, default_value=0.1, above=0, description="s between looks")
+        "period": LeafPort(data_type=float, required=False, default_value=0.1, above=0, description="s between looks")
     }
     OUTPUT_PORTS: ClassVar[dict[str, Any]] = {}
     RETURNS = frozenset({Status.SUCCESS})
@@ -25,7 +25,7 @@ class Monitor(Leaf):
     def work(self) -> Status:
         """See the class."""
         perception, now = self.services.perception, self.services.clock.now()
-        tool, held = self.services.motion.tool(HAND), self.services.belief.held
+        tool, held = self.services.motion.tool(HANDLING_ARM), self.services.belief.held
         perception.track.held(tool.translation)
         perception.hint = None if held is None else (tool * held).rotation.apply([1.0, 0.0, 0.0])
         if now >= self._due - 1e-9:
@@ -42,7 +42,7 @@ class Monitor(Leaf):
             self.say("camera", camera="rear", trusted=not self._trouble, why=trouble or "its frames are sound again")
 
     def terminate(self, new_status: Status) -> None:
-        """Stopped from above: the hand no longer carries under watch."""
+        """When the tree stops the leaf, forget the hand and the hint: the carrying is over."""
         if new_status is Status.INVALID:
             self.services.perception.track.held(None)
             self.services.perception.hint = None

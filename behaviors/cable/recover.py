@@ -1,31 +1,45 @@
-"""After a slip: out of the way, and wait until the cable hangs still."""
+"""After a slip: move the hand out of the way, and wait until the cable hangs still."""
 
+from dataclasses import dataclass
 from itertools import chain
 from typing import Any, ClassVar
 
-from regrasp.behaviors.cable.hand import HAND, HandLeaf
-from regrasp.behaviors.leaf import Failed, Port, Steps
+from regrasp.behaviors.cable.hand import HANDLING_ARM, HandLeaf
+from regrasp.behaviors.leaf import LeafFailed, LeafPort, LeafSteps
 from regrasp.interfaces.cause import CauseCode
-from regrasp.motion.service import OPEN_GAP
 from regrasp.perception.tracking.stillness import Stillness
 
-LEAVE_SECONDS = 0.3  # for the end to swing out of the open jaw
-STILL = 0.25  # of the mean brightness: a cable that moves by about 1 mm; the jaw forgives 20
-BLIND_SECONDS = 15.0  # without the camera: with it, 7 to 13 were waited
-FRAME_PERIOD = 0.2  # s between the frames that are compared
+
+@dataclass(frozen=True)
+class MakeRoomParameters:
+    """How long the hand waits before it draws back."""
+
+    leave_time: float = 0.3  # s for the end to swing out of the open jaw; choice
+
+
+@dataclass(frozen=True)
+class WaitUntilStillParameters:
+    """When a cable counts as still."""
+
+    threshold: float = 0.25  # of the mean brightness: a cable that moves by about 1 mm; the jaw allows for 20 mm
+    blind_time: float = 15.0  # s of waiting without a camera; with one it took 7 to 13 s
+    frame_period: float = 0.2  # s between the frames that are compared; choice
 
 
 class MakeRoom(HandLeaf):
-    """Opens the jaw and brings the hand to its sleep pose: it must not hide the connector nor stop its swing.
+    """Opens the jaw and brings the hand to its sleep pose, so that it neither hides the connector nor stops its swing.
 
-    First the jaw, then straight back: one that closes may pinch the cable, one that turns away may hook it.
+    The jaw opens first, and the hand draws straight back: a jaw that closes may pinch the cable, and a hand that turns
+    away may hook it.
     """
 
-    def steps(self) -> Steps:
+    parameters: ClassVar[MakeRoomParameters] = MakeRoomParameters()
+
+    def steps(self) -> LeafSteps:
         """See the class."""
         self.services.belief.connector = self.services.belief.found_by = None
-        self.services.motion.grippers[HAND].open(OPEN_GAP)
-        for step in chain(self.wait(LEAVE_SECONDS), self.draw_back(), self.go_to_sleep(HAND)):
+        self.open_jaw()
+        for step in chain(self.wait(self.parameters.leave_time), self.draw_back(), self.go_to_sleep(HANDLING_ARM)):
             self.services.perception.look("rear")  # the search starts where the end was seen last
             yield step
 
@@ -33,17 +47,19 @@ class MakeRoom(HandLeaf):
 class WaitUntilStill(HandLeaf):
     """RUNNING while the rear camera sees anything move; FAILURE after `time_limit` seconds.
 
-    A thing that came into the cell meanwhile is mapped then. Without a sound rear camera it waits as long
-    as the cable swings at most; without any sound camera FAILURE, for nobody could find the end.
+    A thing that came into the cell meanwhile is then mapped. Without a sound rear camera it waits as long as a cable
+    swings at most. Without any sound camera it ends in FAILURE: the end could not be found.
     """
 
+    parameters: ClassVar[WaitUntilStillParameters] = WaitUntilStillParameters()
+
     INPUT_PORTS: ClassVar[dict[str, Any]] = {
-        "time_limit": Port(data_type=float, required=False, default_value=30.0, above=0, description="s of waiting")
+        "time_limit": LeafPort(data_type=float, required=False, default_value=30.0, above=0, description="s of waiting")
     }
 
-    def steps(self) -> Steps:
+    def steps(self) -> LeafSteps:
         """See the class."""
-        stillness, begin = Stillness(threshold=STILL), self.services.clock.now()
+        stillness, begin = Stillness(threshold=self.parameters.threshold), self.services.clock.now()
         limit = self.get_input("time_limit")
         perception = self.services.perception
         while self.services.clock.now() < begin + limit:
@@ -59,12 +75,13 @@ class WaitUntilStill(HandLeaf):
                     self.say("a new thing stands in the cell", voxels=voxels)
                     self.services.motion.set_obstacles(perception.occupancy.occupied_points(), perception.occupancy.h)
                 return
-            yield from self.wait(FRAME_PERIOD)
-        raise Failed(CauseCode.NOT_STILL, f"the scene still moved after {limit:.0f} s")
+            yield from self.wait(self.parameters.frame_period)
+        raise LeafFailed(CauseCode.NOT_STILL, f"the scene still moved after {limit:.0f} s")
 
-    def _wait_blind(self, trouble: str) -> Steps:
+    def _wait_blind(self, trouble: str) -> LeafSteps:
         other = self.services.perception.trouble("wrist")
         if other is not None:
-            raise Failed(CauseCode.CAMERA_FAILED, f"{trouble}; {other}")
-        self.say("waiting without the rear camera", seconds=BLIND_SECONDS, why=trouble)
-        yield from self.wait(BLIND_SECONDS)
+            raise LeafFailed(CauseCode.CAMERA_FAILED, f"{trouble}; {other}")
+        seconds = self.parameters.blind_time
+        self.say("waiting without the rear camera", seconds=seconds, why=trouble)
+        yield from self.wait(seconds)

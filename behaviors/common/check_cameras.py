@@ -1,8 +1,8 @@
-"""Consult the rear camera before any search."""
+"""Ask the rear camera for the connector before any search."""
 
 from typing import Any, ClassVar
 
-from regrasp.behaviors.leaf import Failed, Port, Steps, StepsLeaf
+from regrasp.behaviors.leaf import LeafFailed, LeafPort, LeafSteps, StepsLeaf
 from regrasp.interfaces.cause import CauseCode
 from regrasp.perception.pose.estimate import Estimate
 from regrasp.perception.pose.fusion import fuse
@@ -11,15 +11,15 @@ from regrasp.perception.pose.fusion import fuse
 class CheckCameras(StepsLeaf):
     """Looks for `seconds` through the rear camera, then asks the track the thesis's three questions.
 
-    SUCCESS with the connector's mean pose when its frame exists, is fresh and is live; else FAILURE: it must be
-    searched.
+    SUCCESS when the connector's frame exists, is fresh and is live; its mean pose is then in the belief. Else FAILURE:
+    the connector must be searched for.
     """
 
     INPUT_PORTS: ClassVar[dict[str, Any]] = {
-        "seconds": Port(data_type=float, required=False, default_value=1.5, above=0, description="s of looking")
+        "seconds": LeafPort(data_type=float, required=False, default_value=1.5, above=0, description="s of looking")
     }
 
-    def steps(self) -> Steps:
+    def steps(self) -> LeafSteps:
         """See the class."""
         clock, perception = self.services.clock, self.services.perception
         begin = clock.now()
@@ -31,7 +31,7 @@ class CheckCameras(StepsLeaf):
                 seen[result.stamp] = result
         health = perception.track.check(clock.now())
         if not (health.ok and seen):
-            raise Failed(CauseCode.CONNECTOR_NOT_FOUND, health.reason)
+            raise LeafFailed(CauseCode.CONNECTOR_NOT_FOUND, health.reason)
         found, belief = fuse(list(seen.values())), self.services.belief
         belief.connector, belief.sure = found.world_from_connector, found.whole
         belief.found_by, belief.vain_searches = "rear", 0

@@ -1,4 +1,4 @@
-"""Is there something in the hand?"""
+"""Whether the hand holds something."""
 
 from typing import Any, ClassVar
 

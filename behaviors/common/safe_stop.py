@@ -1,28 +1,38 @@
 """The safe end of a mission that failed."""
 
+from dataclasses import dataclass
+from typing import ClassVar
+
 from py_trees.common import Status
 
-from regrasp.behaviors.leaf import Steps, StepsLeaf
+from regrasp.behaviors.leaf import LeafSteps, StepsLeaf
 from regrasp.interfaces.cause import CauseCode
 
-REST = 0.3  # s within which the arms are at rest (spec)
+
+@dataclass(frozen=True)
+class SafeStopParameters:
+    """How long the leaf waits for the arms."""
+
+    stop_time: float = 0.3  # s within which the arms are at rest (spec)
 
 
 class SafeStop(StepsLeaf):
-    """Stops both arms and holds them; jaws keep their force. FAILURE once they rest: the mission failed.
+    """Stops both arms and holds them; the jaws keep their force. FAILURE once the arms rest: the mission has failed.
 
-    Its cause is that of what failed before; it has one of its own only where nothing names one.
+    Its cause is that of the leaf that failed last. It has a cause of its own only when no leaf has named one.
     """
+
+    parameters: ClassVar[SafeStopParameters] = SafeStopParameters()
 
     RETURNS = frozenset({Status.RUNNING, Status.FAILURE})
 
-    def steps(self) -> Steps:
+    def steps(self) -> LeafSteps:
         """See the class."""
         self.services.motion.stop()
-        yield from self.wait(REST)
+        yield from self.wait(self.parameters.stop_time)
 
     def update(self) -> Status:
-        """See the class."""
+        """Turn the end of the steps into FAILURE."""
         status = super().update()
         if status is not Status.SUCCESS:
             return status

@@ -4,14 +4,14 @@ from typing import Any, ClassVar
 
 from py_trees.common import Status
 
-from regrasp.behaviors.leaf import Leaf, Port
+from regrasp.behaviors.leaf import Leaf, LeafPort
 
 
 class UseTechnique(Leaf):
-    """From now on every look is by this technique of `regrasp.perception.pose.technique`."""
+    """Makes every look from now on use this technique of `regrasp.perception.pose.technique`; always SUCCESS."""
 
     INPUT_PORTS: ClassVar[dict[str, Any]] = {
-        "technique": Port(
+        "technique": LeafPort(
             data_type=str,
             names="technique",
             description="rgbd, detector, fused; fiducial where the connector has a tag",

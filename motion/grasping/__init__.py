@@ -1,1 +1,1 @@
-"""How to take hold of things."""
+"""Grasps of the connector, and approaches to them."""

@@ -1,1 +1,1 @@
-"""Paths, and paths in time."""
+"""Joint paths and their timing, and viewpoints."""

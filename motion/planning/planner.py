@@ -1,60 +1,71 @@
 """Collision-free joint paths: straight when that is free, else OMPL's RRTConnect, then shortened.
 
-Counted, never timed: the same seed gives the same path.
+The effort is limited by a count of checks, never by time: the same seed gives the same path.
 """
+
+from dataclasses import dataclass
 
 import numpy as np
 import ompl.base as ob
 import ompl.geometric as og
 import ompl.util as ou
-from numpy.typing import NDArray
 
 from regrasp.interfaces.cause import CauseCode
 from regrasp.motion.failure import PlanningError
 from regrasp.motion.robots.kinematics import LOWER, UPPER, FloatArray
-from regrasp.motion.scene.collision import COARSE_STEP, CollisionModel
+from regrasp.motion.scene.collision import CollisionModel
 
 ou.setLogLevel(ou.LOG_NONE)
 
-# Metres that the arm's far end moves per radian, about: distances in joint space count the big joints more.
+# Metres that the arm's far end moves per radian of each joint, about: distances in joint space count big joints more.
 WEIGHTS = np.array([0.75, 0.75, 0.5, 0.25, 0.25, 0.12])
-_SHORTCUTS = 80  # tries
-_FINE_SLACK = 0.003  # m: between two coarse checks, 0.02 rad apart, a hand 0.3 m off the joint's axis bulges no further
-_ESCAPE_STEP = 0.02  # rad
-_ESCAPE_STEPS = 100
-_ATTEMPTS = 4  # searches, when the fine check of a found path fails
+
+
+@dataclass(frozen=True)
+class PlannerParameters:
+    """The planner's effort."""
+
+    max_checks: int = 20000  # configurations that all searches together may check; choice
+    searches: int = 4  # another search begins when the fine check of a path fails; choice
+    # m by which a path may fall short of the margin in its fine check: between two coarse checks, 0.02 rad apart, a
+    # hand 0.3 m off the joint's axis comes nearer by no more
+    fine_slack: float = 0.003
+    shortcuts: int = 80  # tries to shorten a path; choice
+    escape_step: float = 0.02  # rad of a step away from something near; choice: the step of a coarse check
+    escape_steps: int = 100  # at most; choice
+    escape_directions: int = 32  # random ones a step, besides the joints' own; choice
 
 
 def plan(
     model: CollisionModel,
     start: FloatArray,
-    goals: NDArray[np.float64],
+    goals: FloatArray,
     seed: int,
-    max_checks: int = 20000,
     margin: float = 0.01,
+    parameters: PlannerParameters = PlannerParameters(),
 ) -> FloatArray:
     """Joint path (k, 6) rad from `start` (6,) to one of `goals` (n, 6), `margin` metres from everything.
 
     A start that is nearer than `margin` but does not touch (after a grasp beside a panel) is first led away: the path
-    begins with small steps along which the clearance only grows. `max_checks` bounds the configurations checked by the
-    search.
+    begins with small steps along which the clearance only grows.
 
-    Raises PlanningError: MOTION_BLOCKED if the start touches something, NO_COLLISION_FREE_GOAL if all goals do,
-    PLANNING_FAILED if no path was found.
+    Raises PlanningError: MOTION_BLOCKED if the start touches something, OUT_OF_REACH without goals,
+    NO_COLLISION_FREE_GOAL if no goal keeps the margin, PLANNING_FAILED if no path was found.
     """
     start, goals = np.asarray(start, float), np.asarray(goals, float).reshape(-1, 6)
-    escape = _escape(model, start, margin, np.random.default_rng(seed))
+    escape = _escape(model, start, margin, np.random.default_rng(seed), parameters)
     free_goals = _free_goals(model, goals, margin)
     for goal in free_goals:
         if model.path_free(np.array([escape[-1], goal]), margin):
             return _joined(escape, np.array([escape[-1], goal]))
-    budget = _Budget(max_checks)
-    for attempt in range(_ATTEMPTS):
-        found = _search(model, escape[-1], free_goals, seed + attempt, budget, margin)
-        path = _shortened(model, found, margin, np.random.default_rng([seed, attempt]))
-        if model.path_free(path, max(0.0, margin - _FINE_SLACK)):
+    budget = _Budget(parameters.max_checks)
+    for search in range(parameters.searches):
+        found = _search(model, escape[-1], free_goals, seed + search, budget, margin)
+        path = _shortened(model, found, margin, np.random.default_rng([seed, search]), parameters.shortcuts)
+        if model.path_free(path, max(0.0, margin - parameters.fine_slack)):
             return _joined(escape, path)
-    raise PlanningError(CauseCode.PLANNING_FAILED, f"{_ATTEMPTS} paths found, none free when checked finely")
+    message = f"{parameters.searches} paths found, none free when checked finely"
+    raise PlanningError(CauseCode.PLANNING_FAILED, message)
 
 
 class _Budget:
@@ -77,7 +88,7 @@ class _EdgeCheck(ob.MotionValidator):
     def checkMotion(self, a: ob.State, b: ob.State) -> bool:  # noqa: N802 (OMPL's name)
         """Whether the motion between two states is free."""
         qa, qb = _joints(a), _joints(b)
-        self._budget.left -= 1 + int(np.abs(qb - qa).max() / COARSE_STEP)
+        self._budget.left -= 1 + int(np.abs(qb - qa).max() / self._model.coarse_step)
         return self._model.edge_free(qa, qb, self._margin)
 
 
@@ -88,7 +99,7 @@ def _joints(state: ob.State) -> FloatArray:
 def _search(
     model: CollisionModel, start: FloatArray, goals: FloatArray, seed: int, budget: _Budget, margin: float
 ) -> FloatArray:
-    """Waypoints (k, 6) by RRTConnect; PlanningError when the budget runs out."""
+    """Waypoints (k, 6) by RRTConnect (Kuffner and LaValle 2000); PlanningError when the budget runs out."""
     space = ob.RealVectorStateSpace(6)
     bounds = ob.RealVectorBounds(6)
     for i in range(6):
@@ -142,7 +153,9 @@ def _free_goals(model: CollisionModel, goals: FloatArray, margin: float) -> Floa
     return free
 
 
-def _escape(model: CollisionModel, start: FloatArray, margin: float, rng: np.random.Generator) -> FloatArray:
+def _escape(
+    model: CollisionModel, start: FloatArray, margin: float, rng: np.random.Generator, parameters: PlannerParameters
+) -> FloatArray:
     """Small steps (k, 6) from the start to where the margin is kept, each with more clearance than the one before."""
     q = start
     steps = [q]
@@ -151,9 +164,10 @@ def _escape(model: CollisionModel, start: FloatArray, margin: float, rng: np.ran
         message = f"the arm touches {what}, {-clearance * 1e3:.0f} mm deep"
         raise PlanningError(CauseCode.MOTION_BLOCKED, message)
     while not model.free(q, margin):
-        candidates = np.clip(q + _directions(rng) * _ESCAPE_STEP, LOWER, UPPER)
+        directions = _directions(rng, parameters.escape_directions)
+        candidates = np.clip(q + directions * parameters.escape_step, LOWER, UPPER)
         best = max(candidates, key=model.clearance)
-        if model.clearance(best) <= clearance or len(steps) > _ESCAPE_STEPS:
+        if model.clearance(best) <= clearance or len(steps) > parameters.escape_steps:
             message = f"no way out to {margin * 1e3:.0f} mm clearance from {what}, {clearance * 1e3:.0f} mm away"
             raise PlanningError(CauseCode.MOTION_BLOCKED, message)
         q, clearance = best, model.clearance(best)
@@ -161,16 +175,18 @@ def _escape(model: CollisionModel, start: FloatArray, margin: float, rng: np.ran
     return np.array(steps)
 
 
-def _directions(rng: np.random.Generator) -> FloatArray:
-    """Joint directions (44, 6), largest entry 1: each joint both ways, and random mixtures."""
-    mixed = rng.normal(size=(32, 6))
+def _directions(rng: np.random.Generator, count: int) -> FloatArray:
+    """Joint directions (12 + count, 6), largest entry 1: each joint both ways, and `count` random mixtures."""
+    mixed = rng.normal(size=(count, 6))
     mixed /= np.abs(mixed).max(axis=1, keepdims=True)
     return np.vstack([np.eye(6), -np.eye(6), mixed])
 
 
-def _shortened(model: CollisionModel, path: FloatArray, margin: float, rng: np.random.Generator) -> FloatArray:
-    """Path with random stretches replaced by straight lines wherever these are free and shorter."""
-    for _ in range(_SHORTCUTS):
+def _shortened(
+    model: CollisionModel, path: FloatArray, margin: float, rng: np.random.Generator, tries: int
+) -> FloatArray:
+    """Path with random stretches replaced by straight lines wherever these are free (shortcutting)."""
+    for _ in range(tries):
         if len(path) < 3:
             break
         i, j = np.sort(rng.uniform(0, len(path) - 1, 2))
@@ -178,12 +194,12 @@ def _shortened(model: CollisionModel, path: FloatArray, margin: float, rng: np.r
         if int(j) > int(i) and model.edge_free(a, b, margin):
             path = np.vstack([path[: int(i) + 1], a, b, path[int(j) + 1 :]])
             path = path[np.append(True, np.abs(np.diff(path, axis=0)).max(axis=1) > 1e-6)]
-            path = _without_middles(model, path, margin)
+            path = _without_needless(model, path, margin)
     return path
 
 
-def _without_middles(model: CollisionModel, path: FloatArray, margin: float) -> FloatArray:
-    """Path without the waypoints that a straight line between their neighbours makes needless."""
+def _without_needless(model: CollisionModel, path: FloatArray, margin: float) -> FloatArray:
+    """Path without the waypoints whose neighbours a free straight line joins."""
     i = 1
     while i < len(path) - 1:
         if model.edge_free(path[i - 1], path[i + 1], margin):
@@ -201,4 +217,5 @@ def _at(path: FloatArray, s: float) -> FloatArray:
 
 
 def _joined(escape: FloatArray, path: FloatArray) -> FloatArray:
+    """The escape and the path that begins at its end."""
     return np.vstack([escape[:-1], path])

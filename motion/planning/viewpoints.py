@@ -1,4 +1,7 @@
-"""Where the wrist camera goes to look for the connector: the thesis's spiral (Hwang 2024, section 3.4.3)."""
+"""Viewpoints of the wrist camera for the search and for a closer look.
+
+The search is the thesis's spiral (Hwang 2024, section 3.4.3).
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -10,20 +13,36 @@ from regrasp.interfaces.cell import OPTICAL
 from regrasp.interfaces.frame import Intrinsics
 from regrasp.motion.robots.kinematics import FloatArray
 
-SPACING = 0.25  # metres between main points
-SUB_SPACING = 0.125
-TURN = np.pi / 6  # of a subpoint's view towards its main point
-DISTANCE = 0.30  # metres from the plane through the start; the thesis leaves it out
-_RINGS = 8  # 2 m: more than the rear camera sees
-CLOSE_DISTANCES = (0.30, 0.24, 0.36)  # metres of a closer look: the wrist camera has no depth under 0.18
-_ROUND = ((1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1), (0, 1), (1, 1))  # right first, then downwards
+# Steps (right, up) from a main point to its subpoints: the right one first, then downwards and round.
+_SUBPOINTS = ((1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1), (0, 1), (1, 1))
 _RIGHT = np.array([0.0, -1.0, 0.0])  # as seen when looking at the back panel
 _UP = np.array([0.0, 0.0, 1.0])
 
 
+@dataclass(frozen=True)
+class SpiralParameters:
+    """The spiral's size; the thesis's values where nothing else is said."""
+
+    spacing: float = 0.25  # m between main points
+    sub_spacing: float = 0.125  # m from a main point to its subpoints, across and up
+    view_turn: float = np.pi / 6  # rad by which a subpoint's view turns towards its main point
+    distance: float = 0.30  # m from the plane through the start; choice: the thesis leaves it out
+    rings: int = 8  # choice: 2 m, more than the rear camera sees
+
+
+@dataclass(frozen=True)
+class CloseViewParameters:
+    """The places of a closer look."""
+
+    distances: tuple[float, ...] = (0.30, 0.24, 0.36)  # m, the preferred first; under 0.18 the camera has no depth
+    yaws_deg: tuple[float, ...] = tuple(np.arange(-75.0, 76.0, 15.0).tolist())  # to the left of world x
+    pitches_deg: tuple[float, ...] = tuple(np.arange(-15.0, 76.0, 15.0).tolist())  # downwards
+    distance_cost: float = 0.2  # 1/m off the preferred distance, against the cosine of the angle to the axis; choice
+
+
 @dataclass(frozen=True, eq=False)
-class Stop:
-    """One place to look from: `index` counts stops, `main` main points; `sub` is 0 for the flat view, then 1-8."""
+class Viewpoint:
+    """One place to look from: `index` counts viewpoints, `main` main points; `sub` is 0 for the flat view, then 1-8."""
 
     index: int
     main: int
@@ -32,43 +51,49 @@ class Stop:
 
 
 def spiral(
-    start: FloatArray, world_from_rear: RigidTransform, rear: Intrinsics, distance: float = DISTANCE
-) -> Iterator[Stop]:
-    """Stops of the search from `start` (3,) in world outwards, in the plane through it parallel to the back panel.
+    start: FloatArray,
+    world_from_rear: RigidTransform,
+    rear: Intrinsics,
+    parameters: SpiralParameters = SpiralParameters(),
+) -> Iterator[Viewpoint]:
+    """Viewpoints of the search from `start` (3,) m in the world outwards.
 
-    Every main point is viewed flat (along world x) from `distance` metres, then from eight subpoints round it. Main
-    points out of the rear camera's view are left out and do not count.
+    They look at the plane through the start that is parallel to the back panel. Every main point is viewed flat (along
+    world x) from `distance` metres, then from eight subpoints round it. Main points out of the rear camera's view are
+    left out and do not count.
     """
     main = 0
-    for across, up in _square_spiral():
-        point = np.asarray(start, float) + SPACING * (across * _RIGHT + up * _UP)
+    for across, up in _square_spiral(parameters.rings):
+        point = np.asarray(start, float) + parameters.spacing * (across * _RIGHT + up * _UP)
         if not _in_view(point, world_from_rear, rear):
             continue
-        for sub, (i, j) in enumerate(((0, 0), *_ROUND)):
-            yield Stop(9 * main + sub, main, sub, _view(point, distance, SUB_SPACING * (i * _RIGHT + j * _UP)))
+        for sub, (i, j) in enumerate(((0, 0), *_SUBPOINTS)):
+            offset = parameters.sub_spacing * (i * _RIGHT + j * _UP)
+            yield Viewpoint(9 * main + sub, main, sub, _view(point, parameters.distance, offset, parameters.view_turn))
         main += 1
 
 
-def _square_spiral() -> Iterator[tuple[int, int]]:
+def _square_spiral(rings: int) -> Iterator[tuple[int, int]]:
     """Steps (right, up) of a square spiral from (0, 0): right, down, left, up, ever longer."""
     across, up, length = 0, 0, 1
     yield across, up
-    for turn, (dx, dy) in enumerate([(1, 0), (0, -1), (-1, 0), (0, 1)] * _RINGS):
+    for turn, (dx, dy) in enumerate([(1, 0), (0, -1), (-1, 0), (0, 1)] * rings):
         for _ in range(length):
             across, up = across + dx, up + dy
             yield across, up
         length += turn % 2
 
 
-def _view(point: FloatArray, distance: float, offset: FloatArray) -> RigidTransform:
-    """world_from_camera at `offset` (3,) from the main point's flat view, turned towards the main point."""
+def _view(point: FloatArray, distance: float, offset: FloatArray, view_turn: float) -> RigidTransform:
+    """world_from_camera at `offset` (3,) m from the main point's flat view, turned towards the main point."""
     position = point + offset - np.array([distance, 0.0, 0.0])
     inwards = -offset / max(float(np.linalg.norm(offset)), 1e-9)
-    turn = Rotation.from_rotvec(TURN * np.cross([1.0, 0.0, 0.0], inwards))
+    turn = Rotation.from_rotvec(view_turn * np.cross([1.0, 0.0, 0.0], inwards))
     return RigidTransform.from_components(position, turn * OPTICAL)
 
 
 def _in_view(point: FloatArray, world_from_camera: RigidTransform, camera: Intrinsics) -> bool:
+    """Whether a point (3,) m in the world lies in the camera's picture."""
     x, y, z = world_from_camera.inv().apply(point)
     if z <= 0:
         return False
@@ -76,21 +101,24 @@ def _in_view(point: FloatArray, world_from_camera: RigidTransform, camera: Intri
     return bool(-0.5 <= u < camera.width - 0.5 and -0.5 <= v < camera.height - 0.5)
 
 
-def closer_views(world_from_connector: RigidTransform) -> list[RigidTransform]:
-    """Places to look closely at a connector that was seen: world_from_camera, the best first.
+def closer_views(
+    world_from_connector: RigidTransform, parameters: CloseViewParameters = CloseViewParameters()
+) -> list[RigidTransform]:
+    """Viewpoints for a closer look at a connector whose pose is known roughly: world_from_camera, the best first.
 
-    From the arms' side (towards -x), as square to its axis as may be: there its whole length shows, and its tilt in
-    depth.
+    They lie on the arms' side (towards -x) and look as square to the connector's axis as may be: there its whole length
+    shows, and its tilt in depth.
     """
     center = world_from_connector.translation
     axis = world_from_connector.rotation.apply([1.0, 0.0, 0.0])
     views = []
-    for distance in CLOSE_DISTANCES:
-        for yaw in np.deg2rad(np.arange(-75.0, 76.0, 15.0)):
-            for pitch in np.deg2rad(np.arange(-15.0, 76.0, 15.0)):
+    for distance in parameters.distances:
+        for yaw in np.deg2rad(parameters.yaws_deg):
+            for pitch in np.deg2rad(parameters.pitches_deg):
                 # ZY: first down by the pitch, then left by the yaw
                 turn = Rotation.from_euler("ZY", [yaw, pitch])
                 sight = turn.apply([1.0, 0.0, 0.0])
-                cost = abs(float(sight @ axis)) + 0.2 * abs(distance - CLOSE_DISTANCES[0])
+                detour = abs(distance - parameters.distances[0])
+                cost = abs(float(sight @ axis)) + parameters.distance_cost * detour
                 views.append((cost, RigidTransform.from_components(center - distance * sight, turn * OPTICAL)))
     return [pose for _, pose in sorted(views, key=lambda view: view[0])]

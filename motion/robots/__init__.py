@@ -1,1 +1,1 @@
-"""The arms: kinematics, shape, and how they follow."""
+"""The arms: kinematics, shape, and the check of their encoders."""

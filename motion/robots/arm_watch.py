@@ -1,63 +1,79 @@
-"""Does an arm do as it is told? Its encoder readings against the trajectory that it follows."""
+"""Execution monitoring: an arm's encoder readings against the trajectory that it follows."""
+
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from regrasp.interfaces.fault import JOINT_NAMES
 from regrasp.interfaces.reading import JointReading
 from regrasp.interfaces.trajectory import Trajectory
+from regrasp.motion.robots.kinematics import FloatArray
 
-JOINTS = ("waist", "shoulder", "elbow", "forearm roll", "wrist angle", "wrist rotate")
-BEHIND = 0.08  # rad off the trajectory: without a fault or a contact it is 0.004
-JUMP = 0.05  # rad between two readings beyond what the velocities allow: without a fault it is 0.002
-NEAR_READINGS = 0.11  # s between readings that are held against each other
-LEFT = 0.10  # rad off the place where the arm was left: without a fault it is 0.005, leaning on something 0.04
+
+@dataclass(frozen=True)
+class ArmWatchParameters:
+    """Limits on encoder readings; each stands well above what is measured without a fault."""
+
+    tracking_error: float = 0.08  # rad off the trajectory; without a fault or a contact it is 0.004
+    jump: float = 0.05  # rad between two readings beyond what the velocities allow; without a fault it is 0.002
+    max_reading_interval: float = 0.11  # s between two readings that are compared
+    resting_drift: float = 0.10  # rad off where the arm was left; without a fault 0.005, leaning on something 0.04
 
 
 class ArmWatch:
-    """Watches one arm while it follows a trajectory. `name` is for the sentences."""
+    """Watches one arm while it follows a trajectory. `name` is the arm's, for the sentences."""
 
-    def __init__(self, name: str) -> None:
-        self._name = name
+    def __init__(self, name: str, parameters: ArmWatchParameters = ArmWatchParameters()) -> None:
+        self._name, self._parameters = name, parameters
         self._last: JointReading | None = None
-        self._left: NDArray[np.float64] | None = None
+        self._resting_at: FloatArray | None = None
 
     def begin(self) -> None:
-        """A trajectory begins."""
+        """Begin a new trajectory: the next reading is compared with no earlier one."""
         self._last = None
 
-    def leave(self, joints: NDArray[np.float64] | None) -> None:
-        """The arm rests at these joints (6,) rad; None: nobody knows where it comes to rest."""
-        self._left = joints
+    def leave(self, joints: FloatArray | None) -> None:
+        """Note that the arm rests at these joints (6,) rad; None when it is not known where it comes to rest."""
+        self._resting_at = joints
 
     def moved_alone(self, reading: JointReading) -> str | None:
-        """A sentence when the arm is not where it was left."""
-        if self._left is None:
+        """A sentence when the arm is no longer where it was left, else None."""
+        if self._resting_at is None:
             return None
-        return self._beyond(reading.positions - self._left, LEFT, "from where it was left")
+        return self._beyond(
+            reading.positions - self._resting_at, self._parameters.resting_drift, "from where it was left"
+        )
 
     def jumped(self, reading: JointReading) -> str | None:
-        """A sentence when a reading and the one before it cannot both be true."""
+        """A sentence when this reading and the one before it contradict each other, else None.
+
+        Between two readings a joint turns no further than the faster of its two velocities allows.
+        """
         last, self._last = self._last, reading
-        if last is None or not 0.0 < reading.stamp - last.stamp < NEAR_READINGS:
+        if last is None or not 0.0 < reading.stamp - last.stamp < self._parameters.max_reading_interval:
             return None
         fastest = np.maximum(np.abs(reading.velocities), np.abs(last.velocities))
         step = np.abs(reading.positions - last.positions)
-        return self._beyond(np.maximum(step - fastest * (reading.stamp - last.stamp), 0.0), JUMP, "more than it turned")
+        excess = np.maximum(step - fastest * (reading.stamp - last.stamp), 0.0)
+        return self._beyond(excess, self._parameters.jump, "more than it turned")
 
-    def behind(self, reading: JointReading, trajectory: Trajectory, elapsed: float) -> str | None:
-        """A sentence when the arm is not where the trajectory is after `elapsed` s."""
-        return self._beyond(reading.positions - trajectory.sample(elapsed)[0], BEHIND, "off its trajectory")
+    def off_trajectory(self, reading: JointReading, trajectory: Trajectory, elapsed: float) -> str | None:
+        """A sentence when the arm is not where the trajectory is after `elapsed` s, else None."""
+        error = reading.positions - trajectory.sample(elapsed)[0]
+        return self._beyond(error, self._parameters.tracking_error, "off its trajectory")
 
-    def _beyond(self, off: NDArray[np.float64], limit: float, what: str) -> str | None:
-        joint = int(np.argmax(np.abs(off)))
-        if abs(off[joint]) <= limit:
+    def _beyond(self, error: FloatArray, limit: float, what: str) -> str | None:
+        worst = int(np.argmax(np.abs(error)))
+        if abs(error[worst]) <= limit:
             return None
-        return f"the {self._name} arm's {JOINTS[joint]} reads {abs(off[joint]):.2f} rad {what}, limit {limit:.2f}"
+        joint = JOINT_NAMES[worst].replace("_", " ")
+        return f"the {self._name} arm's {joint} reads {abs(error[worst]):.2f} rad {what}, limit {limit:.2f}"
 
 
-def rest_of(path: NDArray[np.float64], reached: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The waypoints (n, 6) of a joint path (k, 6) that lie ahead of `reached` (6,), a place on it or near."""
-    begins, ways = path[:-1], np.diff(path, axis=0)
-    shares = np.einsum("ij,ij->i", reached - begins, ways) / np.maximum(np.einsum("ij,ij->i", ways, ways), 1e-12)
-    nearest = begins + np.clip(shares, 0.0, 1.0)[:, None] * ways
+def remaining_waypoints(path: FloatArray, reached: FloatArray) -> FloatArray:
+    """The waypoints (n, 6) of a joint path (k, 6) that lie ahead of `reached` (6,), a place on it or near it."""
+    starts, segments = path[:-1], np.diff(path, axis=0)
+    lengths_sq = np.maximum(np.einsum("ij,ij->i", segments, segments), 1e-12)
+    shares = np.einsum("ij,ij->i", reached - starts, segments) / lengths_sq
+    nearest = starts + np.clip(shares, 0.0, 1.0)[:, None] * segments
     return path[int(np.argmin(np.linalg.norm(nearest - reached, axis=1))) + 1 :]

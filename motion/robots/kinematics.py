@@ -1,11 +1,12 @@
-"""Where the arm's links are for given joint angles, and which joint angles bring tool or camera to a pose.
+"""Forward and inverse kinematics: where the links are, and which joint angles bring tool or camera to a pose.
 
 ViperX 300 S, maker's kinematics with the base height of rtb-data's URDF. Joints: waist, shoulder, elbow, forearm roll,
-wrist angle, wrist rotate. At zero the upper arm stands upright and the forearm points forward; every link frame then is
+wrist angle, wrist rotate. At zero the upper arm stands upright, the forearm points forward, and every link frame is
 parallel to the base frame.
 """
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numba as nb
 import numpy as np
@@ -28,11 +29,21 @@ UPPER = np.deg2rad([180.0, 72.0, 92.0, 180.0, 128.0, 180.0])
 VELOCITY_LIMIT = np.full(6, np.pi)  # rad/s, the maker's servos
 ACCELERATION_LIMIT = np.full(6, 5.0)  # rad/s2, the maker's MoveIt configuration for its six-joint arms
 
-_ROUNDING = 1e-9  # rad past a joint's limit that are arithmetic
-_POSITION_TOLERANCE = 1e-4  # metres, of an inverse kinematics solution
-_ANGLE_TOLERANCE = 1e-3  # rad
-_CAMERA_POSITION_TOLERANCE = 0.002  # metres
-_CAMERA_AXIS_TOLERANCE = np.deg2rad(0.5)
+_ROUNDING = 1e-9  # rad past a joint's limit that are rounding errors
+
+
+@dataclass(frozen=True)
+class InverseKinematicsParameters:
+    """Tolerances of inverse kinematics; a solution that misses its pose by more is dropped."""
+
+    position: float = 1e-4  # m, of the tool; choice: far below the arm's accuracy
+    angle: float = 1e-3  # rad, of the tool
+    camera_position: float = 0.002  # m, of a wrist camera; choice: it looks from 0.3 m
+    camera_axis: float = float(np.deg2rad(0.5))  # rad, of a wrist camera's optical axis; choice
+    distinct: float = 1e-3  # rad; solutions whose joints all differ by less are one
+    roll: float = 1e-4  # rad of the last joint at which a camera's roll has converged
+    roll_iterations: int = 20  # choice: bounds the time spent on a pose that it does not reach
+    roll_starts: tuple[float, ...] = (0.0, 0.5 * np.pi, -0.5 * np.pi, np.pi)  # rad from which a camera's roll is sought
 
 
 @nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
@@ -75,8 +86,8 @@ def wrap(q: FloatArray) -> FloatArray:
 
 
 @nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
-def _reaches(base: FloatArray, q: FloatArray, target: FloatArray) -> bool:
-    """Whether joints (6,) bring the tool to a target (4, 4) within the tolerances."""
+def _reaches(base: FloatArray, q: FloatArray, target: FloatArray, max_distance: float, max_angle: float) -> bool:
+    """Whether joints (6,) bring the tool to a target (4, 4) within the tolerances, m and rad."""
     frame = link_frames_in(base, q)[6]
     position, rotation = 0.0, 0.0
     for r in range(3):
@@ -84,13 +95,16 @@ def _reaches(base: FloatArray, q: FloatArray, target: FloatArray) -> bool:
         for c in range(3):
             rotation += (frame[r, c] - target[r, c]) ** 2
     # |A - B| (Frobenius) = sqrt(8) sin(angle / 2): exact near zero, unlike the arc cosine of the trace
-    return position < _POSITION_TOLERANCE**2 and rotation < 8 * np.sin(_ANGLE_TOLERANCE / 2) ** 2
+    return position < max_distance**2 and rotation < 8 * np.sin(max_angle / 2) ** 2
 
 
 class ArmKinematics:
     """One arm whose base frame stands at `base` (world_from_base)."""
 
-    def __init__(self, base: RigidTransform) -> None:
+    def __init__(
+        self, base: RigidTransform, parameters: InverseKinematicsParameters = InverseKinematicsParameters()
+    ) -> None:
+        self._parameters = parameters
         self.base: FloatArray = np.ascontiguousarray(base.as_matrix())
         self._base_inverse = np.linalg.inv(self.base)
         self._solver = HPRobot(np.eye(3)[AXES], np.vstack([ORIGINS, TOOL_OFFSET]))
@@ -110,15 +124,16 @@ class ArmKinematics:
     def ik(self, world_from_tool: RigidTransform) -> FloatArray:
         """All joint vectors (n, 6) rad within the limits that bring the tool to a pose; (0, 6) when there is none.
 
-        Every row is checked by forward kinematics (0.1 mm, 1 mrad): the solver also answers poses out of reach.
+        Every row is checked by forward kinematics (0.1 mm, 1 mrad): the solver also answers for poses out of reach.
         """
         return _within_limits(self._solve(world_from_tool.as_matrix()))
 
     def ik_view(self, world_from_camera: RigidTransform, wrist_from_camera: RigidTransform) -> FloatArray:
         """Joint vectors (n, 6) rad that bring a wrist camera to a place and direction of view, upright images first.
 
-        Five joints carry the camera, so the roll about the optical axis comes out as it may: position within 2 mm and
-        axis within 0.5 degrees are met, the last joint stays 0. The optical axis must be the wrist link's x axis.
+        Only five joints move the camera, so its roll about the optical axis cannot be chosen. The position is met
+        within 2 mm and the axis within 0.5 degrees; the last joint stays 0. Raises ValueError unless the optical axis
+        is the wrist link's x axis.
         """
         wanted = world_from_camera.as_matrix()
         mount = wrist_from_camera.as_matrix()
@@ -126,7 +141,7 @@ class ArmKinematics:
             raise ValueError(f"the camera must look along the wrist link's x axis, not along {mount[:3, 2]}")
         found = [q for q in self._view_solutions(wanted, mount) if self._sees(q, wanted, mount)]
         found.sort(key=lambda q: -float(self._camera_up(q, mount) @ -wanted[:3, 1]))
-        return _within_limits(_distinct(found))
+        return _within_limits(self._distinct(found))
 
     def _tool_matrix(self, q: FloatArray) -> FloatArray:
         frame: FloatArray = self.link_frames(q)[6]
@@ -134,34 +149,37 @@ class ArmKinematics:
         return frame
 
     def _solve(self, target: FloatArray) -> FloatArray:
-        """`ik` of a (4, 4) matrix, whatever the limits."""
+        """`ik` of a (4, 4) matrix without regard to the joint limits."""
         good = []
         for raw in self._solver.IK(self._base_inverse @ target).Q:
             q = wrap(np.asarray(raw, float))
-            if not _reaches(self.base, q, target):
+            if not self._reaches(q, target):
                 q = self._straight_wrist(q, target)
-                if not _reaches(self.base, q, target):
+                if not self._reaches(q, target):
                     continue
             good.append(q)
-        return _distinct(good)
+        return self._distinct(good)
+
+    def _reaches(self, q: FloatArray, target: FloatArray) -> bool:
+        return bool(_reaches(self.base, q, target, self._parameters.position, self._parameters.angle))
 
     def _straight_wrist(self, raw: FloatArray, target: FloatArray) -> FloatArray:
-        """Repair of a branch with the wrist straight, where the solver only gives a least-squares orientation."""
+        """The solution `raw` (6,) with a straight wrist, where the solver only gives a least-squares orientation."""
         arm = np.array([raw[0], raw[1], raw[2], 0.0, 0.0, 0.0])
         turn = self.link_frames(arm)[3, :3, :3].T @ target[:3, :3]
         arm[5] = np.arctan2(turn[2, 1] - turn[1, 2], turn[1, 1] + turn[2, 2])
         return wrap(arm)
 
     def _view_solutions(self, wanted: FloatArray, mount: FloatArray) -> Iterator[FloatArray]:
-        """Fixed-point iteration over the roll: an answer's last joint says by how much the roll was off."""
+        """Fixed-point iteration over the camera's roll: a solution's last joint says by how much the roll is off."""
         tool_from_mount = mount.copy()
         tool_from_mount[0, 3] -= ORIGINS[5, 0] + TOOL_OFFSET[0]
         tool_target = wanted @ np.linalg.inv(tool_from_mount)
-        for start in (0.0, 0.5 * np.pi, -0.5 * np.pi, np.pi):
+        for start in self._parameters.roll_starts:
             for q in self._solve(_rolled(tool_target, wanted, start)):
                 roll = start
-                for _ in range(20):
-                    if abs(q[5]) < 1e-4:
+                for _ in range(self._parameters.roll_iterations):
+                    if abs(q[5]) < self._parameters.roll:
                         yield np.append(q[:5], 0.0)
                         break
                     roll -= q[5]
@@ -172,17 +190,28 @@ class ArmKinematics:
 
     def _sees(self, q: FloatArray, wanted: FloatArray, mount: FloatArray) -> bool:
         camera = self.link_frames(q)[5] @ mount
-        near = float(np.linalg.norm(camera[:3, 3] - wanted[:3, 3])) < _CAMERA_POSITION_TOLERANCE
+        near = float(np.linalg.norm(camera[:3, 3] - wanted[:3, 3])) < self._parameters.camera_position
         cross = float(np.linalg.norm(np.cross(camera[:3, 2], wanted[:3, 2])))
-        return near and cross < np.sin(_CAMERA_AXIS_TOLERANCE) and float(camera[:3, 2] @ wanted[:3, 2]) > 0
+        return near and cross < np.sin(self._parameters.camera_axis) and float(camera[:3, 2] @ wanted[:3, 2]) > 0
 
     def _camera_up(self, q: FloatArray, mount: FloatArray) -> FloatArray:
         up: FloatArray = -(self.link_frames(q)[5] @ mount)[:3, 1]
         return up
 
+    def _distinct(self, rows: list[FloatArray]) -> FloatArray:
+        """The rows as (n, 6) without repetitions, order kept."""
+        kept: list[FloatArray] = []
+        for row in rows:
+            if all(np.abs(wrap(row - other)).max() > self._parameters.distinct for other in kept):
+                kept.append(row)
+        return np.array(kept).reshape(-1, 6)
+
 
 def _rolled(tool_target: FloatArray, wanted: FloatArray, roll: float) -> FloatArray:
-    """The tool target turned by `roll` rad about the wanted optical axis through the wanted camera position."""
+    """The tool target turned by `roll` rad about the wanted optical axis through the wanted camera position.
+
+    Rodrigues' formula: R = I + sin(roll) K + (1 - cos(roll)) K^2, where K is the axis's skew-symmetric matrix.
+    """
     x, y, z = wanted[:3, 2]
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     turn = np.eye(4)
@@ -194,12 +223,3 @@ def _rolled(tool_target: FloatArray, wanted: FloatArray, roll: float) -> FloatAr
 def _within_limits(rows: FloatArray) -> FloatArray:
     inside = np.clip(rows, LOWER, UPPER)
     return inside[np.all(np.abs(inside - rows) < _ROUNDING, axis=1)]
-
-
-def _distinct(rows: list[FloatArray]) -> FloatArray:
-    """The rows as (n, 6) without repetitions (equal within 1 mrad), order kept."""
-    kept: list[FloatArray] = []
-    for row in rows:
-        if all(np.abs(wrap(row - other)).max() > 1e-3 for other in kept):
-            kept.append(row)
-    return np.array(kept).reshape(-1, 6)

@@ -1,9 +1,9 @@
 """The arm as spheres, for collision checks.
 
-Computed from rtb-data's STL meshes of the ViperX 300 S by clustering surface points; base, shoulder and fingers are
-laid out by hand, small where the arm comes near itself in its sleep pose and at the finger tips. From the upper arm on
-no mesh point lies more than 3 mm outside, of the gripper's bar, which must pass between things, 5 mm. Fingers stand
-fully open, 0.057 m each, with pads 6 mm thick.
+Computed from rtb-data's STL meshes of the ViperX 300 S by clustering surface points. Base, shoulder and fingers are
+laid out by hand: small at the finger tips and where the arm comes near itself in its sleep pose. From the upper arm on
+no mesh point lies more than 3 mm outside the spheres. The gripper's bar, which must pass between things, may stand out
+5 mm. Fingers stand fully open, 0.057 m each, with pads 6 mm thick.
 """
 
 import numpy as np
@@ -62,14 +62,15 @@ _ROWS += [(6, x, sy * y, sz * z, r) for sy in (-1, 1) for x, y, z, r in _FINGER 
 _FINGERS = slice(len(_ROWS) - 4 * len(_FINGER), None)
 JAW_OPENING = 0.075  # metres between the pads, 6 mm each, of fully open fingers
 
-LINKS = np.array([row[0] for row in _ROWS], dtype=np.int64)
+SPHERE_LINKS = np.array([row[0] for row in _ROWS], dtype=np.int64)  # (n,): the link whose frame a sphere is in
 SPHERES = np.array([row[1:] for row in _ROWS], dtype=np.float64)  # (n, 4): centre and radius
-CAMERA_RADIUS = 0.022  # metres; a RealSense is 0.025 x 0.09 x 0.025 ...
-CAMERA_ACROSS = (-0.03, 0.0, 0.03)  # ... so three spheres cover it, metres along the wrist link's y axis
+# Three spheres cover a wrist camera: a RealSense measures 0.025 x 0.09 x 0.025 m.
+CAMERA_RADIUS = 0.022  # metres
+CAMERA_ACROSS = (-0.03, 0.0, 0.03)  # metres along the wrist link's y axis
 
 
 def spheres_at(opening: float) -> NDArray[np.float64]:
-    """`SPHERES` (n, 4) with the pads `opening` metres apart."""
+    """`SPHERES` (n, 4), in their links' frames, with the pads `opening` metres apart."""
     moved = SPHERES.copy()
     moved[_FINGERS, 1] -= np.sign(moved[_FINGERS, 1]) * 0.5 * (JAW_OPENING - opening)
     return moved

@@ -1,1 +1,1 @@
-"""What the arms must not touch."""
+"""The planning scene: what the arms must not touch."""

@@ -1,6 +1,7 @@
-"""Whether an arm touches something: spheres against boxes, another arm, seen surfaces and the arm itself."""
+"""Collision checks of an arm: its spheres against boxes, another arm, seen surfaces and the arm itself."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
 
@@ -10,24 +11,50 @@ from numpy.typing import NDArray
 
 from regrasp.interfaces.cell import Box
 from regrasp.motion.robots.kinematics import LOWER, TOOL_OFFSET, UPPER, ArmKinematics, FloatArray, world_spheres
-from regrasp.motion.robots.spheres import CAMERA_ACROSS, CAMERA_RADIUS, JAW_OPENING, LINKS, spheres_at
-from regrasp.motion.scene.distance_grid import FAR, DistanceGrid
+from regrasp.motion.robots.spheres import CAMERA_ACROSS, CAMERA_RADIUS, JAW_OPENING, SPHERE_LINKS, spheres_at
+from regrasp.motion.scene.distance_grid import FREE_DISTANCE, DistanceGrid
 
-IntArray = NDArray[np.int64]
-
-COARSE_STEP = 0.02  # rad of the joint that moves most, between two checks of an edge
-FINE_STEP = 0.01  # the same for a path that will be driven
 _FIRST_MOVING_LINK = 2  # base and shoulder only turn on the spot: no box, surface or arm can be met by moving them
-
-# Spheres stand out of the meshes: 15 mm between shoulder and wrist in the sleep pose look like 1 mm.
-_SELF_SLACK = 0.008
-
 _ITSELF, _GRID, _OTHER_ARM = -1, -2, -3  # what a clearance is to, when it is not a box
+
+
+@dataclass(frozen=True)
+class CollisionParameters:
+    """How finely and how strictly an arm is checked."""
+
+    coarse_step: float = 0.02  # rad of the joint that moves most, between two checks of an edge
+    fine_step: float = 0.01  # rad, the same for a path that will be driven
+    # m that spheres of one arm may overlap: they stand out of the meshes, and the 15 mm between shoulder and wrist in
+    # the sleep pose look like 1 mm
+    self_overlap: float = 0.008
+
+
+@dataclass(frozen=True)
+class Clearances:
+    """Distances (m) that planned motions keep."""
+
+    margin: float = 0.015  # between the arm's spheres and anything while it moves freely; choice
+    tight_margin: float = 0.005  # the same where nothing is found with `margin`; choice
+    # On straight centimetres near things: the first that leaves a path; choice.
+    near_margins: tuple[float, ...] = (0.020, 0.014, 0.008, 0.004, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class ArmBody:
+    """What makes up an arm's body besides its links.
+
+    `camera_offset` (3,) m is where a wrist camera sits in the wrist link's frame. `carried` (m, 4) m are spheres fixed
+    in the tool frame. The pads stand `opening` m apart.
+    """
+
+    camera_offset: Sequence[float] | None = None
+    carried: FloatArray | None = None
+    opening: float = JAW_OPENING
 
 
 @nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
 def _square(a: FloatArray, b: FloatArray) -> float:
-    """Squared distance of two points."""
+    """Squared distance (m2) of two points (3,)."""
     return (a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2
 
 
@@ -45,18 +72,19 @@ def _box_distance(p: FloatArray, box: FloatArray) -> float:
 
 @nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
 def _grid_distance(p: FloatArray, distance: NDArray[np.float32], lower: FloatArray, h: float) -> float:
+    """Distance at a point (3,), by the grid's `distance`, `lower` corner and voxel edge `h`."""
     i, j, k = np.floor((p[0] - lower[0]) / h), np.floor((p[1] - lower[1]) / h), np.floor((p[2] - lower[2]) / h)
     shape = distance.shape
     if i < 0 or j < 0 or k < 0 or i >= shape[0] or j >= shape[1] or k >= shape[2]:
-        return FAR
+        return FREE_DISTANCE
     return distance[int(i), int(j), int(k)]
 
 
 @nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
-def _nearest(q, base, links, local, pairs, boxes, others, distance, lower, h):  # type: ignore[no-untyped-def]
-    """(clearance, what) over everything."""
+def _nearest(q, base, links, local, pairs, boxes, others, distance, lower, h, self_overlap):  # type: ignore[no-untyped-def]
+    """(clearance, what) over everything: clearance in m, what an index into `boxes` or one of the negative codes."""
     world = world_spheres(base, q, links, local)
-    best, what = FAR, _ITSELF
+    best, what = FREE_DISTANCE, _ITSELF
     for n in range(world.shape[0]):
         if links[n] < _FIRST_MOVING_LINK:
             continue
@@ -74,7 +102,7 @@ def _nearest(q, base, links, local, pairs, boxes, others, distance, lower, h):  
             best, what = d, _GRID
     for m in range(pairs.shape[0]):
         a, c = world[pairs[m, 0]], world[pairs[m, 1]]
-        d = np.sqrt(_square(a, c)) - a[3] - c[3] + _SELF_SLACK
+        d = np.sqrt(_square(a, c)) - a[3] - c[3] + self_overlap
         if d < best:
             best, what = d, _ITSELF
     return best, what
@@ -98,8 +126,8 @@ def _meets_box(p, reach, boxes):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
-def _free(q, base, links, local, pairs, boxes, others, distance, lower, h, margin):  # type: ignore[no-untyped-def]
-    """Whether `_nearest` would keep `margin` (own links: 0), at a fifth of the cost."""
+def _free(q, base, links, local, pairs, boxes, others, distance, lower, h, self_overlap, margin):  # type: ignore[no-untyped-def]
+    """Whether `_nearest` would be at least `margin` (own links: 0), at a fifth of the cost."""
     world = world_spheres(base, q, links, local)
     for n in range(world.shape[0] - 1, -1, -1):  # gripper first: it meets things most often
         if links[n] < _FIRST_MOVING_LINK:
@@ -112,16 +140,16 @@ def _free(q, base, links, local, pairs, boxes, others, distance, lower, h, margi
                 return False
     for m in range(pairs.shape[0]):
         a, c = world[pairs[m, 0]], world[pairs[m, 1]]
-        if _square(a, c) < (a[3] + c[3] - _SELF_SLACK) ** 2:
+        if _square(a, c) < (a[3] + c[3] - self_overlap) ** 2:
             return False
     return True
 
 
 @nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
-def _edge_free(qa, qb, step, base, links, local, pairs, boxes, others, distance, lower, h, margin):  # type: ignore[no-untyped-def]
-    """Checks the end, then the middle, then the quarters: an obstacle shows early."""
+def _edge_free(qa, qb, step, base, links, local, pairs, boxes, others, distance, lower, h, self_overlap, margin):  # type: ignore[no-untyped-def]
+    """Whether all configurations of an edge are free: end, middle, then quarters, so that an obstacle shows early."""
     n = int(np.ceil(np.abs(qb - qa).max() / step))
-    if not _free(qb, base, links, local, pairs, boxes, others, distance, lower, h, margin):
+    if not _free(qb, base, links, local, pairs, boxes, others, distance, lower, h, self_overlap, margin):
         return False
     stride = 1
     while stride * 2 <= n:
@@ -129,7 +157,7 @@ def _edge_free(qa, qb, step, base, links, local, pairs, boxes, others, distance,
     while stride >= 1:
         for k in range(stride, n, 2 * stride):
             q = qa + (qb - qa) * (k / n)
-            if not _free(q, base, links, local, pairs, boxes, others, distance, lower, h, margin):
+            if not _free(q, base, links, local, pairs, boxes, others, distance, lower, h, self_overlap, margin):
                 return False
         stride //= 2
     return True
@@ -141,8 +169,8 @@ def _self_pairs(with_camera: bool) -> tuple[tuple[int, int], ...]:
 
     Neighbouring links are left out: joint limits keep them apart.
     """
-    links = [*LINKS.tolist(), *([5] * len(CAMERA_ACROSS) if with_camera else [])]
-    camera = len(LINKS)
+    links = [*SPHERE_LINKS.tolist(), *([5] * len(CAMERA_ACROSS) if with_camera else [])]
+    camera = len(SPHERE_LINKS)
     return tuple(
         (i, j)
         for i, a in enumerate(links)
@@ -152,48 +180,37 @@ def _self_pairs(with_camera: bool) -> tuple[tuple[int, int], ...]:
 
 
 class CollisionModel:
-    """One arm, and all that it must not touch. Does not change; make a new one when the surroundings do.
+    """One arm, and all that it must not touch. It does not change; make a new one when the surroundings do.
 
-    `camera_offset` (3,) m is where a wrist camera sits in the wrist link's frame. `other_arm` (m, 4) are another arm's
-    spheres in world (`spheres` of its model). `carried` (m, 4) are spheres fixed in the tool frame; the pads stand
-    `opening` m apart. A `margin` is metres between surfaces; the arm's own links must only not touch, whatever the
-    margin.
+    `other_arm` (m, 4) m are another arm's spheres in the world (`spheres` of its model). A `margin` is metres between
+    surfaces; the arm's own links must only not touch, whatever the margin.
     """
 
     def __init__(
         self,
         kinematics: ArmKinematics,
         boxes: Sequence[Box],
-        camera_offset: Sequence[float] | None = None,
+        body: ArmBody = ArmBody(),
         other_arm: FloatArray | None = None,
         grid: DistanceGrid | None = None,
-        carried: FloatArray | None = None,
-        opening: float = JAW_OPENING,
+        parameters: CollisionParameters = CollisionParameters(),
     ) -> None:
         self.kinematics = kinematics
+        self.coarse_step, self._fine_step = parameters.coarse_step, parameters.fine_step
         self._names = [box.name for box in boxes]
-        links, local = [LINKS], [spheres_at(opening)]
-        pairs = list(_self_pairs(camera_offset is not None))
-        if camera_offset is not None:
-            links.append(np.full(len(CAMERA_ACROSS), 5))
-            x, y, z = camera_offset
-            local.append(np.array([[x, y + across, z, CAMERA_RADIUS] for across in CAMERA_ACROSS]))
-        if carried is not None and len(carried):
-            first = sum(map(len, links))
-            pairs += [(i, first + n) for i in np.flatnonzero(LINKS <= 3).tolist() for n in range(len(carried))]
-            links.append(np.full(len(carried), 6))
-            local.append(np.asarray(carried, float) + np.append(TOOL_OFFSET, 0.0))
-        distance = grid or DistanceGrid(np.full((1, 1, 1), FAR, np.float32), np.zeros(3), 1e-3)
+        links, local, pairs = _body_spheres(body)
+        distance = grid or DistanceGrid(np.full((1, 1, 1), FREE_DISTANCE, np.float32), np.zeros(3), 1e-3)
         self._arguments = (
             kinematics.base,
-            np.concatenate(links).astype(np.int64),
-            np.ascontiguousarray(np.concatenate(local)),
-            np.array(pairs, dtype=np.int64).reshape(-1, 2),
+            links,
+            local,
+            pairs,
             np.array([[*b.center, *(0.5 * s for s in b.size)] for b in boxes], float).reshape(-1, 6),
             np.ascontiguousarray(np.empty((0, 4)) if other_arm is None else other_arm, float),
             np.ascontiguousarray(distance.distance),
             distance.lower,
             float(distance.h),
+            float(parameters.self_overlap),
         )
 
     def free(self, q: FloatArray, margin: float) -> bool:
@@ -201,17 +218,17 @@ class CollisionModel:
         inside = bool(np.all((q >= LOWER) & (q <= UPPER)))
         return inside and bool(_free(np.asarray(q, float), *self._arguments, margin))
 
-    def edge_free(self, qa: FloatArray, qb: FloatArray, margin: float, step: float = COARSE_STEP) -> bool:
-        """Whether the straight joint motion is free, its end included (not its start), checked every `step` rad."""
-        return bool(_edge_free(np.asarray(qa, float), np.asarray(qb, float), step, *self._arguments, margin))
+    def edge_free(self, qa: FloatArray, qb: FloatArray, margin: float) -> bool:
+        """Whether the straight joint motion is free, its end included (not its start), checked coarsely."""
+        return self._edge_free(qa, qb, margin, self.coarse_step)
 
     def path_free(self, path: FloatArray, margin: float) -> bool:
         """Whether the joint path (k, 6) is free from its first row to its last, checked finely."""
         edges = pairwise(np.asarray(path, float))
-        return self.free(path[0], margin) and all(self.edge_free(a, b, margin, FINE_STEP) for a, b in edges)
+        return self.free(path[0], margin) and all(self._edge_free(a, b, margin, self._fine_step) for a, b in edges)
 
     def clearance(self, q: FloatArray) -> float:
-        """Least distance in metres to anything, the arm's own links included; negative is the depth of the touch."""
+        """Least distance (m) to anything, the arm's own links included; a negative one is a penetration depth."""
         return self.nearest(q)[0]
 
     def nearest(self, q: FloatArray) -> tuple[float, str]:
@@ -224,3 +241,27 @@ class CollisionModel:
         """The arm's spheres (n, 4) in world at joints (6,) rad, for another arm's model."""
         base, links, local = self._arguments[:3]
         return np.asarray(world_spheres(base, np.asarray(q, float), links, local))
+
+    def _edge_free(self, qa: FloatArray, qb: FloatArray, margin: float, step: float) -> bool:
+        return bool(_edge_free(np.asarray(qa, float), np.asarray(qb, float), step, *self._arguments, margin))
+
+
+def _body_spheres(body: ArmBody) -> tuple[NDArray[np.int64], FloatArray, NDArray[np.int64]]:
+    """An arm's spheres: their links (n,), the spheres (n, 4) in the links' frames, and pairs (m, 2) that can meet."""
+    links, local = [SPHERE_LINKS], [spheres_at(body.opening)]
+    pairs = list(_self_pairs(body.camera_offset is not None))
+    if body.camera_offset is not None:
+        links.append(np.full(len(CAMERA_ACROSS), 5))
+        x, y, z = body.camera_offset
+        local.append(np.array([[x, y + across, z, CAMERA_RADIUS] for across in CAMERA_ACROSS]))
+    if body.carried is not None and len(body.carried):
+        first = sum(map(len, links))
+        up_to_forearm = np.flatnonzero(SPHERE_LINKS <= 3).tolist()
+        pairs += [(i, first + n) for i in up_to_forearm for n in range(len(body.carried))]
+        links.append(np.full(len(body.carried), 6))
+        local.append(np.asarray(body.carried, float) + np.append(TOOL_OFFSET, 0.0))
+    return (
+        np.concatenate(links).astype(np.int64),
+        np.ascontiguousarray(np.concatenate(local)),
+        np.array(pairs, dtype=np.int64).reshape(-1, 2),
+    )

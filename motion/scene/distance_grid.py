@@ -1,4 +1,4 @@
-"""How far the nearest seen surface is, looked up in a grid of voxels."""
+"""Distance field: how far the nearest seen surface is, looked up in a grid of voxels."""
 
 from dataclasses import dataclass
 
@@ -6,16 +6,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
-FAR = 10.0  # metres; the distance where nothing is occupied
+FREE_DISTANCE = 10.0  # metres; what a grid says where nothing is occupied
 
 
 @dataclass(frozen=True, eq=False)
 class DistanceGrid:
-    """Distances in metres to the nearest occupied voxel's centre, never more than the truth anywhere inside a voxel.
+    """Distances (m) to the nearest occupied voxel's centre; nowhere inside a voxel more than the true distance.
 
-    `distance` (nx, ny, nz) float32; `lower` (3,) is the corner of voxel (0, 0, 0) in world; `h` the voxel's edge.
-    Outside the grid nothing is known to be occupied. A grid knows only what it was given: mark unseen space where that
-    matters.
+    `distance` (nx, ny, nz) float32 m; `lower` (3,) m is the corner of voxel (0, 0, 0) in the world; `h` m is a voxel's
+    edge. Outside the grid nothing is known to be occupied. Unseen space counts as free unless it is marked as occupied.
     """
 
     distance: NDArray[np.float32]
@@ -26,7 +25,7 @@ class DistanceGrid:
     def from_occupied(cls, occupied: NDArray[np.bool_], lower: NDArray[np.float64], h: float) -> "DistanceGrid":
         """Grid of an occupancy array (nx, ny, nz)."""
         if not occupied.any():
-            return cls(np.full(occupied.shape, FAR, np.float32), np.asarray(lower, float), h)
+            return cls(np.full(occupied.shape, FREE_DISTANCE, np.float32), np.asarray(lower, float), h)
         centres = np.asarray(distance_transform_edt(~occupied)) * h
         # A point may lie half a voxel's diagonal off the centre that the transform measured from.
         return cls((centres - 0.5 * np.sqrt(3.0) * h).astype(np.float32), np.asarray(lower, float), h)
@@ -45,9 +44,9 @@ class DistanceGrid:
         return cls.from_occupied(occupied, lower, h)
 
     def at(self, points: NDArray[np.float64]) -> NDArray[np.float32]:
-        """Distances (n,) m at points (n, 3) in world; `FAR` outside the grid."""
+        """Distances (n,) m at points (n, 3) in world; `FREE_DISTANCE` outside the grid."""
         index = np.floor((points - self.lower) / self.h).astype(int)
         inside = np.all((index >= 0) & (index < self.distance.shape), axis=1)
-        found = np.full(len(points), FAR, np.float32)
+        found = np.full(len(points), FREE_DISTANCE, np.float32)
         found[inside] = self.distance[tuple(index[inside].T)]
         return found

@@ -7,8 +7,8 @@ import pytest
 from fake_services import Stage, seen
 from py_trees.common import Status
 
-from regrasp.behaviors.cable.hand import CLOSE_SECONDS
-from regrasp.behaviors.cable.recover import BLIND_SECONDS
+from regrasp.behaviors.cable.hand import HandParameters
+from regrasp.behaviors.cable.recover import WaitUntilStill, WaitUntilStillParameters
 from regrasp.interfaces.cause import CauseCode, ServiceError
 from regrasp.interfaces.cell import KnownCell
 
@@ -44,7 +44,14 @@ def test_a_mistake_in_a_leaf_is_not_taken_for_a_service(stage: Stage, monkeypatc
 def test_without_the_rear_camera_it_waits_as_long_as_a_cable_swings(stage: Stage) -> None:
     stage.perception.troubles["rear"] = REAR
     assert stage.run(stage.tree(LEAF.format("WaitUntilStill")), 20.0) is Status.SUCCESS
-    assert stage.clock.t == pytest.approx(BLIND_SECONDS, abs=0.11)
+    assert stage.clock.t == pytest.approx(WaitUntilStillParameters().blind_time, abs=0.11)
+
+
+def test_a_leaf_takes_other_parameters(stage: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(WaitUntilStill, "parameters", WaitUntilStillParameters(blind_time=1.0))
+    stage.perception.troubles["rear"] = REAR
+    assert stage.run(stage.tree(LEAF.format("WaitUntilStill")), 20.0) is Status.SUCCESS
+    assert stage.clock.t == pytest.approx(1.0, abs=0.11)
 
 
 @pytest.mark.parametrize("leaf", ["WaitUntilStill", "LookAtStow"])
@@ -96,4 +103,4 @@ def test_a_jaw_that_does_not_close_is_told_three_times(stage: Stage) -> None:
     assert stage.run(stage.tree('<Unplug name="unplug" socket="back_4"/>'), 9.0) is Status.FAILURE
     assert stage.belief.causes[-1].code is CauseCode.GRIPPER_FAILED
     assert [what for what, _ in stage.motion.grippers["right"].told] == ["close"] * 3
-    assert stage.clock.t > 3 * CLOSE_SECONDS
+    assert stage.clock.t > 3 * HandParameters().close_time

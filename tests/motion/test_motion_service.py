@@ -10,12 +10,16 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.cell import KnownCell, pose_along
 from regrasp.interfaces.frame import Intrinsics, RgbdFrame
+from regrasp.motion.execution import ExecutionParameters, JawParameters
 from regrasp.motion.failure import PlanningError
 from regrasp.motion.planning.cable_path import natural_pose
-from regrasp.motion.service import GRIP_OFFSETS, OPEN_GAP, TIGHT_MARGIN, Motion
-from regrasp.motion.task import Task
+from regrasp.motion.service import Motion, MotionParameters
+from regrasp.motion.task import MotionTask
 
 Points = NDArray[np.float64]
+PARAMETERS = MotionParameters()
+OPEN_GAP = PARAMETERS.execution.jaw.open_gap
+TIGHT_MARGIN = PARAMETERS.clearances.tight_margin
 READY = np.array([0.4, -0.6, 0.6, 0.0, 0.3, 0.0])
 ASIDE = np.array([-0.5, -0.6, 0.6, 0.0, 0.3, 0.0])
 HELD = RigidTransform.from_components([0.0, 0.0, 0.0], Rotation.from_euler("y", -90, degrees=True))
@@ -64,12 +68,12 @@ def test_the_nearest_to_hand_of_several_goals_is_reached(rig: Rig) -> None:
 
 @pytest.mark.parametrize("work", [lambda m: m.move("right", READY[None]), lambda m: m.shift("right", [0.0, 0.0, 0.05])])
 def test_an_arm_that_does_not_follow_is_led_on_slower_and_then_given_up(
-    rig: Rig, work: Callable[[Motion], Task]
+    rig: Rig, work: Callable[[Motion], MotionTask]
 ) -> None:
     rig.arms["right"].at = ASIDE
     rig.arms["right"].stuck = 0.0
     remarks: list[str] = []
-    rig.motion.remark = remarks.append
+    rig.motion.execution.on_anomaly = remarks.append
     with pytest.raises(PlanningError, match=r"off its trajectory, limit 0.08, 3 times") as error:
         rig.run(work(rig.motion))
     assert error.value.code is CauseCode.ARM_FAILED
@@ -128,6 +132,15 @@ def test_a_jaw_that_does_not_open_is_told_three_times_and_then_given_up(rig: Rig
         rig.run(rig.motion.release("right"))
     assert error.value.code is CauseCode.GRIPPER_FAILED
     assert len(rig.grippers["right"].told) == 3
+
+
+def test_parameters_of_every_part_come_through_the_service(rig: Rig) -> None:
+    jaw = JawParameters(attempts=2, open_gap=0.06)
+    parameters = MotionParameters(execution=ExecutionParameters(jaw=jaw))
+    deaf = {"left": rig.grippers["left"], "right": Deaf(rig.clock, gap=0.02)}
+    motion = Motion(rig.known, rig.arms, deaf, rig.clock, 0, parameters)
+    with pytest.raises(PlanningError, match="told 2 times to open to 60 mm"):
+        rig.run(motion.release("right"))
 
 
 def test_cancel_stops_the_arm_where_it_is(rig: Rig) -> None:
@@ -229,7 +242,7 @@ def test_a_pick_brings_the_open_jaw_round_the_connector(rig: Rig, shallow: float
     tool, axis = rig.motion.tool("right"), plug.rotation.apply([1.0, 0.0, 0.0])
     pads_middle = tool.translation + tool.rotation.apply([shallow, 0.0, 0.0])
     offset = pads_middle - plug.translation
-    assert min(abs(offset @ axis - known) for known in GRIP_OFFSETS) < 1e-3
+    assert min(abs(offset @ axis - known) for known in PARAMETERS.pick.grip_offsets) < 1e-3
     assert np.linalg.norm(offset - (offset @ axis) * axis) < 1e-3
     assert abs(tool.rotation.apply([0.0, 1.0, 0.0]) @ axis) < 1e-3  # the fingers close across it
 
@@ -244,7 +257,7 @@ def test_an_arm_seen_to_be_off_takes_hold_where_the_connector_is(rig: Rig) -> No
         asked.append(since)
         return surface(kin, rig.motion.joints("right") + off, OPEN_GAP) if rig.clock.t > since + 0.2 else None
 
-    rig.run(rig.motion.pick("right", plug, seen=seen))
+    rig.run(rig.motion.pick("right", plug, point_cloud=seen))
     assert min(asked) == max(asked) > rig.arms["right"].followed[0][0]
     blind = Rig(rig.known)
     blind.run(blind.motion.pick("right", plug))
@@ -257,7 +270,7 @@ def test_an_arm_seen_to_be_off_takes_hold_where_the_connector_is(rig: Rig) -> No
 @pytest.mark.parametrize("points", [None, np.empty((0, 3))])
 def test_a_camera_that_shows_no_arm_changes_nothing(rig: Rig, points: Points | None) -> None:
     plug = rig.known.socket("back_4").world_from_plug(rig.known.connector.length)
-    rig.run(rig.motion.pick("right", plug, seen=lambda _since: points))
+    rig.run(rig.motion.pick("right", plug, point_cloud=lambda _since: points))
     blind = Rig(rig.known)
     blind.run(blind.motion.pick("right", plug))
     assert rig.motion.joints("right") == pytest.approx(blind.motion.joints("right"))

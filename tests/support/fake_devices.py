@@ -9,7 +9,7 @@ from regrasp.interfaces.cell import KnownCell
 from regrasp.interfaces.reading import GripperReading, JointReading
 from regrasp.interfaces.trajectory import Trajectory
 from regrasp.motion.service import Motion
-from regrasp.motion.task import Task
+from regrasp.motion.task import MotionTask
 
 TICK = 0.05
 
@@ -101,7 +101,7 @@ class Rig:
         self.grippers: dict[str, FakeGripper] = {s.name: FakeGripper(self.clock) for s in self.known.arms}
         self.motion = Motion(self.known, self.arms, self.grippers, self.clock, seed=0)
 
-    def run(self, task: Task, seconds: float = 60.0) -> None:
+    def run(self, task: MotionTask, seconds: float = 60.0) -> None:
         """Poll a task at every tick until it is done."""
         end = self.clock.t + seconds
         while not task.poll():

@@ -19,7 +19,8 @@ from regrasp.interfaces.cell import KnownCell
 from regrasp.interfaces.frame import RgbdFrame
 from regrasp.interfaces.reading import GripperReading
 from regrasp.motion.failure import PlanningError
-from regrasp.motion.task import Task
+from regrasp.motion.service import MotionParameters
+from regrasp.motion.task import MotionTask
 from regrasp.perception.pose.estimate import Estimate, NoEstimate, pose_covariance
 from regrasp.perception.pose.segmentation import NotSeen
 from regrasp.perception.tracking.track import ConnectorTrack
@@ -75,6 +76,7 @@ class FakeMotion:
 
     def __init__(self, clock: Clock) -> None:
         self.clock = clock
+        self.parameters = MotionParameters()
         self.seconds = 0.2
         self.error: Exception | None = None
         self.hand = RigidTransform.from_translation([0.3, 0.0, 0.4])
@@ -87,23 +89,23 @@ class FakeMotion:
         view = SimpleNamespace(ik_view=self._views)
         self.kinematics = {"left": view, "right": view}
 
-    def move(self, arm: str, goals: Vector, *, margin: float = 0.0, tight: bool = True) -> Task:
+    def move(self, arm: str, goals: Vector, *, margin: float = 0.0, tight: bool = True) -> MotionTask:
         self.moves.append((arm, goals))
-        return Task(self._steps(), lambda: self.cancelled.append(arm))
+        return MotionTask(self._steps(), lambda: self.cancelled.append(arm))
 
-    def shift(self, arm: str, way: Vector) -> Task:
+    def shift(self, arm: str, way: Vector) -> MotionTask:
         self.shifts.append((arm, way))
-        return Task(self._steps(), lambda: self.cancelled.append(arm))
+        return MotionTask(self._steps(), lambda: self.cancelled.append(arm))
 
-    def straight(self, arm: str, goal: RigidTransform, *, speed: float = 1.0) -> Task:
-        return Task(self._steps(), lambda: self.cancelled.append(arm))
+    def straight(self, arm: str, goal: RigidTransform, *, speed: float = 1.0) -> MotionTask:
+        return MotionTask(self._steps(), lambda: self.cancelled.append(arm))
 
     def sees(self, world_from_camera: RigidTransform, points: Vector) -> bool:
         return True
 
-    def release(self, arm: str) -> Task:
+    def release(self, arm: str) -> MotionTask:
         self.grippers[arm].open(0.05)
-        return Task(self._steps(), lambda: self.cancelled.append(arm))
+        return MotionTask(self._steps(), lambda: self.cancelled.append(arm))
 
     def give_up(self, arm: str, code: CauseCode, message: str) -> PlanningError:
         return PlanningError(code, message)

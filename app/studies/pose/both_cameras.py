@@ -7,10 +7,10 @@ from scipy.spatial.transform import RigidTransform
 from regrasp.app.studies.pose.grasp import done, grasp, services_of
 from regrasp.app.studies.pose.scenes import Scene
 from regrasp.app.studies.pose.trial import MEAN_SECONDS, Looked, Setup, Trial, look, looked, measured
-from regrasp.behaviors.cable.hand import EYE
-from regrasp.behaviors.cable.look import LOOK_MARGIN, LookLeaf
+from regrasp.behaviors.cable.hand import CAMERA_ARM
+from regrasp.behaviors.cable.look import LookLeaf
 from regrasp.behaviors.common.start_up import StartUp
-from regrasp.behaviors.leaf import Steps
+from regrasp.behaviors.leaf import LeafSteps
 from regrasp.behaviors.services import Services
 from regrasp.perception.pose.fusion import fuse
 from regrasp.perception.pose.technique import Technique
@@ -22,21 +22,21 @@ SETTLE_SECONDS = 0.5  # until the arm swings no more
 class BestView(LookLeaf):
     """Brings the wrist camera to where it sees the whole of the connector that is believed in."""
 
-    def steps(self) -> Steps:
+    def steps(self) -> LeafSteps:
         """See the class."""
         connector = self.services.belief.connector
         assert connector is not None
         _, goals = self.best_view(connector)
-        yield self.services.motion.move(EYE, goals, margin=LOOK_MARGIN, tight=False)
+        yield self.services.motion.move(CAMERA_ARM, goals, margin=self.view.margin, tight=False)
         yield from self.wait(SETTLE_SECONDS)
 
 
 class PutAway(LookLeaf):
     """Brings the left arm to sleep."""
 
-    def steps(self) -> Steps:
+    def steps(self) -> LeafSteps:
         """See the class."""
-        yield from self.go_to_sleep(EYE)
+        yield from self.go_to_sleep(CAMERA_ARM)
 
 
 def run_both(setup: Setup, configuration: str, seed: int) -> list[Trial]:

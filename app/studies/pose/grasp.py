@@ -7,7 +7,7 @@ from py_trees.common import Status
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.app.studies.pose.scenes import Scene
-from regrasp.behaviors.cable.hand import HAND
+from regrasp.behaviors.cable.hand import HANDLING_ARM
 from regrasp.behaviors.cable.regrasp import Regrasp
 from regrasp.behaviors.common.start_up import StartUp
 from regrasp.behaviors.leaf import Leaf
@@ -60,7 +60,7 @@ def done(scene: Scene, services: Services, leaf: Leaf) -> str:
 def _drawn_back(services: Services, scene: Scene) -> str:
     motion, truth = services.motion, scene.truth
     start = truth.connector_pose().translation
-    task = motion.shift(HAND, motion.tool(HAND).rotation.apply([-DRAWN, 0.0, 0.0]), checked=False)
+    task = motion.shift(HANDLING_ARM, motion.tool(HANDLING_ARM).rotation.apply([-DRAWN, 0.0, 0.0]), checked=False)
     try:
         while not task.poll():
             scene.world.advance(TICK)

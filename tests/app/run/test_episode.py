@@ -14,7 +14,7 @@ from regrasp.app.records.reader import read_record
 from regrasp.app.records.result import Result
 from regrasp.app.run.episode import run_episode
 from regrasp.app.scenario.load import Scenario, load_scenario
-from regrasp.behaviors.leaf import Failed, Leaf, Steps, StepsLeaf
+from regrasp.behaviors.leaf import Leaf, LeafFailed, LeafSteps, StepsLeaf
 from regrasp.interfaces.cause import CauseCode
 from regrasp.sim.world import World
 
@@ -22,7 +22,7 @@ from regrasp.sim.world import World
 class Swing(StepsLeaf):
     """Swings both arms out of their sleep pose, then waits for ever."""
 
-    def steps(self) -> Steps:
+    def steps(self) -> LeafSteps:
         motion = self.services.motion
         tasks = [motion.move(arm, motion.joints(arm)[None] + [turn, 0.4, -0.2, 0, 0, 0]) for arm, turn in SWINGS]
         while True:
@@ -36,7 +36,7 @@ class Breaks(StepsLeaf):
 
     AFTER: ClassVar[float] = 0.8
 
-    def steps(self) -> Steps:
+    def steps(self) -> LeafSteps:
         yield from self.wait(self.AFTER)
         raise ZeroDivisionError("no joint that long")
 
@@ -70,15 +70,15 @@ class BreaksAtOnce(Leaf):
 class GivesUp(StepsLeaf):
     """Fails with a cause after half a second."""
 
-    def steps(self) -> Steps:
+    def steps(self) -> LeafSteps:
         yield from self.wait(0.5)
-        raise Failed(CauseCode.OUT_OF_REACH, "connector 0.82 m from the right arm, reach 0.75 m")
+        raise LeafFailed(CauseCode.OUT_OF_REACH, "connector 0.82 m from the right arm, reach 0.75 m")
 
 
 class Done(StepsLeaf):
     """Succeeds after half a second."""
 
-    def steps(self) -> Steps:
+    def steps(self) -> LeafSteps:
         yield from self.wait(0.5)
 
 

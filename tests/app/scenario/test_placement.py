@@ -8,7 +8,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from regrasp.app.scenario.placement import overlaps, penetration
 from regrasp.interfaces.cell import KnownCell
 from regrasp.motion.robots.kinematics import ArmKinematics
-from regrasp.motion.robots.spheres import LINKS, SPHERES
+from regrasp.motion.robots.spheres import SPHERE_LINKS, SPHERES
 
 edges = st.tuples(*[st.floats(0.02, 0.5)] * 3)
 angles = st.tuples(*[st.floats(-3, 3)] * 3)
@@ -66,7 +66,7 @@ def test_an_arm_asleep_is_told_where_one_of_its_spheres_is_in_the_block(
     found = dict(overlaps(known, np.array(place), (edge, edge, edge), yaw_deg, (0.0, 0.0, 0.0)))
     for arm in known.arms:
         frames = ArmKinematics(RigidTransform.from_translation(arm.base)).link_frames(np.array(arm.sleep))
-        centers = np.array([(frames[link] @ [*c[:3], 1.0])[:3] for link, c in zip(LINKS, SPHERES, strict=True)])
+        centers = np.array([(frames[link] @ [*c[:3], 1.0])[:3] for link, c in zip(SPHERE_LINKS, SPHERES, strict=True)])
         inside = Rotation.from_euler("z", -yaw_deg, degrees=True).apply(centers - place)
         if np.any(np.abs(inside).max(axis=1) < 0.5 * edge - 1e-5):
             assert f"the {arm.name} arm asleep" in found

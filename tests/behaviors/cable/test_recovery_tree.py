@@ -23,7 +23,7 @@ from regrasp.behaviors import LEAVES, Leaf
 from regrasp.interfaces.cause import Cause, ServiceError
 from regrasp.interfaces.cell import KnownCell
 from regrasp.interfaces.frame import Intrinsics, RgbdFrame
-from regrasp.motion.task import Task
+from regrasp.motion.task import MotionTask
 from regrasp.trees import in_tree_order, load_tree
 
 Make = Callable[..., "Play"]
@@ -38,13 +38,13 @@ class BusyMotion(FakeMotion):
         super().__init__(clock)
         self.at_work: list[str] = []
 
-    def move(self, arm: str, *_goal: Any, **_options: Any) -> Task:
+    def move(self, arm: str, *_goal: Any, **_options: Any) -> MotionTask:
         def steps() -> Iterator[None]:
             self.at_work.append(arm)
             yield from self._steps()
             self.at_work.remove(arm)
 
-        return Task(steps(), lambda: self.at_work.remove(arm) if arm in self.at_work else None)
+        return MotionTask(steps(), lambda: self.at_work.remove(arm) if arm in self.at_work else None)
 
     carry = straight = pick = shift = release = move
 
@@ -125,7 +125,7 @@ def play(known: KnownCell, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> I
     # Geometry that takes long and that no motion here looks at.
     monkeypatch.setattr("regrasp.behaviors.cable.carry.Carry._goals", lambda *_arguments: [])
     monkeypatch.setattr("regrasp.behaviors.cable.carry.Insert._seated", lambda *_arguments: None)
-    monkeypatch.setattr("regrasp.behaviors.cable.look.closer_views", lambda connector: [connector] * 2)
+    monkeypatch.setattr("regrasp.behaviors.cable.look.closer_views", lambda connector, _: [connector] * 2)
     yield lambda slip, gone=False: Play(known, tmp_path, slip, gone)
     Blackboard.clear()
 
@@ -183,7 +183,7 @@ def test_every_failed_leaf_names_a_cause(play: Make, monkeypatch: pytest.MonkeyP
     whole = play(2, trouble == "not found")
     attempts = Attempts(whole.root, whole.services.belief.causes, whole.clock.now)
     if trouble == "no hand":
-        monkeypatch.setattr(whole.motion, "pick", lambda *_, **__: Task(iter([None]), lambda: None))
+        monkeypatch.setattr(whole.motion, "pick", lambda *_, **__: MotionTask(iter([None]), lambda: None))
         monkeypatch.setattr(whole.hand, "close", lambda force: setattr(whole.hand, "gap", 0.0))
     elif trouble == "dark cameras":
         monkeypatch.setattr(whole.eyes, "trouble", lambda camera: f"the {camera} camera is dark")

@@ -7,7 +7,7 @@ import pytest
 from fake_services import Stage, seen, unseen
 from py_trees.common import Status
 
-from regrasp.behaviors.cable.spiral_search import DISTANCE
+from regrasp.behaviors.cable.spiral_search import SpiralSearchParameters
 from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.cell import FixedMount, KnownCell
 from regrasp.motion.failure import PlanningError
@@ -15,6 +15,7 @@ from regrasp.motion.planning.viewpoints import spiral
 from regrasp.perception.pose.estimate import Estimate, NoEstimate
 from regrasp.perception.pose.segmentation import NotSeen
 
+SPIRAL = SpiralSearchParameters().spiral
 PLACE = np.array([0.40, 0.10, 0.25])
 
 
@@ -43,7 +44,7 @@ def places(stage: Stage, n: int) -> list[np.ndarray]:
     assert isinstance(rear.mount, FixedMount)
     last = stage.perception.track.last
     assert last is not None
-    stops = spiral(last.position, rear.mount.world_from_camera, rear.intrinsics, DISTANCE)
+    stops = spiral(last.position, rear.mount.world_from_camera, rear.intrinsics, SPIRAL)
     return [stop.world_from_camera.translation for stop in islice(stops, n)]
 
 
@@ -87,7 +88,7 @@ def test_what_shows_too_little_is_looked_at_next(stage: Stage) -> None:
     assert stage.run(stage.tree(search(300)), 60.0) is Status.SUCCESS
     assert len(stage.motion.moves) == 2
     assert eye(stage, 0) == pytest.approx(first)
-    assert np.linalg.norm(eye(stage, 1) - place) == pytest.approx(DISTANCE)
+    assert np.linalg.norm(eye(stage, 1) - place) == pytest.approx(SPIRAL.distance)
     assert stage.belief.connector is not None
     assert stage.belief.connector.translation == pytest.approx(place, abs=1e-3)
 

@@ -7,7 +7,7 @@ from scipy.spatial.transform import RigidTransform
 from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.cell import Box
 from regrasp.motion.failure import PlanningError
-from regrasp.motion.planning.planner import plan
+from regrasp.motion.planning.planner import PlannerParameters, plan
 from regrasp.motion.robots.kinematics import ArmKinematics, FloatArray
 from regrasp.motion.scene.collision import CollisionModel
 
@@ -75,7 +75,7 @@ def test_the_budget_ends_a_search_without_a_way() -> None:
     model = CollisionModel(KIN, walls)
     up = np.array([1.2, 0.3, 0.3, 0.0, 0.0, 0.0])
     with pytest.raises(PlanningError, match="no path to 1 goals at 10 mm margin in 3000 checked") as caught:
-        plan(model, up, (up * [-1, 1, 1, 1, 1, 1])[None], seed=0, max_checks=3000)
+        plan(model, up, (up * [-1, 1, 1, 1, 1, 1])[None], seed=0, parameters=PlannerParameters(max_checks=3000))
     assert caught.value.code is CauseCode.PLANNING_FAILED
 
 

@@ -6,17 +6,18 @@ import pytest
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.cell import Box, KnownCell, WristMount
-from regrasp.motion.planning.viewpoints import DISTANCE, Stop, spiral
+from regrasp.motion.planning.viewpoints import SpiralParameters, Viewpoint, spiral
 from regrasp.motion.robots.kinematics import ArmKinematics, FloatArray
-from regrasp.motion.scene.collision import CollisionModel
+from regrasp.motion.scene.collision import ArmBody, CollisionModel
 
+DISTANCE = SpiralParameters().distance
 START = np.array([0.36, 0.14, 0.25])
 
 
-def stops(known: KnownCell, start: FloatArray, distance: float = DISTANCE) -> list[Stop]:
+def stops(known: KnownCell, start: FloatArray) -> list[Viewpoint]:
     rear = known.camera("rear")
     assert not isinstance(rear.mount, WristMount)
-    return list(spiral(start, rear.mount.world_from_camera, rear.intrinsics, distance))
+    return list(spiral(start, rear.mount.world_from_camera, rear.intrinsics))
 
 
 def right_and_up(pose: RigidTransform) -> list[float]:
@@ -74,7 +75,7 @@ def test_the_left_arm_reaches_most_of_the_first_nine(
     mount = known.camera("wrist").mount
     assert isinstance(mount, WristMount)
     others = CollisionModel(right_arm, []).spheres(np.array(known.arm("right").sleep))
-    model = CollisionModel(left_arm, boxes, camera_offset=mount.offset, other_arm=others)
+    model = CollisionModel(left_arm, boxes, body=ArmBody(camera_offset=mount.offset), other_arm=others)
     reached = 0
     for stop in stops(known, START)[:9]:
         answers = left_arm.ik_view(stop.world_from_camera, mount.wrist_from_camera)

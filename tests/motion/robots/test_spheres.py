@@ -7,7 +7,7 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from regrasp.motion.robots.kinematics import TOOL_OFFSET
-from regrasp.motion.robots.spheres import LINKS, SPHERES
+from regrasp.motion.robots.spheres import SPHERE_LINKS, SPHERES
 
 MESHES = Path(rtbdata.__file__).parent / "xacro/trossen_descriptions/meshes/meshes_vx300s"
 
@@ -27,12 +27,12 @@ PARTS = [
 
 def test_spheres_are_small_at_the_finger_tips() -> None:
     """A connector 3 cm in front of a panel can be gripped at the tool's centre with the gripper square to the panel."""
-    fingers = SPHERES[LINKS == 6]
+    fingers = SPHERES[SPHERE_LINKS == 6]
     assert float((fingers[:, 0] + fingers[:, 3]).max()) < TOOL_OFFSET[0] + 0.03
 
 
 def test_left_and_right_finger_mirror_each_other() -> None:
-    tips = SPHERES[(LINKS == 6) & (SPHERES[:, 0] > 0.07)]
+    tips = SPHERES[(SPHERE_LINKS == 6) & (SPHERES[:, 0] > 0.07)]
     mirrored = tips * [1, -1, 1, 1]
     assert {tuple(row) for row in tips} == {tuple(row) for row in mirrored}
 
@@ -42,6 +42,6 @@ def test_spheres_cover_the_mesh(name: str, link: int, turn: Rotation, origin: li
     mesh = trimesh.load_mesh(MESHES / f"VXSA-300-M-{name}.stl")
     points, _ = trimesh.sample.sample_surface(mesh, 3000, seed=0)
     points = turn.apply(np.asarray(points) * 1e-3) + origin
-    own = SPHERES[link == LINKS]
+    own = SPHERES[link == SPHERE_LINKS]
     outside = (np.linalg.norm(points[:, None] - own[None, :, :3], axis=2) - own[:, 3]).min(axis=1)
     assert float(outside.max()) < (0.005 if name == "9-Gripper-Bar" else 0.003)

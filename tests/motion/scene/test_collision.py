@@ -8,8 +8,8 @@ from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.cell import Box, KnownCell
 from regrasp.motion.robots.kinematics import LOWER, UPPER, ArmKinematics, FloatArray
-from regrasp.motion.robots.spheres import LINKS, SPHERES
-from regrasp.motion.scene.collision import CollisionModel
+from regrasp.motion.robots.spheres import SPHERE_LINKS, SPHERES
+from regrasp.motion.scene.collision import ArmBody, CollisionModel
 from regrasp.motion.scene.distance_grid import DistanceGrid
 
 HOME = np.array([0.0, -0.8, 0.8, 0.0, 0.5, 0.0])
@@ -22,7 +22,7 @@ joints = st.tuples(*(st.floats(float(a), float(b)) for a, b in zip(LOWER, UPPER,
 
 def brute_force(kin: ArmKinematics, q: FloatArray, box: Box) -> float:
     """Least distance from the moving links' spheres to points laid densely over the box's surface."""
-    spheres = CollisionModel(kin, []).spheres(q)[LINKS >= 2]
+    spheres = CollisionModel(kin, []).spheres(q)[SPHERE_LINKS >= 2]
     axes = [np.linspace(c - s / 2, c + s / 2, 1 + round(s / 0.01)) for c, s in zip(box.center, box.size, strict=True)]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     gaps = np.linalg.norm(spheres[:, None, :3] - points[None], axis=2) - spheres[:, None, 3]
@@ -46,7 +46,7 @@ def test_distance_to_a_box_is_that_of_brute_force(q: FloatArray) -> None:
 def test_free_agrees_with_clearance(q: FloatArray, margin: float) -> None:
     other = CollisionModel(ArmKinematics(RigidTransform.from_translation([0.0, 0.35, 0.0])), []).spheres(HOME)
     grid = DistanceGrid.from_points(np.array([[0.3, -0.2, 0.3]]), np.full(3, -1.0), np.full(3, 1.0), 0.02)
-    model = CollisionModel(KIN, [BLOCK], camera_offset=(0, 0, 0.06), other_arm=other, grid=grid)
+    model = CollisionModel(KIN, [BLOCK], body=ArmBody(camera_offset=(0, 0, 0.06)), other_arm=other, grid=grid)
     distance, what = model.nearest(q)
     if distance < 0:
         assert not model.free(q, 0.0)
@@ -62,7 +62,7 @@ def test_the_sleeping_arms_of_the_thesis_cell_touch_nothing(known: KnownCell, bo
     for name, other in (("left", "right"), ("right", "left")):
         others = CollisionModel(arms[other], []).spheres(sleep[other])
         camera = (0.0, 0.0, 0.06) if name == "left" else None
-        model = CollisionModel(arms[name], boxes, camera_offset=camera, other_arm=others)
+        model = CollisionModel(arms[name], boxes, body=ArmBody(camera), other_arm=others)
         assert model.free(sleep[name], 0.02), model.nearest(sleep[name])
 
 
@@ -106,7 +106,7 @@ def test_a_carried_thing_counts() -> None:
     wall = Box(name="wall", center=(0.70, 0, 0.4), size=(0.02, 0.5, 0.5))
     stick = np.array([[0.14, 0.0, 0.0, 0.01]])  # ahead of the tool centre at x = 0.55
     assert CollisionModel(KIN, [wall]).free(FORWARD, 0.01)
-    assert not CollisionModel(KIN, [wall], carried=stick).free(FORWARD, 0.01)
+    assert not CollisionModel(KIN, [wall], body=ArmBody(carried=stick)).free(FORWARD, 0.01)
 
 
 def test_edge_sees_what_lies_between_its_free_ends() -> None:
@@ -122,5 +122,5 @@ def test_edge_sees_what_lies_between_its_free_ends() -> None:
 def test_spheres_move_with_their_links() -> None:
     q = np.array([0.4, -0.3, 0.2, 0.5, -0.6, 0.7])
     frames = KIN.link_frames(q)
-    expected = [frames[k] @ np.append(s[:3], 1.0) for k, s in zip(LINKS, SPHERES, strict=True)]
+    expected = [frames[k] @ np.append(s[:3], 1.0) for k, s in zip(SPHERE_LINKS, SPHERES, strict=True)]
     assert CollisionModel(KIN, []).spheres(q)[:, :3] == pytest.approx(np.array(expected)[:, :3])

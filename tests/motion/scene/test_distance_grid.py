@@ -2,7 +2,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from regrasp.motion.scene.distance_grid import FAR, DistanceGrid
+from regrasp.motion.scene.distance_grid import FREE_DISTANCE, DistanceGrid
 
 LOWER, UPPER, H = np.array([-0.2, 0.0, 0.1]), np.array([0.2, 0.3, 0.3]), 0.02
 
@@ -28,6 +28,6 @@ def test_never_farther_than_the_nearest_occupied_voxel(
 
 def test_nothing_occupied_is_far_and_points_outside_are_left_out() -> None:
     empty = DistanceGrid.from_points(np.array([[5.0, 5.0, 5.0]]), LOWER, UPPER, H)
-    assert np.all(empty.distance == FAR)
+    assert np.all(empty.distance == FREE_DISTANCE)
     assert empty.distance.shape == (20, 15, 10)
     assert empty.distance.dtype == np.float32

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from regrasp.app.tasks.cable.expectations import Expect, PoseError
 from regrasp.app.tasks.cable.judge import Judge
-from regrasp.behaviors.services import Belief, Notice
+from regrasp.behaviors.services import Belief, LossNotice
 from regrasp.interfaces.cause import CauseCode
 from regrasp.sim.cable.phase import STILL_SECONDS
 from regrasp.sim.ground_truth import GroundTruth
@@ -106,7 +106,7 @@ def test_an_end_that_slides_out_of_the_jaw_is_being_lost_before_the_pads_let_go(
     slides = run.go(0.2, in_hand=0.01)
     run.go(1.0, fingers=0)
     assert run.judge.losses == [pytest.approx(slides)]
-    run.belief.notices.append(Notice(slides + 0.1, "gap"))
+    run.belief.notices.append(LossNotice(slides + 0.1, "gap"))
     assert run.verdict("slips") == (True, 1)
     assert run.verdict("detection_delay") == (True, pytest.approx(0.1))
 
@@ -129,7 +129,7 @@ def test_what_slid_and_was_held_fast_again_is_lost_only_later() -> None:
 def test_a_false_alarm_is_no_notice_of_the_loss_that_it_brings_about() -> None:
     run = Run(Expect(slips=1))
     alarm = run.go(0.2, fingers=2)
-    run.belief.notices.append(Notice(alarm + 0.1, "gap"))
+    run.belief.notices.append(LossNotice(alarm + 0.1, "gap"))
     run.go(1.0, fingers=0)  # the robot opens its jaw
     assert run.verdict("slips") == (False, 0)
 
@@ -157,7 +157,11 @@ def test_each_loss_has_the_first_notice_before_the_next() -> None:
     first = run.go(1.0, fingers=0)
     run.go(1.0, fingers=2)
     second = run.go(1.0, fingers=0)
-    run.belief.notices += [Notice(0.5, "distance"), Notice(first + 0.2, "gap"), Notice(first + 0.4, "place")]
+    run.belief.notices += [
+        LossNotice(0.5, "distance"),
+        LossNotice(first + 0.2, "gap"),
+        LossNotice(first + 0.4, "place"),
+    ]
     one, two = run.judge.slips(run.belief)
     assert (one.released_at, one.detected_at) == pytest.approx((first, first + 0.2))
     assert one.detected_by == "gap"
@@ -172,7 +176,7 @@ def test_slips_are_met_when_every_loss_was_noticed_and_there_were_enough() -> No
     run.go(1.0, fingers=2)
     lost = run.go(1.0, fingers=0)
     assert run.verdict("slips") == (False, 0)
-    run.belief.notices.append(Notice(lost + 0.3, "gap"))
+    run.belief.notices.append(LossNotice(lost + 0.3, "gap"))
     assert run.verdict("slips") == (True, 1)
     run.go(1.0, fingers=2)
     run.go(1.0, fingers=0)  # a second one, unnoticed
@@ -259,7 +263,7 @@ def test_the_longest_delay_counts_and_an_unseen_loss_is_too_late() -> None:
         run.go(1.0, fingers=2)
         lost = run.go(1.0, fingers=0)
         assert run.verdict("detection_delay") == (False, None)
-        run.belief.notices.append(Notice(lost + delay, "gap"))
+        run.belief.notices.append(LossNotice(lost + delay, "gap"))
         assert run.verdict("detection_delay") == (met, pytest.approx(delay))
 
 

@@ -1,33 +1,51 @@
-"""Where the arms' bodies are, and what they must not touch."""
+"""The planning scene: where the arms are, and what they must not touch."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.cell import Connector, KnownCell, WristMount
 from regrasp.interfaces.devices import Arm, Gripper
 from regrasp.interfaces.frame import RgbdFrame
-from regrasp.motion.robots.kinematics import ArmKinematics
-from regrasp.motion.scene.collision import CollisionModel
+from regrasp.motion.robots.kinematics import ArmKinematics, FloatArray, InverseKinematicsParameters
+from regrasp.motion.scene.collision import ArmBody, CollisionModel, CollisionParameters
 from regrasp.motion.scene.distance_grid import DistanceGrid
 
-FloatArray = NDArray[np.float64]
-
 NO_POINTS = np.empty((0, 3))
-TOUCHING = 0.005  # m: seen points so near to a standing arm were none
-GRID_BORDER = 0.2  # m around the voxels: no sphere of an arm is thicker
-ARM_MARGIN = 0.025  # m round an arm where seen points are its own: 13 mm of depth, half a voxel's diagonal, 5 mm of arm
 
 
-class Bodies:
+@dataclass(frozen=True)
+class PlanningSceneParameters:
+    """How seen points become obstacles."""
+
+    # m round an arm where seen points are its own: 13 mm of depth error, half a voxel's diagonal, 5 mm of arm error
+    arm_margin: float = 0.025
+    touching: float = 0.005  # m; a seen point so near to a standing arm is no obstacle
+    grid_border: float = 0.2  # m round the voxels; no sphere of an arm is thicker
+    connector_padding: float = 1.2  # radii of the spheres that cover a carried connector, in its own radii; choice
+    sight_samples: int = 24  # points on a line of sight that must be free; choice
+    sight_range: tuple[float, float] = (0.15, 0.85)  # shares of a line of sight that are checked: not its ends; choice
+    collision: CollisionParameters = field(default_factory=CollisionParameters)
+    kinematics: InverseKinematicsParameters = field(default_factory=InverseKinematicsParameters)
+
+
+class PlanningScene:
     """The two arms as read, the cell as known, and the voxels and the cable as seen."""
 
-    def __init__(self, known: KnownCell, arms: Mapping[str, Arm], grippers: Mapping[str, Gripper]) -> None:
+    def __init__(
+        self,
+        known: KnownCell,
+        arms: Mapping[str, Arm],
+        grippers: Mapping[str, Gripper],
+        parameters: PlanningSceneParameters = PlanningSceneParameters(),
+    ) -> None:
         self.known, self.arms, self.grippers = known, arms, grippers
+        self._scene_parameters = parameters
         self.kinematics: dict[str, ArmKinematics] = {
-            spec.name: ArmKinematics(RigidTransform.from_translation(spec.base)) for spec in known.arms
+            spec.name: ArmKinematics(RigidTransform.from_translation(spec.base), parameters.kinematics)
+            for spec in known.arms
         }
         self._cameras: dict[str, WristMount] = {
             c.mount.arm: c.mount for c in known.cameras if isinstance(c.mount, WristMount)
@@ -35,21 +53,22 @@ class Bodies:
         self._boxes = known.solids()
         self._grid: DistanceGrid | None = None
         self._points = self._cable = NO_POINTS
-        self._spacing = 0.01
+        self._spacing = 0.01  # m, until the first voxels come
 
     def set_obstacles(self, points: FloatArray, spacing: float) -> None:
-        """Keep clear of occupied voxels from now on: centres (n, 3) m and edge m.
+        """Keep clear of occupied voxels from now on: centres (n, 3) m in the world, and the edge `spacing` m.
 
         Points where an arm is now, or sleeps, do not count: what was seen there was an arm.
         """
+        margin = self._scene_parameters.arm_margin
         self._points, self._spacing = points, spacing
         for spec in self.known.arms:
             for q in (self.joints(spec.name), np.array(spec.sleep)):
-                self._points = _away_from(self._points, self.model(spec.name, others=False).spheres(q), ARM_MARGIN)
+                self._points = _points_beyond(self._points, self.model(spec.name, others=False).spheres(q), margin)
         self._rebuild_grid()
 
     def keep_clear(self, points: FloatArray) -> None:
-        """Keep clear of these points (n, 3) m too, in place of an earlier call's: a cable, a stowed connector."""
+        """Keep clear of these points (n, 3) m too, a cable or a stowed connector; they replace an earlier call's."""
         self._cable = points
         self._rebuild_grid()
 
@@ -58,22 +77,24 @@ class Bodies:
         if not len(points):
             self._grid = None
             return
-        lower, upper = points.min(axis=0) - GRID_BORDER, points.max(axis=0) + GRID_BORDER
+        border = self._scene_parameters.grid_border
+        lower, upper = points.min(axis=0) - border, points.max(axis=0) + border
         self._grid = DistanceGrid.from_points(points, lower, upper, self._spacing)
 
     def start_model(
         self, arm: str, held: RigidTransform | None = None, *, clip: bool = True, opening: float | None = None
     ) -> CollisionModel:
-        """`model` for a motion that begins now: seen points that the arm touches where it stands were none.
+        """`model` for a motion that begins now; seen points that the arm touches where it stands are forgotten.
 
-        Voxels are coarse and cameras err by millimetres; a hand that came in beside an obstacle must get out again.
+        Voxels are coarse and cameras err by millimetres: a hand that came in beside an obstacle must get out again.
         """
         model = self.model(arm, held=held, clip=clip, opening=opening)
         distance, what = model.nearest(self.joints(arm))
-        if what == "seen surface" and distance < TOUCHING:
+        touching = self._scene_parameters.touching
+        if what == "seen surface" and distance < touching:
             spheres = model.spheres(self.joints(arm))
-            self._points = _away_from(self._points, spheres, TOUCHING + 2 * self._spacing)
-            self._cable = _away_from(self._cable, spheres, TOUCHING + 2 * self._spacing)
+            self._points = _points_beyond(self._points, spheres, touching + 2 * self._spacing)
+            self._cable = _points_beyond(self._cable, spheres, touching + 2 * self._spacing)
             self._rebuild_grid()
             model = self.model(arm, held=held, clip=clip, opening=opening)
         return model
@@ -87,7 +108,7 @@ class Bodies:
         return self.kinematics[arm].tool(self.joints(arm))
 
     def camera_pose(self, frame: RgbdFrame) -> RigidTransform:
-        """world_from_camera of a frame as the robot believes it."""
+        """world_from_camera of a frame, by the mount as known and the encoders as read at the exposure."""
         mount = self.known.camera(frame.camera).mount
         if isinstance(mount, WristMount):
             assert frame.joints is not None
@@ -110,8 +131,9 @@ class Bodies:
     ) -> CollisionModel:
         """What `arm` must not touch now.
 
-        `held` is tool_from_connector while it carries the connector; without `clip` the clip's bracket may be touched.
-        The jaw is as the fingers read, or `opening` m wide.
+        `held` is tool_from_connector while the arm carries the connector. Without `others` the other arm and the seen
+        surfaces do not count; without `clip` the clip's bracket may be touched. The jaw stands as the fingers read, or
+        `opening` m wide.
         """
         other = None
         if others:
@@ -119,20 +141,20 @@ class Bodies:
             other = self.model(name, others=False).spheres(self.joints(name))
         boxes = self._boxes if clip else [b for b in self._boxes if b not in self.known.clip.bracket]
         camera = self._cameras.get(arm)
-        return CollisionModel(
-            self.kinematics[arm],
-            boxes,
-            camera_offset=camera.offset if camera else None,
-            other_arm=other,
-            grid=self._grid if others else None,
-            carried=None if held is None else _connector_spheres(held, self.known.connector),
-            opening=self.grippers[arm].reading().gap if opening is None else opening,
+        padding = self._scene_parameters.connector_padding
+        body = ArmBody(
+            camera.offset if camera else None,
+            None if held is None else _connector_spheres(held, self.known.connector, padding),
+            self.grippers[arm].reading().gap if opening is None else opening,
         )
+        grid = self._grid if others else None
+        return CollisionModel(self.kinematics[arm], boxes, body, other, grid, self._scene_parameters.collision)
 
     def sees(self, world_from_camera: RigidTransform, points: FloatArray) -> bool:
         """Whether nothing known or seen stands between a camera and any of the points (n, 3) m."""
         eye = world_from_camera.translation
-        shares = np.linspace(0.15, 0.85, 24)[:, None, None]
+        first, last = self._scene_parameters.sight_range
+        shares = np.linspace(first, last, self._scene_parameters.sight_samples)[:, None, None]
         rays = (eye + shares * (points - eye)).reshape(-1, 3)
         for box in self._boxes:
             if np.any(np.all(np.abs(rays - box.center) < 0.5 * np.array(box.size), axis=1)):
@@ -140,14 +162,14 @@ class Bodies:
         return self._grid is None or bool(np.min(self._grid.at(rays)) > 0.0)
 
 
-def _connector_spheres(held: RigidTransform, connector: Connector) -> FloatArray:
-    """Spheres (3, 4) that cover a carried connector, in the tool frame."""
+def _connector_spheres(held: RigidTransform, connector: Connector, padding: float) -> FloatArray:
+    """Spheres (3, 4) m that cover a carried connector, in the tool frame; their radius is `padding` times its own."""
     along = (0.5 * connector.length - connector.radius) * np.array([-1.0, 0.0, 1.0])
     centers = held.apply(np.column_stack([along, np.zeros(3), np.zeros(3)]))
-    return np.column_stack([centers, np.full(3, 1.2 * connector.radius)])
+    return np.column_stack([centers, np.full(3, padding * connector.radius)])
 
 
-def _away_from(points: FloatArray, spheres: FloatArray, margin: float) -> FloatArray:
+def _points_beyond(points: FloatArray, spheres: FloatArray, margin: float) -> FloatArray:
     """The points (n, 3) further than `margin` m from the spheres (m, 4)."""
     distance = np.linalg.norm(points[:, None] - spheres[None, :, :3], axis=2)
     return points[np.all(distance > spheres[:, 3] + margin, axis=1)]

@@ -1,0 +1,162 @@
+"""Trajectory execution: lets arms follow and jaws open, watches them, and puts what does not follow out of order."""
+
+from collections.abc import Callable, Generator, Iterator, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from regrasp.interfaces.cause import CauseCode
+from regrasp.interfaces.devices import Arm, Clock, Gripper
+from regrasp.interfaces.trajectory import Trajectory
+from regrasp.motion.failure import PlanningError
+from regrasp.motion.planning.timing import TimingParameters, time_path
+from regrasp.motion.robots.arm_watch import ArmWatch, ArmWatchParameters, remaining_waypoints
+from regrasp.motion.robots.kinematics import FloatArray
+from regrasp.motion.task import MotionTask
+
+
+@dataclass(frozen=True)
+class JawParameters:
+    """How a jaw opens."""
+
+    open_gap: float = 0.05  # m between the pads: 15 mm to each side of the connector; poses err by about 8 mm
+    slack: float = 0.005  # m short of its gap that a jaw counts as open; choice
+    attempts: int = 3  # times that a jaw is told to open; choice
+    timeout: float = 1.0  # s that it has each time; choice
+
+
+@dataclass(frozen=True)
+class ExecutionParameters:
+    """How a trajectory's execution is judged and repeated."""
+
+    goal_tolerance: float = 0.05  # rad; an arm that rests further from its goal was blocked; choice
+    settle_time: float = 0.10  # s after a trajectory's end before the arm's position is judged; choice
+    arrival_timeout: float = 1.0  # s that a late arm then has to reach the goal; choice
+    attempts: int = 3  # times that an arm which does not follow is led on; choice
+    slowdown: float = 0.5  # factor on the speed for every attempt after the first; choice
+    retry_pause: float = 1.0  # s before the next attempt; what jams may come free
+    jaw: JawParameters = JawParameters()
+    watch: ArmWatchParameters = field(default_factory=ArmWatchParameters)
+    timing: TimingParameters = field(default_factory=TimingParameters)
+
+
+class Execution:
+    """Carries out motions of the arms on the simulated clock; planning one takes `latency` s.
+
+    An arm or jaw that fails is out of order: from then on every task of it fails with the same cause.
+    """
+
+    def __init__(
+        self,
+        arms: Mapping[str, Arm],
+        grippers: Mapping[str, Gripper],
+        clock: Clock,
+        latency: float,
+        parameters: ExecutionParameters = ExecutionParameters(),
+    ) -> None:
+        self.parameters = parameters
+        self.on_anomaly: Callable[[str], None] = lambda sentence: None  # told of an arm or a jaw that does not follow
+        self._arms, self._grippers, self._clock, self._latency = arms, grippers, clock, latency
+        self._watches = {name: ArmWatch(name, parameters.watch) for name in arms}
+        self._speed_share = dict.fromkeys(arms, 1.0)  # of the speed asked for; less for an arm that fell behind
+        self._out_of_order: dict[str, PlanningError] = {}
+
+    def task(self, arm: str, steps: Iterator[None]) -> MotionTask:
+        """The steps as a task of an arm. It raises the arm's cause at its first poll if that is out of order."""
+
+        def guarded() -> Iterator[None]:
+            if arm in self._out_of_order:
+                raise self._out_of_order[arm]
+            yield from steps
+
+        return MotionTask(guarded(), lambda: self.halt(arm))
+
+    def halt(self, arm: str) -> None:
+        """Stop an arm where it is."""
+        self._arms[arm].stop()
+        self._watches[arm].leave(None)
+
+    def give_up(self, arm: str, code: CauseCode, message: str) -> PlanningError:
+        """Put an arm or its jaw out of order with this cause; the error is for the caller to raise."""
+        self.on_anomaly(f"{message}: out of order")
+        self._out_of_order[arm] = PlanningError(code, message)
+        return self._out_of_order[arm]
+
+    def follow(self, arm: str, path: FloatArray, speed: float) -> Iterator[None]:
+        """Steps that bring an arm along a joint path (k, 6) rad, at `speed` in (0, 1] of the joints' limits.
+
+        An arm that falls behind is stopped and led on, slower each time. Raises PlanningError ARM_FAILED when it never
+        follows or reads what cannot be, and MOTION_BLOCKED when it ends off its goal.
+        """
+        moved = self._watches[arm].moved_alone(self._arms[arm].reading())
+        if moved is not None:
+            raise self.give_up(arm, CauseCode.ARM_FAILED, moved)
+        for _ in range(self.parameters.attempts):
+            trajectory = time_path(path, speed * self._speed_share[arm], self.parameters.timing)
+            yield from self._pause(self._latency)
+            trouble, elapsed = yield from self._run(arm, trajectory)
+            if trouble is None:
+                break
+            self.halt(arm)
+            self.on_anomaly(trouble)
+            self._speed_share[arm] *= self.parameters.slowdown
+            path = remaining_waypoints(path, trajectory.sample(elapsed)[0])
+            yield from self._pause(self.parameters.retry_pause)
+            path = np.vstack([self._joints(arm), path])
+        else:
+            raise self.give_up(arm, CauseCode.ARM_FAILED, f"{trouble}, {self.parameters.attempts} times")
+        yield from self._arrive(arm, path[-1])
+        self._watches[arm].leave(self._joints(arm))
+
+    def open_jaw(self, arm: str, gap: float) -> Iterator[None]:
+        """Steps that open a jaw until its fingers read `gap` m. Raises PlanningError GRIPPER_FAILED if they do not."""
+        gripper, jaw = self._grippers[arm], self.parameters.jaw
+        for _ in range(jaw.attempts):
+            gripper.open(jaw.open_gap)
+            end = self._clock.now() + jaw.timeout
+            while self._clock.now() < end - 1e-9:
+                if gripper.reading().gap >= gap:
+                    return
+                yield
+        message = f"the {arm} jaw stands {1e3 * gripper.reading().gap:.1f} mm open, told {jaw.attempts} times to open"
+        raise self.give_up(arm, CauseCode.GRIPPER_FAILED, f"{message} to {1e3 * jaw.open_gap:.0f} mm")
+
+    def _run(self, arm: str, trajectory: Trajectory) -> Generator[None, None, tuple[str | None, float]]:
+        """Let the arm follow; why it was found off the trajectory, if it was, and after how many seconds."""
+        watch, start = self._watches[arm], self._clock.now()
+        watch.begin()
+        watch.leave(None)
+        self._arms[arm].follow(trajectory)
+        while self._arms[arm].is_moving():
+            yield
+            reading, elapsed = self._arms[arm].reading(), self._clock.now() - start
+            jumped = watch.jumped(reading)
+            if jumped is not None:
+                self.halt(arm)
+                raise self.give_up(arm, CauseCode.ARM_FAILED, jumped)
+            trouble = watch.off_trajectory(reading, trajectory, elapsed)
+            if trouble is not None:
+                return trouble, elapsed
+        return None, trajectory.duration
+
+    def _arrive(self, arm: str, goal: FloatArray) -> Iterator[None]:
+        """Wait until the arm rests at `goal` (6,) rad. Raises PlanningError when it does not come there."""
+        yield from self._pause(self.parameters.settle_time)
+        end, tolerance = self._clock.now() + self.parameters.arrival_timeout, self.parameters.goal_tolerance
+        while self._goal_error(arm, goal) > tolerance and self._clock.now() < end - 1e-9:
+            yield
+        error = self._goal_error(arm, goal)
+        if error > tolerance:
+            message = f"the {arm} arm stopped {error:.2f} rad short of its goal, more than {tolerance:.2f}"
+            raise PlanningError(CauseCode.MOTION_BLOCKED, message)
+
+    def _goal_error(self, arm: str, goal: FloatArray) -> float:
+        return float(np.max(np.abs(self._joints(arm) - goal)))
+
+    def _joints(self, arm: str) -> FloatArray:
+        return self._arms[arm].reading().positions
+
+    def _pause(self, seconds: float) -> Iterator[None]:
+        end = self._clock.now() + seconds
+        while self._clock.now() < end - 1e-9:
+            yield

@@ -1,0 +1,77 @@
+"""Approaches to a connector: the grasps that may be taken, and how near to things each comes."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.spatial.transform import RigidTransform
+
+from regrasp.interfaces.cell import Connector
+from regrasp.motion.failure import PlanningError
+from regrasp.motion.grasping.grasps import ApproachParameters, Grasp, GraspParameters, choose_grasp, grasp_candidates
+from regrasp.motion.robots.kinematics import FloatArray
+from regrasp.motion.scene.collision import Clearances, CollisionModel
+
+
+@dataclass(frozen=True)
+class PickParameters:
+    """Which grasps are tried, and how many of them the planner may choose from."""
+
+    # m along the connector from its centre, tried in turn: near the cable the tip stays in sight
+    grip_offsets: tuple[float, ...] = (-0.02, -0.03, 0.0)
+    max_approaches: int = 12  # choice: each is a goal of the planner
+    standoff: float = 0.08  # m back along the tool, where the straight approach begins; choice
+    jaw_reach: float = 0.13  # m round a connector's centre where a jaw may be: half its length, a finger, 5 cm of palm
+    grasp: GraspParameters = field(default_factory=GraspParameters)
+
+
+def pick_candidates(
+    world_from_connector: RigidTransform,
+    connector: Connector,
+    shallow: float,
+    parameters: PickParameters = PickParameters(),
+) -> list[Grasp]:
+    """Grasps at every grip offset, cheapest first within each; see `grasp_candidates` for `shallow` m."""
+    return [
+        grasp
+        for offset in parameters.grip_offsets
+        for grasp in grasp_candidates(
+            world_from_connector, connector.length, connector.radius, offset, shallow, parameters.grasp
+        )
+    ]
+
+
+def find_approaches(
+    model: CollisionModel,
+    near: CollisionModel,
+    q: FloatArray,
+    candidates: Sequence[Grasp],
+    clearances: Clearances,
+    parameters: PickParameters = PickParameters(),
+) -> list[FloatArray]:
+    """Joint paths (k, 6) rad from standoff to grasp of the first candidates that work, about `max_approaches`.
+
+    All keep the greatest of the near margins with which any candidate works. `model` and `near` as in `choose_grasp`.
+    Raises PlanningError with a tally when no candidate works with any margin.
+    """
+    for near_margin in clearances.near_margins:
+        approach = ApproachParameters(parameters.standoff, clearances.margin, near_margin)
+        paths: list[FloatArray] = []
+        left = candidates
+        while left and len(paths) < parameters.max_approaches:
+            try:
+                choice = choose_grasp(model.kinematics, model, q, left, near, approach)
+            except PlanningError:
+                if not paths and near_margin == clearances.near_margins[-1]:
+                    raise
+                break
+            paths += choice.paths
+            left = left[left.index(choice.grasp) + 1 :]
+        if paths:
+            return paths
+    return []
+
+
+def points_beyond(points: FloatArray, place: FloatArray, radius: float) -> FloatArray:
+    """The points (n, 3) further than `radius` m from a place (3,)."""
+    return points[np.linalg.norm(points - place, axis=1) > radius]
