@@ -15,10 +15,10 @@ from scipy.stats import chi2
 
 from regrasp.app.files.whole_file import write_whole
 from regrasp.app.records.result import plain, versions
-from regrasp.app.studies.demo import wilson
 from regrasp.app.studies.pose.scenes import HEADLINE
 from regrasp.app.studies.pose.tasks import run_tasks
 from regrasp.app.studies.pose.trial import Setup
+from regrasp.app.studies.statistics import wilson_interval
 from regrasp.app.studies.table import print_table
 from regrasp.perception.pose.estimate import Estimate
 
@@ -159,7 +159,7 @@ def _line(name: str, found: dict[str, Any]) -> tuple[str, ...]:
     shares = []
     for key in ("position", "axis"):
         k, n = found[key]
-        low, high = wilson(k, n)
+        low, high = wilson_interval(k, n)
         shares += [f"{100 * k / n:.1f} %", f"{100 * low:.1f} to {100 * high:.1f} %"]
     k, n = found["estimates"]
     return name, f"{k}/{n}", *shares, f"{1e3 * found['mean_error_m']:.1f}", f"{found['median_axis_error_deg']:.1f}"

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from regrasp.app.studies.demo import wilson
 from regrasp.app.studies.pose.scenes import CONFIGURATIONS, HEADLINE
 from regrasp.app.studies.pose.trial import Trial
+from regrasp.app.studies.statistics import wilson_interval
 
 # Hwang 2024, table 5: mean error in mm of the RGB-D technique by the share hidden, in its configurations 3 and 6 to 9.
 THESIS_RGBD = {"3": 4.4, "6": 8.8, "7": 13.6, "8": 17.0, "9": 35.7}
@@ -62,7 +62,7 @@ def _shares(trials: Sequence[Trial], techniques: Sequence[str], thesis: Mapping[
             tried = [bool(getattr(t, what)) for t in own if getattr(t, what) is not None]
             if tried:
                 k, n = sum(tried), len(tried)
-                low, high = wilson(k, n)
+                low, high = wilson_interval(k, n)
                 axes.bar(number, 100 * k / n, WIDTH, yerr=[[100 * (k / n - low)], [100 * (high - k / n)]], capsize=4)
             if technique in thesis:
                 k, n = thesis[technique][what]

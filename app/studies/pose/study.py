@@ -14,12 +14,12 @@ from typing import Any
 
 from regrasp.app.files.whole_file import write_whole
 from regrasp.app.records.result import plain, versions
-from regrasp.app.studies.demo import wilson
 from regrasp.app.studies.pose.both_cameras import BOTH, run_both
 from regrasp.app.studies.pose.negatives import Negative, run_negatives
 from regrasp.app.studies.pose.scenes import CONFIGURATIONS, HEADLINE
 from regrasp.app.studies.pose.tasks import run_tasks
 from regrasp.app.studies.pose.trial import Setup, Trial, run_trials
+from regrasp.app.studies.statistics import wilson_interval
 from regrasp.app.studies.table import print_table
 
 # Hwang 2024, table 3: of 27 trials identified and grasped, mean error and its standard deviation in m.
@@ -171,7 +171,7 @@ def _share(pair: Sequence[int] | None) -> str:
 
 
 def _interval(pair: Sequence[int]) -> str:
-    low, high = wilson(*pair)
+    low, high = wilson_interval(*pair)
     return f"{100 * low:.0f} to {100 * high:.0f} %" if pair[1] else "-"
 
 

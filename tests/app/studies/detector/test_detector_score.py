@@ -4,6 +4,7 @@ import pytest
 from regrasp.app.studies.detector.score import (
     OCCLUSION,
     Answer,
+    ScoreParameters,
     average_precision,
     held_out_shots,
     occlusion_class,
@@ -57,9 +58,8 @@ def test_a_masks_box_has_the_pixels_edges() -> None:
     assert true_box(mask) == (9.5, 3.5, 19.5, 6.5)
 
 
-def test_held_out_pictures_fill_every_class(cell: Cell, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(
-        "regrasp.app.studies.detector.score.LEAST_SEEN", 6
-    )  # the cell of tests has pictures of a sixteenth
-    shots = held_out_shots(cell, 1, 1)
-    assert [occlusion_class(s) if s.mask.any() else None for s in shots] == [*range(len(OCCLUSION)), None]
+def test_held_out_pictures_fill_every_class(cell: Cell) -> None:
+    least = 6  # px: the cell of tests has pictures of a sixteenth
+    shots = held_out_shots(cell, 1, 1, parameters=ScoreParameters(min_visible_area=least))
+    classes = [occlusion_class(s, least) if s.mask.any() else None for s in shots]
+    assert classes == [*range(len(OCCLUSION)), None]
