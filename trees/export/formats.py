@@ -27,7 +27,7 @@ FORMATS: dict[str, Callable[[Node, Theme], str | bytes]] = {
     "png": _png,
     "svg": to_svg,
 }
-SUFFIXES = {
+FORMAT_OF_SUFFIX = {
     ".txt": "ascii",
     ".dot": "dot",
     ".gv": "dot",

@@ -7,7 +7,7 @@ keys become ports of its model; those of the main tree, which nobody calls, are 
 
 from xml.etree import ElementTree as ET
 
-from regrasp.trees.graph import Node, Port
+from regrasp.trees.graph import Node, NodePort
 
 _BUILT_IN = {"ForceFailure", "ForceSuccess", "Inverter", "Repeat", "RetryUntilSuccessful", "RunOnce"}
 _RENAMED = {
@@ -71,7 +71,7 @@ def _words(node: Node, is_main: bool) -> tuple[str, dict[str, str]]:
     return tag, {names.get(name, name): value for name, value in ports.items()} | policy
 
 
-def _value(port: Port, is_main: bool) -> str:
+def _value(port: NodePort, is_main: bool) -> str:
     return port.constant if is_main and port.constant is not None else str(port.value)
 
 
@@ -88,11 +88,11 @@ def _model(root: Node) -> ET.Element:
         entry = ET.SubElement(model, kind, {"ID": word})
         entry.extend(_port(port) for port in sorted(node.ports, key=lambda port: port.name))
         if node.policy:
-            entry.append(_port(Port("policy")))
+            entry.append(_port(NodePort("policy")))
     return model
 
 
-def _port(port: Port) -> ET.Element:
+def _port(port: NodePort) -> ET.Element:
     attributes = {"name": port.name, "type": _TYPES.get(port.type, "BT::AnyTypeAllowed")}
     if port.default is not None:
         attributes["default"] = port.default

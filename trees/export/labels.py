@@ -1,10 +1,10 @@
-"""What is written on a node, in words that the pictures share."""
+"""The texts on a node that the picture formats share."""
 
 from collections.abc import Iterator
 
-from regrasp.trees.graph import Kind, Node
+from regrasp.trees.graph import Node, NodeKind
 
-SYMBOLS: dict[Kind, str] = {"sequence": "→", "fallback": "?", "parallel": "⇉", "decorator": "δ"}
+SYMBOLS: dict[NodeKind, str] = {"sequence": "→", "fallback": "?", "parallel": "⇉", "decorator": "δ"}
 
 
 def heading(node: Node) -> str:
@@ -16,7 +16,7 @@ def heading(node: Node) -> str:
 def details(node: Node) -> list[str]:
     """Lines below the name: type (unless symbol or name say it), policy and ports; what is left out; a run's stats.
 
-    That a run never came to a node is for colours to say.
+    Colours, not texts, show that a run never visited a node.
     """
     said = node.type if _says_type(node) else ""
     about = " ".join(filter(None, [said, node.policy, node.subtree, *(port.text for port in node.given)]))

@@ -3,7 +3,7 @@
 from xml.sax.saxutils import escape, quoteattr
 
 from regrasp.trees.export.picture import picture
-from regrasp.trees.export.scene import Curve, Group, Lines, Rect, Scene, Shape
+from regrasp.trees.export.shapes import Curve, Drawing, Group, Lines, Rect, Shape
 from regrasp.trees.export.themes import Theme
 from regrasp.trees.graph import Node
 
@@ -15,14 +15,14 @@ def to_svg(root: Node, theme: Theme) -> str:
     return _document(picture(root, theme))
 
 
-def _document(scene: Scene) -> str:
-    width, height = _n(scene.width), _n(scene.height)
+def _document(drawing: Drawing) -> str:
+    width, height = _n(drawing.width), _n(drawing.height)
     lines = [
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" viewBox="0 0 {width} {height}"'
         f' role="img" font-family="{_FONTS}">',
-        f"<title>{escape(scene.title)}</title>",
-        f'<rect width="{width}" height="{height}" fill="{scene.background}"/>',
-        *map(_group, scene.groups),
+        f"<title>{escape(drawing.title)}</title>",
+        f'<rect width="{width}" height="{height}" fill="{drawing.background}"/>',
+        *map(_group, drawing.groups),
         "</svg>",
     ]
     return "\n".join(lines)
@@ -39,8 +39,8 @@ def _shape(shape: Shape) -> str:
         return f'<rect {place} rx="{_n(shape.radius)}" fill="{shape.fill}"{_stroke(shape)}/>'
     if isinstance(shape, Curve):
         (x0, y0), *others = shape.points
-        pulls = " ".join(f"{_n(x)},{_n(y)}" for x, y in others)
-        return f'<path d="M{_n(x0)},{_n(y0)} C{pulls}" fill="none"{_stroke(shape)}/>'
+        controls = " ".join(f"{_n(x)},{_n(y)}" for x, y in others)
+        return f'<path d="M{_n(x0)},{_n(y0)} C{controls}" fill="none"{_stroke(shape)}/>'
     if isinstance(shape, Lines):
         points = " ".join(f"{_n(x)},{_n(y)}" for x, y in shape.points)
         ends = ' stroke-linecap="round" stroke-linejoin="round"'

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from regrasp.trees.graph import Kind, Node
+from regrasp.trees.graph import Node, NodeKind
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,7 @@ class Theme:
     failed: str
     failed_surface: str
     icon: str  # on a kind's colour
-    kinds: Mapping[Kind, str]
+    kinds: Mapping[NodeKind, str]
 
 
 THEMES = {
