@@ -216,13 +216,13 @@ class ScriptedTree:
         self.tree.tick()
         return self.status
 
-    def run(self, until: int | None = None) -> Status:
+    def run(self, until: int | None = None, max_ticks: int = MAX_TICKS) -> Status:
         """Tick until the tree ends, or until tick number `until`; the root's status.
 
         Raises:
-            RuntimeError: without `until`, the tree has not ended after `MAX_TICKS`; the message says what still runs.
+            RuntimeError: without `until`, the tree has not ended after `max_ticks`; the message says what still runs.
         """
-        while self.ticks < (until or MAX_TICKS) and self.tick() is Status.RUNNING:
+        while self.ticks < (until or max_ticks) and self.tick() is Status.RUNNING:
             pass
         if until is None and self.status is Status.RUNNING:
             raise RuntimeError(

@@ -109,12 +109,12 @@ def evaluate_detector(
     if wrong:
         raise Findings(wrong)
     loaded = _load(cell)
-    from regrasp.app.studies.detector.score import answer, detector_figures, held_out_shots
+    from regrasp.app.studies.detector.score import detector_figures, held_out_shots, score_picture
 
     detector = _detector(loaded, model)
     with _progress("drawing held-out pictures", 5 * held_out) as tell:
         shots = held_out_shots(loaded, seed, held_out, report_progress=tell)
-    figures = detector_figures([answer(detector, shot, loaded, number) for number, shot in enumerate(shots)])
+    figures = detector_figures([score_picture(detector, shot, loaded, number) for number, shot in enumerate(shots)])
     if out is not None:
         out.parent.mkdir(parents=True, exist_ok=True)
         write_whole(out, json.dumps(figures, indent=2) + "\n")

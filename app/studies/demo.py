@@ -44,7 +44,7 @@ def run_demo(
     done, interrupted = run_all(runs, jobs, lambda rows: _write(out, rows, runs, overrides), settings, episode)
     rows = list(done.values())
     _write(out, rows, runs, overrides)
-    print_table(_HEADER, table(rows))
+    print_table(_HEADER, table_lines(rows))
     return 130 if interrupted else 0
 
 
@@ -72,7 +72,7 @@ def _write(out: Path | None, rows: list[Row], runs: Sequence[Run], overrides: Se
 _HEADER = ("case", "succeeded", "95 % interval", "median sim s", "median x real time", "max force N")
 
 
-def table(rows: Sequence[Row]) -> list[tuple[str, ...]]:
+def table_lines(rows: Sequence[Row]) -> list[tuple[str, ...]]:
     """The lines below the header: one for each case that has runs, in their order, and one for all runs."""
     groups: dict[str, list[Row]] = {}
     for row in rows:

@@ -39,10 +39,10 @@ _DEFAULTS = ScoreParameters()
 
 
 @dataclass(frozen=True)
-class Answer:
+class ScoredPicture:
     """The detections in one picture, likeliest first, and the ground truth."""
 
-    found: Sequence[Detection]
+    detections: Sequence[Detection]
     truth: Box | None = None  # around the connector's visible part; None: it is not in the picture
     occlusion: float = 0.0  # share of the connector that is hidden
     angle_error_deg: float | None = None  # of the axis in the image, for the right box; None: no such axis
@@ -50,51 +50,53 @@ class Answer:
     axis_error_deg: float | None = None  # of the pose's axis; None: no pose
     min_overlap: float = ScoreParameters.min_overlap  # from which a box is right
 
-    def right(self) -> list[bool]:
+    def correct(self) -> list[bool]:
         """For each detection whether it is the connector; a second box on the connector is wrong."""
         out: list[bool] = []
-        for detection in self.found:
+        for detection in self.detections:
             fits = self.truth is not None and overlap(detection.box, self.truth) >= self.min_overlap
             out.append(fits and not any(out))
         return out
 
     @property
-    def seen(self) -> bool:
+    def detected(self) -> bool:
         """Whether the connector was found with a score that counts."""
-        return any(right and d.score >= MIN_SCORE for d, right in zip(self.found, self.right(), strict=True))
+        return any(right and d.score >= MIN_SCORE for d, right in zip(self.detections, self.correct(), strict=True))
 
     @property
-    def false(self) -> int:
+    def false_positives(self) -> int:
         """The number of wrong boxes with a score that counts."""
-        return sum(d.score >= MIN_SCORE and not right for d, right in zip(self.found, self.right(), strict=True))
+        return sum(d.score >= MIN_SCORE and not right for d, right in zip(self.detections, self.correct(), strict=True))
 
 
-def average_precision(answers: Sequence[Answer]) -> float:
+def average_precision(pictures: Sequence[ScoredPicture]) -> float:
     r"""Area under the precision-recall curve, precision made non-increasing (all points, as in PASCAL VOC 2010).
 
     .. math:: AP = \sum_i (r_i - r_{i-1}) \max_{j \ge i} p_j
 
     with precision p and recall r after the i likeliest boxes of all pictures.
     """
-    return _area(np.vstack([np.empty((0, 2)), *map(_hits, answers)]), sum(a.truth is not None for a in answers))
+    return _area(np.vstack([np.empty((0, 2)), *map(_hits, pictures)]), sum(a.truth is not None for a in pictures))
 
 
 def precision_interval(
-    answers: Sequence[Answer], samples: int = ScoreParameters.bootstrap_samples
+    pictures: Sequence[ScoredPicture], samples: int = ScoreParameters.bootstrap_samples
 ) -> tuple[float, float]:
     """The 95 % interval of the average precision by the percentile bootstrap (Efron 1979): `samples` resamplings."""
-    hits, there = [_hits(a) for a in answers], np.array([a.truth is not None for a in answers])
+    hits, there = [_hits(a) for a in pictures], np.array([a.truth is not None for a in pictures])
     rng, areas = np.random.default_rng(0), []
     for _ in range(samples):
-        some = rng.integers(len(answers), size=len(answers))
+        some = rng.integers(len(pictures), size=len(pictures))
         areas.append(_area(np.concatenate([hits[i] for i in some]), int(there[some].sum())))
     low, high = np.quantile(areas, [0.025, 0.975]).tolist()
     return low, high
 
 
-def _hits(answer: Answer) -> NDArray[np.float64]:
+def _hits(picture: ScoredPicture) -> NDArray[np.float64]:
     """For each box its score, and 1 if it is right, else 0: (n, 2)."""
-    return np.array([(d.score, r) for d, r in zip(answer.found, answer.right(), strict=True)], float).reshape(-1, 2)
+    return np.array([(d.score, r) for d, r in zip(picture.detections, picture.correct(), strict=True)], float).reshape(
+        -1, 2
+    )
 
 
 def _area(hits: NDArray[np.float64], total: int) -> float:
@@ -155,47 +157,49 @@ def true_box(mask: NDArray[np.bool_]) -> Box | None:
     return u - 0.5, v - 0.5, u + width - 0.5, v + height - 0.5
 
 
-def answer(detector: Detector, shot: Shot, cell: Cell, number: int, parameters: ScoreParameters = _DEFAULTS) -> Answer:
-    """The detector's answer to a picture, with the errors of its pose. `number` seeds the depth noise."""
+def score_picture(
+    detector: Detector, shot: Shot, cell: Cell, number: int, parameters: ScoreParameters = _DEFAULTS
+) -> ScoredPicture:
+    """The detections in a picture, and the errors of the pose from it. `number` seeds the depth noise."""
     depth = DepthNoise(shot.camera, cell.hidden.errors, number).apply(shot.depth, 1)
     frame = RgbdFrame(shot.camera.name, number, 0.0, shot.rgb, depth, shot.camera.intrinsics)
     found, truth = detector.detect(frame, parameters.min_recorded_score), true_box(shot.mask)
     if truth is None:
-        return Answer(found)
-    out = Answer(found, truth, shot.occlusion, min_overlap=parameters.min_overlap)
-    if not out.seen:
+        return ScoredPicture(found)
+    out = ScoredPicture(found, truth, shot.occlusion, min_overlap=parameters.min_overlap)
+    if not out.detected:
         return out
-    best = found[out.right().index(True)]
+    best = found[out.correct().index(True)]
     axis = axis_in_image(shot)
     has_angle = float(np.hypot(*axis)) > parameters.min_in_plane
     turned = np.rad2deg(best.angle - np.arctan2(axis[1], axis[0]))
     angle_error = abs((turned + 90) % 180 - 90) if has_angle else None
     true_axis = shot.world_from_connector.rotation.apply([1.0, 0.0, 0.0])
     pose = detector.estimate(frame, shot.world_from_camera, axis=true_axis)
-    if not isinstance(pose, Estimate) or not out.right()[0]:
+    if not isinstance(pose, Estimate) or not out.correct()[0]:
         return replace(out, angle_error_deg=angle_error)
     error = tuple((pose.position - shot.world_from_connector.translation).tolist())
     axis_error = float(np.rad2deg(np.arccos(np.clip(pose.axis @ true_axis, -1, 1))))
     return replace(out, angle_error_deg=angle_error, position_error=error, axis_error_deg=axis_error)
 
 
-def detector_figures(answers: Sequence[Answer]) -> dict[str, Any]:
+def detector_figures(pictures: Sequence[ScoredPicture]) -> dict[str, Any]:
     """The figures of evaluation.json: shares as [right, all], quantiles in degrees and m."""
-    there = [a for a in answers if a.truth is not None]
-    empty = [a for a in answers if a.truth is None]
+    there = [a for a in pictures if a.truth is not None]
+    empty = [a for a in pictures if a.truth is None]
     classes = {f"{low:.0%}-{high:.0%}": [a for a in there if low <= a.occlusion < high] for low, high in OCCLUSION}
     angles = [a.angle_error_deg for a in there if a.angle_error_deg is not None]
     positions = np.array([a.position_error for a in there if a.position_error is not None]).reshape(-1, 3)
     axes = [a.axis_error_deg for a in there if a.axis_error_deg is not None]
     return {
         "schema": 1,
-        "ap50": average_precision(answers),
-        "ap50_interval": precision_interval(answers),
+        "ap50": average_precision(pictures),
+        "ap50_interval": precision_interval(pictures),
         "min_score": MIN_SCORE,
-        "recall": [sum(a.seen for a in there), len(there)],
-        "recall_by_occlusion": {name: [sum(a.seen for a in group), len(group)] for name, group in classes.items()},
-        "false_boxes": sum(a.false for a in answers),
-        "empty_pictures_with_a_box": [sum(a.false > 0 for a in empty), len(empty)],
+        "recall": [sum(a.detected for a in there), len(there)],
+        "recall_by_occlusion": {name: [sum(a.detected for a in group), len(group)] for name, group in classes.items()},
+        "false_boxes": sum(a.false_positives for a in pictures),
+        "empty_pictures_with_a_box": [sum(a.false_positives > 0 for a in empty), len(empty)],
         "angle_error_deg": _quantiles(angles),
         "position_error_m": _quantiles(np.linalg.norm(positions, axis=1)),
         "position_deviation_m": _deviation(positions.ravel()),

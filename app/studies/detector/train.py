@@ -17,13 +17,19 @@ import torch
 from torch import nn
 
 from regrasp.app.studies.detector.data import AugmentationParameters, Pictures, draw_crop, target_maps
-from regrasp.app.studies.detector.score import Answer, ScoreParameters, average_precision, true_box
+from regrasp.app.studies.detector.score import ScoredPicture, ScoreParameters, average_precision, true_box
 from regrasp.perception.pose.detector import HEIGHT, INPUT, WIDTH, decode, network_input
 
-CHANNELS = (16, 32, 64, 96)  # at strides 4 to 32
-DEPTHS = (1, 3, 3)  # convolutions at strides 8 to 32, after the one that halves the resolution
-HEAD_CHANNELS = 32  # on the way up and in the head; choice: all in all 3.2 ms of processor time per picture
 OPSET = 17  # of ONNX; choice: OpenCV 5 reads it
+
+
+@dataclass(frozen=True)
+class NetworkParameters:
+    """The size of the network."""
+
+    channels: tuple[int, ...] = (16, 32, 64, 96)  # at strides 4 to 32; choice
+    depths: tuple[int, ...] = (1, 3, 3)  # convolutions at strides 8 to 32, after the one that halves the resolution
+    head_channels: int = 32  # on the way up and in the head; choice: 3.2 ms of processor time per picture in all
 
 
 @dataclass(frozen=True)
@@ -58,18 +64,19 @@ class Network(nn.Module):
     the processor time.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, parameters: NetworkParameters = NetworkParameters()) -> None:
         super().__init__()
-        half = CHANNELS[0] // 2
-        self.stem = nn.Sequential(_convolution(13, half, kernel=1), _convolution(half, CHANNELS[0], 2))
+        channels, head = parameters.channels, parameters.head_channels
+        half = channels[0] // 2
+        self.stem = nn.Sequential(_convolution(13, half, kernel=1), _convolution(half, channels[0], 2))
         self.down = nn.ModuleList(
             nn.Sequential(_convolution(a, b, 2), *(_convolution(b, b) for _ in range(depth)))
-            for (a, b), depth in zip(pairwise(CHANNELS), DEPTHS, strict=True)
+            for (a, b), depth in zip(pairwise(channels), parameters.depths, strict=True)
         )
-        self.side = nn.ModuleList(_convolution(channels, HEAD_CHANNELS, kernel=1) for channels in CHANNELS[1:])
-        last = nn.Conv2d(HEAD_CHANNELS, 7, 1)
+        self.side = nn.ModuleList(_convolution(count, head, kernel=1) for count in channels[1:])
+        last = nn.Conv2d(head, 7, 1)
         nn.init.constant_(last.bias[:1], -4.0)  # a likelihood of 2 % at first: few cells hold a connector
-        self.head = nn.Sequential(_convolution(HEAD_CHANNELS, HEAD_CHANNELS), last)
+        self.head = nn.Sequential(_convolution(head, head), last)
 
     def forward(self, x: torch.Tensor) -> torch.Tensor:
         """See the class."""
@@ -181,7 +188,7 @@ def read_weights(model: bytes) -> Weights:
 
 @torch.no_grad()
 def load_weights(network: Network, weights: Weights, inputs: torch.Tensor) -> None:
-    """Give the network these weights; it then answers as the file from which they were read.
+    """Give the network these weights; it then scored as the file from which they were read.
 
     A file holds each convolution and its batch normalization fused into one. They are split again: the normalization
     gets the mean and variance of the convolution's output for `inputs` (n, 13, h / 2, w / 2), and scale and bias that
@@ -253,11 +260,11 @@ def _inputs(pictures: Pictures, which: slice) -> torch.Tensor:
 def _precision(network: Network, pictures: Pictures) -> float:
     """Average precision on whole pictures, without those where too little of the connector is visible."""
     network.eval()
-    answers = []
+    scored = []
     for i, mask in enumerate(pictures.masks >= 128):
         if 0 < cv2.countNonZero(mask.astype(np.uint8)) < AugmentationParameters.min_visible_area:
             continue
         maps = network(_inputs(pictures, slice(i, i + 1)))[0].numpy()
-        answers.append(Answer(decode(maps, 1.0, ScoreParameters.min_recorded_score), true_box(mask)))
+        scored.append(ScoredPicture(decode(maps, 1.0, ScoreParameters.min_recorded_score), true_box(mask)))
     network.train()
-    return average_precision(answers)
+    return average_precision(scored)

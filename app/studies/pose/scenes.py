@@ -44,8 +44,6 @@ class SceneParameters:
     bisection_steps: int = 40  # choice: from 0.4 m to far less than a pixel
 
 
-# N m2; choice: a tenth of the cell's, whose cable, bent into these poses, presses on the stand with up to 7 N
-CABLE_STIFFNESS = 0.005
 _DEFAULTS = SceneParameters()
 
 
@@ -81,13 +79,16 @@ CONFIGURATIONS = {c.name: c for c in _ALL}
 HEADLINE = tuple(c.name for c in _ALL if not c.shadow)
 
 
-def study_cell(name: str = "thesis", overrides: Sequence[str] = ()) -> Cell:
+def study_cell(name: str = "thesis", overrides: Sequence[str] = (), cable_stiffness: float = 0.005) -> Cell:
     """The cell of that name or file, with a softer cable and with overrides such as "key.path=value".
+
+    `cable_stiffness` in N m2, by default a tenth of the cell's: the cell's own cable, bent into these poses, would
+    press on the stand with up to 7 N.
 
     Raises:
         Findings: no such cell, or something wrong in it or in the overrides.
     """
-    assignments, wrong = read([f"hidden.cable.stiffness.zero={CABLE_STIFFNESS}", *overrides])
+    assignments, wrong = read([f"hidden.cable.stiffness.zero={cable_stiffness}", *overrides])
     if wrong:
         raise Findings(wrong)
     return load_cell(resolve("cell", name, Path()), assignments)
