@@ -1,4 +1,4 @@
-"""Tree files, and what loads, checks, shows and exports them."""
+"""Loads, checks, shows and exports tree files."""
 
 from regrasp.trees.check import TreeFinding, check_tree
 from regrasp.trees.element import TreeSyntaxError

@@ -1,4 +1,4 @@
-"""A tree as text to look at."""
+"""A tree as indented text."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -18,7 +18,7 @@ def show_tree(path: Path) -> str:
 
 
 def to_ascii(root: Node) -> str:
-    """The tree with its subtrees filled in, a line a node: name, type, memory or policy, ports; of a run, its stats."""
+    """The tree with its subtrees expanded, one line per node: name, type, memory or policy, ports, a run's stats."""
     return "\n".join([_label(root), *_below(root, "")])
 
 

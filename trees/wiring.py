@@ -52,7 +52,7 @@ class ExpandedNode:
 
 @dataclass(frozen=True)
 class _Source:
-    """What a key stands for: a blackboard path, or a constant."""
+    """The source of a value: a blackboard path, or a constant."""
 
     text: str
     is_constant: bool
@@ -60,13 +60,13 @@ class _Source:
 
 @dataclass(frozen=True)
 class _Scope:
-    """One subtree instance: its namespace, and the keys that its caller maps."""
+    """One subtree instance: its namespace, and the keys that the SubTree element maps."""
 
     namespace: str
     keys: Mapping[str, _Source]
 
     def source(self, value: str) -> _Source:
-        """What an attribute's value stands for; braces that make no key are a finding elsewhere."""
+        """The source of an attribute's value; malformed braces count as a constant, `check_tree` reports them."""
         try:
             key = key_of(value)
         except ValueError:
@@ -76,7 +76,7 @@ class _Scope:
         return self.keys.get(key, _Source(f"{self.namespace}/{key}", is_constant=False))
 
     def inner(self, tree: Element, call: Element | None = None) -> "_Scope":
-        """The scope of a subtree that is called here; without a call, that of the main tree."""
+        """The scope of a subtree that is included here by `call`; without a call, that of the main tree."""
         values = {**tree.attributes, **(call.attributes if call else {})}
         keys = {name: self.source(value) for name, value in values.items() if name not in ("ID", "name")}
         return _Scope(f"{self.namespace}/{call.name}" if call else "", keys)

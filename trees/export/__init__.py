@@ -1,4 +1,4 @@
-"""Trees in other forms: pictures, text for other programs, and what other editors open."""
+"""Exports trees: as pictures, as text for other programs, and as files of other editors."""
 
 from regrasp.trees.export.formats import FORMAT_OF_SUFFIX, FORMATS, export_tree
 from regrasp.trees.export.themes import THEMES

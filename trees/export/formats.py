@@ -1,4 +1,4 @@
-"""The formats by name."""
+"""The export formats by name and by file suffix."""
 
 from collections.abc import Callable
 
@@ -41,7 +41,7 @@ FORMAT_OF_SUFFIX = {
 
 
 def export_tree(root: Node, name: str, theme: str = "light") -> bytes:
-    """The tree in the format of that name, text as UTF-8 with an end of line.
+    """The tree in the format of that name; text is UTF-8 and ends with a newline.
 
     Raises:
         KeyError: no such format or theme.

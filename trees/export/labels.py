@@ -14,7 +14,7 @@ def heading(node: Node) -> str:
 
 
 def details(node: Node) -> list[str]:
-    """Lines below the name: type (unless symbol or name say it), policy and ports; what is left out; a run's stats.
+    """Lines below the name: type (unless symbol or name say it), policy and ports; hidden nodes; a run's stats.
 
     Colours, not texts, show that a run never visited a node.
     """
@@ -26,7 +26,7 @@ def details(node: Node) -> list[str]:
 
 
 def tooltip(node: Node) -> str:
-    """All that is known of a node, a fact a line."""
+    """Everything known about a node, one fact per line."""
     memory = {True: " with memory", False: " without memory", None: ""}[node.memory]
     facts = [node.path, f"{node.type}{memory}", node.policy, node.subtree]
     facts += [f"{port.direction} {port.text}" for port in node.given]
@@ -46,7 +46,7 @@ def identifiers(root: Node) -> dict[str, str]:
 
 
 def links(root: Node) -> Iterator[tuple[Node, Node]]:
-    """Each node with each of its children; a subtree stands for the top node inside it."""
+    """Each node with each of its children; in place of a subtree the top node inside it."""
     for parent in root.walk():
         if parent.kind != "subtree":
             for child in parent.children:

@@ -188,7 +188,7 @@ def read_weights(model: bytes) -> Weights:
 
 @torch.no_grad()
 def load_weights(network: Network, weights: Weights, inputs: torch.Tensor) -> None:
-    """Give the network these weights; it then scored as the file from which they were read.
+    """Give the network these weights; it then gives the same maps as the file from which they were read.
 
     A file holds each convolution and its batch normalization fused into one. They are split again: the normalization
     gets the mean and variance of the convolution's output for `inputs` (n, 13, h / 2, w / 2), and scale and bias that
