@@ -16,7 +16,8 @@ import onnx.numpy_helper
 import torch
 from torch import nn
 
-from regrasp.app.studies.detector.data import AugmentationParameters, Pictures, draw_crop, target_maps
+from regrasp.app.studies.detector.crops import AugmentationParameters, draw_crop, target_maps
+from regrasp.app.studies.detector.data import Pictures
 from regrasp.app.studies.detector.score import ScoredPicture, ScoreParameters, average_precision, true_box
 from regrasp.perception.pose.detector import HEIGHT, INPUT, WIDTH, decode, network_input
 

@@ -6,14 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from regrasp.app.studies.detector.data import (
-    AugmentationParameters,
-    Pictures,
-    Target,
-    draw_crop,
-    make_pictures,
-    target_maps,
-)
+from regrasp.app.studies.detector.crops import AugmentationParameters, Target, draw_crop, target_maps
+from regrasp.app.studies.detector.data import Pictures, make_pictures
 from regrasp.interfaces.cell import Cell
 from regrasp.perception.pose.detector import decode
 
@@ -56,8 +50,8 @@ def test_crops_depend_on_the_generator_alone(pictures: Pictures) -> None:
 
 def test_crops_keep_the_connector_in_its_box(pictures: Pictures, monkeypatch: pytest.MonkeyPatch) -> None:
     """A white connector in a black picture reaches all four edges of its box, and no pixel of it is outside."""
-    monkeypatch.setattr("regrasp.app.studies.detector.data._cut_out", lambda *_: None)
-    monkeypatch.setattr("regrasp.app.studies.detector.data._recolored", lambda image, *_: image)
+    monkeypatch.setattr("regrasp.app.studies.detector.crops._cut_out", lambda *_: None)
+    monkeypatch.setattr("regrasp.app.studies.detector.crops._recolored", lambda image, *_: image)
     white = replace(pictures, images=np.zeros_like(pictures.images))
     white.images[pictures.masks >= 128] = 255
     compared = 0
