@@ -159,8 +159,8 @@ def _cut_out(
     height, width = HEIGHT // parameters.cutout_fraction, WIDTH // parameters.cutout_fraction
     for _ in range(parameters.cutouts):
         u, v = rng.integers(0, image.shape[0], 2)
-        covered = slice(v, v + height), slice(u, u + width)
-        image[covered], mask[covered] = rng.integers(0, 256, 3), 0
+        cutout = slice(v, v + height), slice(u, u + width)
+        image[cutout], mask[cutout] = rng.integers(0, 256, 3), 0
         depth_ratio = rng.choice([0.0, rng.uniform(*parameters.cutout_depth)])
         sizes[v // 2 : (v + height) // 2, u // 2 : (u + width) // 2] = depth_ratio * sizes[v // 2, u // 2]
 

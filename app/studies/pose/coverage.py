@@ -77,7 +77,7 @@ def cover_scene(setup: Setup, configuration: str, seed: int, frame_count: int = 
     """Each technique in the first frames of a scene; it is made anew for every frame."""
     with setup.scene(configuration, seed) as scene:
         frames, truth = list(scene.frames(frame_count)), scene.truth.connector_pose()
-        covered = []
+        scenes = []
         for name in setup.techniques:
             results = [setup.technique(name).estimate(frame, scene.world_from_camera) for frame in frames]
             found = tuple(
@@ -85,8 +85,8 @@ def cover_scene(setup: Setup, configuration: str, seed: int, frame_count: int = 
                 for e in results
                 if isinstance(e, Estimate)
             )
-            covered.append(SceneCoverage(name, len(frames), found))
-    return covered
+            scenes.append(SceneCoverage(name, len(frames), found))
+    return scenes
 
 
 def mahalanobis_sq(estimate: Estimate, truth: RigidTransform) -> tuple[float, float]:
