@@ -1,4 +1,4 @@
-"""`make bench`: what our parts cost beside the bare calls under them, timed in turn in one process."""
+"""`make bench`: the time that our functions take against the bare library calls in them, measured in one process."""
 
 import io
 import statistics
@@ -38,23 +38,23 @@ from regrasp.trees.scripted import ScriptedTree
 Call = Callable[[], Any]
 
 
-def main() -> None:
-    """Print a table: milliseconds of ours and of the other, and their ratio."""
-    cv2.setNumThreads(1)  # a robot has other work for its cores
+def print_bench() -> None:
+    """Print a table: milliseconds of our call and of the other, and their ratio."""
+    cv2.setNumThreads(1)  # as on a robot, whose other cores have other work
     scenario = load_scenario("no_obstacle")
     world = World(scenario.cell, "zero", 0)
     try:
         rows = {
-            "shipped trees checked / parsed by py_trees": checks(),
-            "tick of the recovery tree with logs / bare": ticks(),
-            "cable torques by numba / numpy and scipy": springs(scenario.cell.hidden.cable.links),
-            f"848x480 picture by {world.renderer.name} / TinyRenderer": pictures(world),
-            **looks(scenario.cell, 848),
-            **looks(scenario.cell, 640),
-            "848x480 tag to pose / bare OpenCV calls": tags(848),
-            "640x480 tag to pose / bare OpenCV calls": tags(640),
-            **detections(scenario.cell, 848),
-            **detections(scenario.cell, 640),
+            "shipped trees checked / parsed by py_trees": tree_checks(),
+            "tick of the recovery tree with logs / bare": tree_ticks(),
+            "cable torques by numba / numpy and scipy": cable_torques(scenario.cell.hidden.cable.links),
+            f"848x480 picture by {world.renderer.name} / TinyRenderer": rendered_pictures(world),
+            **color_techniques(scenario.cell, 848),
+            **color_techniques(scenario.cell, 640),
+            "848x480 tag to pose / bare OpenCV calls": tag_techniques(848),
+            "640x480 tag to pose / bare OpenCV calls": tag_techniques(640),
+            **detector_stages(scenario.cell, 848),
+            **detector_stages(scenario.cell, 640),
         }
         print_table(("pair", "ours ms", "other ms", "ratio"), [_line(name, *pair) for name, pair in rows.items()])
     finally:
@@ -62,12 +62,12 @@ def main() -> None:
 
 
 def _line(name: str, ours: Call, other: Call) -> tuple[str, ...]:
-    a, b = in_turn(ours, other)
+    a, b = interleaved(ours, other)
     return name, f"{1e3 * a:.3f}", f"{1e3 * b:.3f}", f"{a / b:.2f}"
 
 
-def in_turn(ours: Call, other: Call, seconds: float = 2.0) -> tuple[float, float]:
-    """Median seconds of a call of each, called in turn for so long (five times at least), so that load hits both."""
+def interleaved(ours: Call, other: Call, seconds: float = 2.0) -> tuple[float, float]:
+    """Median seconds of each call. They run in turn for `seconds`, at least five times, so that load hits both."""
     ours(), other()  # compiles, fills caches
     took: tuple[list[float], list[float]] = ([], [])
     end = time.perf_counter() + seconds
@@ -79,14 +79,14 @@ def in_turn(ours: Call, other: Call, seconds: float = 2.0) -> tuple[float, float
     return statistics.median(took[0]), statistics.median(took[1])
 
 
-def ticks() -> tuple[Call, Call]:
-    """The recovery tree on scripted leaves with and without the logs: it loses, searches, stows, and begins anew."""
+def tree_ticks() -> tuple[Call, Call]:
+    """The recovery tree with scripted leaves, with and without logs: it loses, searches, stows, and starts again."""
     script = {"DetectSlip": "8 failure, running", "Carry": "20 success"}
     script |= {"Holding": "success, failure", "CheckCameras": "3 failure"}
 
     def tree() -> py_trees.trees.BehaviourTree:
         made = ScriptedTree(shipped("tree")["recovery"], script, default="5 success").tree
-        made.visitors.clear()  # its table
+        made.visitors.clear()  # its tick table
         return made
 
     logged, bare = tree(), tree()
@@ -95,8 +95,8 @@ def ticks() -> tuple[Call, Call]:
     return logged.tick, bare.tick
 
 
-def checks() -> tuple[Call, Call]:
-    """All shipped trees, checked in full and built by py_trees' parser, which checks little."""
+def tree_checks() -> tuple[Call, Call]:
+    """All shipped trees: our full check, and py_trees' parser, which checks little."""
     paths = list(shipped("tree").values())
 
     def parse() -> None:
@@ -107,8 +107,8 @@ def checks() -> tuple[Call, Call]:
     return lambda: [check_tree(path, LEAVES) for path in paths], parse
 
 
-def springs(links: int) -> tuple[Call, Call]:
-    """Torques of a bent cable."""
+def cable_torques(links: int) -> tuple[Call, Call]:
+    """The spring and damper torques of a bent cable with so many links."""
     rng = np.random.default_rng(0)
     rotations = Rotation.from_rotvec(0.1 * rng.normal(size=(links, 3))).as_quat(canonical=True)
     rates, stiffness, damping = rng.normal(size=(links, 3)), np.full(links, 2.0), np.full(links, 0.01)
@@ -121,7 +121,7 @@ def springs(links: int) -> tuple[Call, Call]:
     return lambda: spring_torques(rotations, rates, stiffness, damping), plain
 
 
-def pictures(world: World) -> tuple[Call, Call]:
+def rendered_pictures(world: World) -> tuple[Call, Call]:
     """The rear camera's picture by the world's renderer and by PyBullet's software renderer."""
     tiny = make_renderer(world.visuals, "tiny")
     spec = world.cell.known.camera("rear")
@@ -134,7 +134,7 @@ def pictures(world: World) -> tuple[Call, Call]:
 
 
 def rear_frame(cell: Cell, width: int) -> tuple[RgbdFrame, RigidTransform]:
-    """The rear camera's first frame with `width` x 480 pixels, and its pose as the robot believes it."""
+    """The rear camera's first frame with `width` x 480 pixels, and its nominal pose."""
     spec = cell.known.camera("rear").model_copy(update={"width": width})
     cameras = (spec, cell.known.camera("wrist"))
     world = World(cell.model_copy(update={"known": cell.known.model_copy(update={"cameras": cameras})}), "zero", 0)
@@ -146,10 +146,10 @@ def rear_frame(cell: Cell, width: int) -> tuple[RgbdFrame, RigidTransform]:
     return frame, spec.mount.world_from_camera  # type: ignore[union-attr]
 
 
-def tags(width: int) -> tuple[Call, Call]:
-    """The connector's pose by its tag in a rear frame of `width` x 480 pixels, and OpenCV's own share of it.
+def tag_techniques(width: int) -> tuple[Call, Call]:
+    """The connector's pose by its tag in a rear frame of `width` x 480 pixels, and the bare OpenCV calls in it.
 
-    That is the search, the fit of the edges, and both poses.
+    These are the search for the tag, the fit of its edges, and its two poses.
     """
     cell = load_cell(shipped("cell")["thesis_tags"])
     frame, pose = rear_frame(cell, width)
@@ -179,10 +179,10 @@ def tags(width: int) -> tuple[Call, Call]:
     return lambda: technique.estimate(frame, pose), bare
 
 
-def looks(cell: Cell, width: int) -> dict[str, tuple[Call, Call]]:
-    """The connector's pose from a rear frame of `width` x 480 pixels, and stages of it; OpenCV's own share of each.
+def color_techniques(cell: Cell, width: int) -> dict[str, tuple[Call, Call]]:
+    """The connector's pose by its colour in a rear frame of `width` x 480 pixels, stages of it, and bare OpenCV calls.
 
-    That is colour space, range, dilation and contours of the whole picture.
+    These are colour space, range, dilation and contours of the whole picture.
     """
     frame, pose = rear_frame(cell, width)
     known, color = cell.known, SegmentationParameters.for_color(cell.known.connector.color)
@@ -205,28 +205,28 @@ def looks(cell: Cell, width: int) -> dict[str, tuple[Call, Call]]:
     return {f"{width}x480 {name} / bare OpenCV calls": (call, bare) for name, call in ours.items()}
 
 
-def detections(cell: Cell, width: int) -> dict[str, tuple[Call, Call]]:
-    """The connector's pose by the network from a rear frame of `width` x 480 pixels, and stages; the network alone."""
+def detector_stages(cell: Cell, width: int) -> dict[str, tuple[Call, Call]]:
+    """The detector's pose from a rear frame of `width` x 480 pixels, its stages, and the network alone."""
     (frame, pose), detector = rear_frame(cell, width), Detector(cell.known)
     network = cv2.dnn.readNetFromONNX(np.frombuffer(shipped_network(), np.uint8))
 
-    def seen() -> Any:
+    def make_input() -> Any:
         return network_input(fitted(frame.rgb)[0], pixel_sizes(frame.depth, frame.intrinsics))[None]
 
-    blob = seen()
+    inputs = make_input()
 
     def bare() -> Any:
-        network.setInput(blob)
+        network.setInput(inputs)
         return network.forward()
 
     assert not isinstance(detector.estimate(frame, pose), NoEstimate)
     ours: dict[str, Call] = {
         "detector": lambda: detector.estimate(frame, pose),
-        "detector, its network's input": seen,
+        "detector, its network's input": make_input,
         "detector, found but not placed": lambda: detector.detect(frame),
     }
     return {f"{width}x480 {name} / its network's bare forward": (call, bare) for name, call in ours.items()}
 
 
 if __name__ == "__main__":
-    main()
+    print_bench()

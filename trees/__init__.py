@@ -1,6 +1,6 @@
-"""Tree files, and what loads, checks, shows and exports them."""
+"""Loads, checks, shows and exports tree files."""
 
-from regrasp.trees.check import Finding, check_tree
+from regrasp.trees.check import TreeFinding, check_tree
 from regrasp.trees.element import TreeSyntaxError
 from regrasp.trees.graph import Node, collapsed, read_graph, recorded
 from regrasp.trees.inputs import check_inputs
@@ -11,10 +11,10 @@ from regrasp.trees.show import show_tree
 
 __all__ = [
     "Execution",
-    "Finding",
     "Node",
     "NodeStats",
     "TreeError",
+    "TreeFinding",
     "TreeSyntaxError",
     "check_inputs",
     "check_tree",

@@ -1,22 +1,22 @@
-"""What a tree file may say, as text to read: every leaf and built-in element with its attributes."""
+"""Every leaf and built-in element of tree files with its attributes, as text."""
 
 from collections.abc import Iterator, Mapping
 
-from regrasp.trees.vocabulary import BUILT_IN, Attribute, Kind, kinds
+from regrasp.trees.vocabulary import BUILT_IN, Attribute, ElementKind, element_kinds
 
-_SUBTREE = Kind(
+_SUBTREE = ElementKind(
     {"ID": Attribute(str, about="the BehaviorTree to put here; every other attribute sets a key of it")},
     about="Another BehaviorTree of the file, with keys of its own.",
 )
 
 
-def words(leaves: Mapping[str, type]) -> dict[str, Kind]:
+def all_elements(leaves: Mapping[str, type]) -> dict[str, ElementKind]:
     """Every element that a tree may hold: the leaves, then the built-in ones."""
-    known = kinds(leaves)
+    known = element_kinds(leaves)
     return {tag: known[tag] for tag in leaves} | BUILT_IN | {"SubTree": _SUBTREE}
 
 
-def describe(tag: str, kind: Kind, full: bool = False) -> Iterator[str]:
+def describe(tag: str, kind: ElementKind, full: bool = False) -> Iterator[str]:
     """Lines: the element with the first line of what it does (or all of it), then each attribute."""
     about = kind.about.splitlines() or [""]
     yield f"{tag:<18} {about[0]}".rstrip()

@@ -1,7 +1,7 @@
-"""Everything wrong with a tree file, before it runs.
+"""Checks a tree file before it runs, and finds everything that is wrong with it.
 
-py_trees' own parser stops at the first error, has no line numbers and lets much pass: memory that is not stated, words
-that it does not know, empty composites, ports without a value.
+py_trees' own parser stops at the first error, gives no line numbers, and accepts much that is wrong: memory that is not
+stated, unknown attributes, empty composites, ports without a value.
 """
 
 import re
@@ -12,20 +12,24 @@ from pathlib import Path
 from regrasp.interfaces.quote import cut, quoted
 from regrasp.trees.element import Element, TreeSyntaxError, key_of, read_elements
 from regrasp.trees.flow import check_flow
-from regrasp.trees.vocabulary import COUNTERPARTS, Kind, Names, kinds, nearest
-from regrasp.trees.wiring import Filled, TooLarge
+from regrasp.trees.vocabulary import COUNTERPARTS, CellNames, ElementKind, element_kinds, suggestion
+from regrasp.trees.wiring import ExpandedTree, TreeTooLarge
 
-Finding = tuple[int, str]  # line from 1 (0: the file itself), "what is wrong; what would be right"
+TreeFinding = tuple[int, str]  # line from 1 (0: the file itself), "what is wrong; what would be right"
 
-MOST_FINDINGS = 500  # a file with more was not written by hand
 _NAME = re.compile(r"[\w-]+")
 
 
-def check_tree(path: Path, leaves: Mapping[str, type] | None = None, names: Names | None = None) -> list[Finding]:
-    """All findings, in line order; a file without any loads.
+def check_tree(
+    path: Path,
+    leaves: Mapping[str, type] | None = None,
+    names: CellNames | None = None,
+    max_findings: int = 500,
+) -> list[TreeFinding]:
+    """All findings, in line order, at most `max_findings`; a file without findings loads.
 
-    `leaves` maps a tag to its class, by default all of ours. `names` says which names a port may hold that means a
-    thing in the cell, {"socket": ["back_1", ...]}; without it they are not checked.
+    `leaves` maps a tag to its class, by default all of ours. `names` holds, for each kind of object in the cell, the
+    names that a port may take, {"socket": ["back_1", ...]}; without it names are not checked.
 
     Raises:
         TypeError: a leaf class without ports.
@@ -42,10 +46,10 @@ def check_tree(path: Path, leaves: Mapping[str, type] | None = None, names: Name
         return [(0, f"cannot be read: {error.strerror}; name a file that can")]
     except TreeSyntaxError as error:
         return [(error.line, str(error))]
-    return sorted(set(islice(_findings(root, kinds(leaves, names)), MOST_FINDINGS)))
+    return sorted(set(islice(_findings(root, element_kinds(leaves, names)), max_findings)))
 
 
-def _findings(root: Element, known: Mapping[str, Kind]) -> Iterator[Finding]:
+def _findings(root: Element, known: Mapping[str, ElementKind]) -> Iterator[TreeFinding]:
     given = [tree for tree in root.children if tree.tag == "BehaviorTree"]
     trees = {tree.attributes["ID"]: tree for tree in given if tree.attributes.get("ID")}
     keys = {identifier: _keys_used(tree) for identifier, tree in trees.items()}
@@ -60,29 +64,29 @@ def _findings(root: Element, known: Mapping[str, Kind]) -> Iterator[Finding]:
     yield from loops
     try:
         yield from check_runs(root, trees, known)
-    except TooLarge as error:
-        if not loops:  # filling one in has no end
+    except TreeTooLarge as error:
+        if not loops:  # expanding a loop has no end
             yield root.line, str(error)
 
 
-def check_runs(root: Element, trees: Mapping[str, Element], known: Mapping[str, Kind]) -> list[Finding]:
-    """What shows only in the tree that will run, its subtrees filled in. Raises TooLarge.
+def check_runs(root: Element, trees: Mapping[str, Element], known: Mapping[str, ElementKind]) -> list[TreeFinding]:
+    """Findings in the tree that will run, its subtrees expanded. Raises TreeTooLarge.
 
-    `trees` are those under `root` by their ID, `known` the kinds of elements by tag.
+    `trees` are the BehaviorTree elements under `root` by ID, `known` the kinds of elements by tag.
     """
     main = trees.get(root.attributes.get("main_tree_to_execute", ""))
     if main is None:
         return []
-    filled = Filled(main, trees, known)
-    return [*filled.findings, *check_flow(filled.root)]
+    expanded = ExpandedTree(main, trees, known)
+    return [*expanded.findings, *check_flow(expanded.root)]
 
 
 def unknown(what: str, word: str, known: Collection[str]) -> str:
-    """The sentence about a word that is not known, with the nearest that is."""
-    return f"unknown {what} {quoted(word)}; {nearest(word, known)}"
+    """A message about an unknown word, with the nearest known one."""
+    return f"unknown {what} {quoted(word)}; {suggestion(word, known)}"
 
 
-def _check_document(root: Element, trees: Mapping[str, Element]) -> Iterator[Finding]:
+def _check_document(root: Element, trees: Mapping[str, Element]) -> Iterator[TreeFinding]:
     if root.tag != "root":
         yield root.line, f"the outermost element is <{cut(root.tag)}>; write <root>"
     for attribute in root.attributes.keys() - {"main_tree_to_execute"}:
@@ -91,7 +95,7 @@ def _check_document(root: Element, trees: Mapping[str, Element]) -> Iterator[Fin
     if not main:
         yield root.line, "root does not state main_tree_to_execute; write the ID of the tree to run"
     elif main not in trees:
-        right = nearest(main, trees) if trees else "write a BehaviorTree with this ID"
+        right = suggestion(main, trees) if trees else "write a BehaviorTree with this ID"
         yield root.line, f"unknown main tree {quoted(main)}; {right}"
     for tree in root.children:
         if tree.tag in ("Include", "Import"):
@@ -116,7 +120,7 @@ def _check_document(root: Element, trees: Mapping[str, Element]) -> Iterator[Fin
                     yield tree.line, unknown("default of a key", attribute, used)
 
 
-def _check_names(tree: Element) -> Iterator[Finding]:
+def _check_names(tree: Element) -> Iterator[TreeFinding]:
     namespaces = set()
     for parent in tree.walk():
         seen = set()
@@ -136,7 +140,9 @@ def _check_names(tree: Element) -> Iterator[Finding]:
                 namespaces.add(element.name)
 
 
-def _check_element(element: Element, known: Mapping[str, Kind], keys: Mapping[str, set[str]]) -> Iterator[Finding]:
+def _check_element(
+    element: Element, known: Mapping[str, ElementKind], keys: Mapping[str, set[str]]
+) -> Iterator[TreeFinding]:
     if element.tag == "SubTree":
         yield from _check_subtree(element, keys)
         return
@@ -160,7 +166,7 @@ def _check_element(element: Element, known: Mapping[str, Kind], keys: Mapping[st
             yield from _check_attribute(element, kind, name, value)
 
 
-def _check_attribute(element: Element, kind: Kind, name: str, value: str) -> Iterator[Finding]:
+def _check_attribute(element: Element, kind: ElementKind, name: str, value: str) -> Iterator[TreeFinding]:
     if name not in kind.attributes:
         yield element.line, unknown(f"attribute of {element.tag}", name, [*kind.attributes, "name"])
         return
@@ -176,7 +182,7 @@ def _check_attribute(element: Element, kind: Kind, name: str, value: str) -> Ite
         yield element.line, f"{element.label}: {name}={quoted(value)} {problem}"
 
 
-def _check_subtree(element: Element, keys: Mapping[str, set[str]]) -> Iterator[Finding]:
+def _check_subtree(element: Element, keys: Mapping[str, set[str]]) -> Iterator[TreeFinding]:
     if element.children:
         yield element.line, f"{element.label} takes no children and has {len(element.children)}; move them out of it"
     identifier = element.attributes.get("ID", "")
@@ -193,7 +199,7 @@ def _check_subtree(element: Element, keys: Mapping[str, set[str]]) -> Iterator[F
                 yield element.line, unknown(f"key of subtree {cut(identifier)}", name, keys[identifier])
 
 
-def _check_key(element: Element, name: str, value: str) -> Iterator[Finding]:
+def _check_key(element: Element, name: str, value: str) -> Iterator[TreeFinding]:
     try:
         key_of(value)
     except ValueError as error:
@@ -205,7 +211,7 @@ def _keys_used(tree: Element) -> set[str]:
     return {value[1:-1] for value in values if value.startswith("{") and value.endswith("}")}
 
 
-def _never_run(root: Element, trees: Mapping[str, Element]) -> Iterator[Finding]:
+def _never_run(root: Element, trees: Mapping[str, Element]) -> Iterator[TreeFinding]:
     main = root.attributes.get("main_tree_to_execute", "")
     run: set[str] = set()
     todo = [main]
@@ -218,11 +224,13 @@ def _never_run(root: Element, trees: Mapping[str, Element]) -> Iterator[Finding]
             yield tree.line, f"BehaviorTree {quoted(identifier)} is never run; include it with a SubTree, or remove it"
 
 
-def _loops(trees: Mapping[str, Element]) -> Iterator[Finding]:
-    """The SubTree elements whose tree is open already when one follows them down."""
+def _loops(trees: Mapping[str, Element]) -> Iterator[TreeFinding]:
+    """SubTree elements that include a tree in itself (depth-first search)."""
     done: set[str] = set()
     for first in trees:
-        branch = {} if first in done else {first: _subtrees(trees[first])}  # open trees, each with what is left of it
+        branch = (
+            {} if first in done else {first: _subtrees(trees[first])}
+        )  # open trees, each with the SubTree elements still to follow
         while branch:
             current = next(reversed(branch))
             element = next(branch[current], None)

@@ -1,4 +1,4 @@
-"""Tree files as plain elements that know their line."""
+"""Reads a tree file into plain elements that know their line."""
 
 import re
 from collections.abc import Iterator
@@ -9,7 +9,7 @@ from xml.parsers.expat import errors
 
 from regrasp.interfaces.quote import cut, quoted
 
-MAX_DEPTH = 60  # elements inside one another; the parser that builds the tree is recursive
+MAX_ELEMENT_DEPTH = 60  # nested elements; the parser that builds the tree is recursive
 _KEY = re.compile(r"\{([A-Za-z_]\w*)\}")
 
 _REMEDIES = {
@@ -41,7 +41,7 @@ class Element:
 
     @property
     def label(self) -> str:
-        """How a sentence names it: Wait 'watch'."""
+        """How messages name the element: Wait 'watch'."""
         return f"{cut(self.tag)} {quoted(self.name)}"
 
     @property
@@ -75,7 +75,7 @@ def read_elements(path: Path) -> Element:
 
     Raises:
         OSError: the file cannot be read.
-        TreeSyntaxError: not well-formed, nested deeper than `MAX_DEPTH`, or with a document type (it could name
+        TreeSyntaxError: not well-formed, nested deeper than `MAX_ELEMENT_DEPTH`, or with a document type (it could name
             entities, which may reach outside the file or grow without bound).
     """
     content = path.read_bytes()
@@ -87,9 +87,9 @@ def read_elements(path: Path) -> Element:
         element = Element(tag, attributes, parser.CurrentLineNumber)
         open_elements[-1].children.append(element)
         open_elements.append(element)
-        if len(open_elements) > MAX_DEPTH:
+        if len(open_elements) > MAX_ELEMENT_DEPTH:
             raise TreeSyntaxError(
-                element.line, f"elements nested deeper than {MAX_DEPTH}; move some into a BehaviorTree"
+                element.line, f"elements nested deeper than {MAX_ELEMENT_DEPTH}; move some into a BehaviorTree"
             )
 
     def end(_tag: str) -> None:

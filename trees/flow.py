@@ -1,7 +1,7 @@
-"""What no tick of a tree can do: reach a node, let a Parallel succeed, write a key before it is read.
+"""Data flow analysis of a tree: nodes never reached, Parallels that never succeed, keys read before they are written.
 
-All runs at once: a leaf may end in any status that it `RETURNS`, and at each tick in another. What holds for none of
-them is a finding, so a tree that can work has none.
+It follows all possible runs at once: a leaf may end every tick in any status that it `RETURNS`. A finding is what is
+impossible in every run, so a tree that can work has no findings.
 """
 
 from collections.abc import Callable, Collection, Iterator
@@ -13,16 +13,16 @@ from py_trees.common import Status
 
 from regrasp.interfaces.quote import cut
 from regrasp.trees.vocabulary import ANY_STATUS, BUILT_IN
-from regrasp.trees.wiring import Node, Wire
+from regrasp.trees.wiring import ExpandedNode, Wire
 
 SUCCESS, FAILURE, RUNNING = Status.SUCCESS, Status.FAILURE, Status.RUNNING
 
 
 class Runs(NamedTuple):
-    """The runs that come to some point, as bits. Bit i stands for the ith reader of a key, bit 0 for one never ticked.
+    """The runs that come to some point, as bit sets. Bit i is the ith reader of a key, bit 0 a reader never ticked.
 
-    In `fresh`: there is a run in which that reader has not been ticked yet. In `written`: there is one in which its
-    key, moreover, may have been written. Only a reader's first tick counts: where it finds nothing the run ends.
+    A bit in `fresh`: in some run that reader has not been ticked yet. In `written`: in some such run its key may also
+    have been written. Only a reader's first tick counts: if its key has no value then, the run ends.
     """
 
     fresh: int = 0
@@ -32,7 +32,7 @@ class Runs(NamedTuple):
         return Runs(self.fresh | other.fresh, self.written | other.written)
 
     def after(self, earlier: "Runs") -> "Runs":
-        """Those of these runs that may have come by an earlier point."""
+        """Those of these runs that may have passed an earlier point."""
         return Runs(self.fresh & earlier.fresh, self.written & earlier.fresh)
 
 
@@ -51,7 +51,7 @@ _TO: dict[str, dict[Status, tuple[Status, ...]]] = {  # what decorators make of 
 _GOES_ON = {"Sequence": SUCCESS, "Fallback": FAILURE, "Selector": FAILURE}
 
 
-def check_flow(root: Node) -> Iterator[tuple[int, str]]:
+def check_flow(root: ExpandedNode) -> Iterator[tuple[int, str]]:
     """Findings (line, sentence) about what no run of the tree can do."""
     flow = _Flow(root)
     nodes = [*root.walk()]
@@ -69,22 +69,22 @@ def check_flow(root: Node) -> Iterator[tuple[int, str]]:
             yield reader.line, f"{early}; tick {writer.what.partition(':')[0]} of line {writer.line} before it"
 
 
-def _unreachable(nodes: list[Node], flow: "_Flow") -> Iterator[tuple[int, str]]:
-    """An element in a subtree is unreachable if it is in every place where the subtree is included."""
+def _unreachable(nodes: list[ExpandedNode], flow: "_Flow") -> Iterator[tuple[int, str]]:
+    """Nodes that no run reaches; in a subtree, only if no place that includes it reaches the element."""
     reached = {id(node.element) for node in nodes if node in flow.ends}
     for parent in nodes:
         never = [child for child in parent.children if id(child.element) not in reached]
         if parent in flow.ends and never:
-            child = never[0]  # those after it are so for the same reason
+            child = never[0]  # those after it are unreachable for the same reason
             before = [other for other in parent.children if other in flow.ends][-1]
             ends = "fails" if _GOES_ON[parent.element.tag] is FAILURE else "succeeds"
             message = f"{child.element.label} is never reached: {before.element.label} before it never {ends}"
             yield child.element.line, f"{message}; move it before that, or remove it"
 
 
-def _hopeless(nodes: list[Node], flow: "_Flow") -> Iterator[tuple[int, str]]:
-    """Parallels that can succeed nowhere in the tree; what their children can do is told for the first place."""
-    parallels: dict[int, list[Node]] = {}
+def _hopeless(nodes: list[ExpandedNode], flow: "_Flow") -> Iterator[tuple[int, str]]:
+    """Parallels that can succeed in no place of the tree; the message describes the first place."""
+    parallels: dict[int, list[ExpandedNode]] = {}
     for node in nodes:
         if node.element.tag == "Parallel" and node in flow.ends:
             parallels.setdefault(id(node.element), []).append(node)
@@ -107,12 +107,12 @@ def _hopeless(nodes: list[Node], flow: "_Flow") -> Iterator[tuple[int, str]]:
 class _Flow:
     """All runs of a tree: in `ends` the nodes that some run reaches, with the statuses in which it leaves them."""
 
-    def __init__(self, root: Node) -> None:
+    def __init__(self, root: ExpandedNode) -> None:
         nodes = [*root.walk()]
-        self.ends: dict[Node, Ends] = {}
+        self.ends: dict[ExpandedNode, Ends] = {}
         self.readers = [wire for node in nodes for wire in node.reads if wire.required]
-        self._own: dict[Node, int] = {}  # bits of the node's own reads
-        self._served: dict[Node, int] = {}  # bits of the reads of the keys that it writes
+        self._own: dict[ExpandedNode, int] = {}  # bits of the node's own reads
+        self._served: dict[ExpandedNode, int] = {}  # bits of the readers of the keys that the node writes
         of_path: dict[str, int] = {}
         for bit, (node, wire) in enumerate(((n, w) for n in nodes for w in n.reads if w.required), 1):
             self._own[node] = self._own.get(node, 0) | 1 << bit
@@ -135,15 +135,15 @@ class _Flow:
         late = self._met & ~self._in_time
         return [wire for bit, wire in enumerate(self.readers, 1) if late >> bit & 1]
 
-    def can(self, node: Node, status: Status) -> bool:
+    def can(self, node: ExpandedNode, status: Status) -> bool:
         """Whether some run leaves the node in this status."""
         return bool(self.ends[node][status].fresh)
 
-    def only(self, node: Node, status: Status) -> bool:
+    def only(self, node: ExpandedNode, status: Status) -> bool:
         """Whether every run that leaves the node leaves it in this status."""
         return not any(self.can(node, other) for other in ANY_STATUS - {status})
 
-    def _tick(self, node: Node, runs: Runs) -> Ends:
+    def _tick(self, node: ExpandedNode, runs: Runs) -> Ends:
         """The runs after a tick of this node."""
         if not runs.fresh:
             return _none()
@@ -152,7 +152,7 @@ class _Flow:
             self.ends[node], self._changed = ends, True
         return ends
 
-    def _wired(self, node: Node, runs: Runs) -> Runs:
+    def _wired(self, node: ExpandedNode, runs: Runs) -> Runs:
         """The runs after the node has read its inputs and may have written its outputs."""
         own = self._own.get(node, 0)
         self._met |= runs.fresh & own
@@ -160,10 +160,10 @@ class _Flow:
         fresh = runs.fresh & ~own
         return Runs(fresh, runs.written & ~own | fresh & self._served.get(node, 0))
 
-    def _ended(self, node: Node) -> Ends:
+    def _ended(self, node: ExpandedNode) -> Ends:
         return self.ends.get(node) or _none()
 
-    def _rule(self, node: Node) -> Callable[[Node, Runs], Ends]:
+    def _rule(self, node: ExpandedNode) -> Callable[[ExpandedNode, Runs], Ends]:
         tag = node.element.tag
         built_in = node.kind is BUILT_IN.get(tag)  # None is None: a subtree, or an element that nobody knows
         if built_in and node.children:
@@ -175,8 +175,8 @@ class _Flow:
                 return self._decorated
         return self._any
 
-    def _any(self, node: Node, runs: Runs) -> Ends:
-        """A leaf, or a node with children of which nothing is known: it may tick them in any order."""
+    def _any(self, node: ExpandedNode, runs: Runs) -> Ends:
+        """A leaf, or a node of an unknown kind: it may tick its children in any order."""
         for child in node.children:
             for end in self._ended(child).values():
                 runs |= end
@@ -184,16 +184,16 @@ class _Flow:
             self._tick(child, runs)
         return _none() | dict.fromkeys(node.kind.returns if node.kind else ANY_STATUS, runs)
 
-    def _decorated(self, node: Node, runs: Runs) -> Ends:
+    def _decorated(self, node: ExpandedNode, runs: Runs) -> Ends:
         tag, child, ends = node.element.tag, node.children[0], _none()
         for status, end in self._tick(child, runs).items():
-            if tag == "OneShot" and status is not RUNNING:  # the end that it had before, without a tick of the child
+            if tag == "OneShot" and status is not RUNNING:  # its earlier end, without a tick of the child
                 end |= runs.after(end)
             for becomes in _becomes(node, status):
                 ends[becomes] |= end
         return ends
 
-    def _in_turn(self, node: Node, runs: Runs) -> Ends:
+    def _in_turn(self, node: ExpandedNode, runs: Runs) -> Ends:
         """Sequence and Fallback; with memory a tick may begin at any child that was running."""
         ends, goes_on = _none(), _GOES_ON[node.element.tag]
         at = runs
@@ -207,8 +207,8 @@ class _Flow:
         ends[goes_on] = at
         return ends
 
-    def _parallel(self, node: Node, runs: Runs) -> Ends:
-        """Every child at every tick; with success_on_all one that has succeeded rests until the others have."""
+    def _parallel(self, node: ExpandedNode, runs: Runs) -> Ends:
+        """Ticks every child; with success_on_all a child that has succeeded is skipped until all have."""
         on_all, end, ticks = node.constants.get("policy") == "success_on_all", runs, []
         for child in node.children:
             rest = end.after(self._ended(child)[SUCCESS]) if on_all else Runs()
@@ -233,7 +233,7 @@ def _union(many: list[Runs]) -> Runs:
     return reduce(or_, many, Runs())
 
 
-def _becomes(node: Node, status: Status) -> Collection[Status]:
+def _becomes(node: ExpandedNode, status: Status) -> Collection[Status]:
     """The statuses that a decorator may make of its child's."""
     tag = node.element.tag
     if tag == "Condition":
@@ -242,5 +242,5 @@ def _becomes(node: Node, status: Status) -> Collection[Status]:
             return (SUCCESS, RUNNING)
         return (SUCCESS,) if waits_for == status.value.lower() else (RUNNING,)
     if "1" in (node.constants.get("num_failures"), node.constants.get("num_success")):
-        return (status,)  # Retry and Repeat that do not
+        return (status,)  # a Retry or Repeat of one try
     return _TO.get(tag, {}).get(status, (status,))

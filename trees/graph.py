@@ -1,4 +1,4 @@
-"""A tree as one value that every writer takes: what the file says, with subtrees filled in."""
+"""A tree as one value for every export format: what the file says, with subtrees expanded."""
 
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -13,8 +13,8 @@ from regrasp.trees.run_stats import NodeStats
 from regrasp.trees.vocabulary import BUILT_IN
 from regrasp.trees.wiring import MAX_NODES, MAX_TREE_DEPTH
 
-Kind = Literal["sequence", "fallback", "parallel", "decorator", "action", "condition", "subtree"]
-_COMPOSITES: dict[str, Kind] = {
+NodeKind = Literal["sequence", "fallback", "parallel", "decorator", "action", "condition", "subtree"]
+_COMPOSITES: dict[str, NodeKind] = {
     "Sequence": "sequence",
     "Fallback": "fallback",
     "Selector": "fallback",
@@ -24,7 +24,7 @@ _COMPOSITES: dict[str, Kind] = {
 
 
 @dataclass(frozen=True)
-class Port:
+class NodePort:
     """A port of a leaf, an argument of a decorator, or a key of a subtree."""
 
     name: str
@@ -36,9 +36,9 @@ class Port:
 
     @property
     def text(self) -> str:
-        """What is written, with the constant behind a key beside it: tries={tries}=5."""
+        """Name and value as written, and the constant behind a key: tries={tries}=5."""
         behind = "" if self.constant in (None, self.value) else f"={self.constant}"
-        return printable(f"{self.name}={self.value}{behind}")
+        return one_line(f"{self.name}={self.value}{behind}")
 
 
 @dataclass(frozen=True)
@@ -48,10 +48,10 @@ class Node:
     path: str  # as `node_paths` names it
     name: str
     type: str  # the element's tag
-    kind: Kind
+    kind: NodeKind
     memory: bool | None = None
     policy: str = ""
-    ports: tuple[Port, ...] = ()
+    ports: tuple[NodePort, ...] = ()
     tree: str = ""  # the ID of the tree that it is written in
     subtree: str = ""  # the ID of a SubTree's tree
     children: tuple["Node", ...] = ()
@@ -68,24 +68,26 @@ class Node:
 
     @property
     def unvisited(self) -> bool:
-        """Whether a run is shown that never came here."""
+        """Whether the tree shows a run that never visited this node."""
         return self.stats is not None and not self.stats.visits
 
     @property
-    def given(self) -> list[Port]:
+    def given(self) -> list[NodePort]:
         """The ports that the file gives a value."""
         return [port for port in self.ports if port.value is not None]
 
 
 @dataclass(frozen=True)
 class _Scope:
-    """One instance of a tree: where it stands, what is a constant in it, and the trees that it stands in."""
+    """One instance of a tree: the constants of its keys, and the IDs of the trees around it."""
 
     trees: Mapping[str, Element]
     leaves: Mapping[str, type]
     keys: Mapping[str, str]
     opened: tuple[str, ...]
-    room: Iterator[int] = field(default_factory=lambda: iter(range(MAX_NODES)))  # one for each node of the whole
+    budget: Iterator[int] = field(
+        default_factory=lambda: iter(range(MAX_NODES))
+    )  # one number for each node of the whole tree
 
 
 def read_graph(path: Path, leaves: Mapping[str, type] | None = None, inputs: Mapping[str, str] | None = None) -> Node:
@@ -112,7 +114,7 @@ def read_graph(path: Path, leaves: Mapping[str, type] | None = None, inputs: Map
 
 
 def collapsed(node: Node, depth: int) -> Node:
-    """The tree with its SubTrees open `depth` deep: at 0 each that stands in the main tree is closed, a single node."""
+    """The tree with its SubTrees open down to `depth`: at 0 each SubTree in the main tree is a single, closed node."""
     if node.kind == "subtree" and node.children:
         if depth == 0:
             return replace(node, children=(), hidden=sum(n.kind != "subtree" for n in node.walk()))
@@ -121,7 +123,7 @@ def collapsed(node: Node, depth: int) -> Node:
 
 
 def recorded(node: Node, stats: Mapping[str, NodeStats], failed: Collection[str] = ()) -> Node:
-    """The tree with the stats of a run by path, and a mark on the paths of the nodes by which it failed."""
+    """The tree with a run's stats by path, and a mark on the nodes whose paths are in `failed`."""
     children = tuple(recorded(child, stats, failed) for child in node.children)
     if node.kind == "subtree" and children:  # no node of its own in a run
         return replace(node, children=children, stats=children[0].stats, failed=children[0].failed)
@@ -130,9 +132,9 @@ def recorded(node: Node, stats: Mapping[str, NodeStats], failed: Collection[str]
 
 def _node(element: Element, above: str, scope: _Scope) -> Node:
     path = f"{above}/{element.name}" if above else element.name
-    if next(scope.room, None) is None or path.count("/") >= MAX_TREE_DEPTH:
+    if next(scope.budget, None) is None or path.count("/") >= MAX_TREE_DEPTH:
         raise ValueError(
-            f"more than {MAX_NODES} nodes, or deeper than {MAX_TREE_DEPTH}, with its subtrees filled in; include fewer"
+            f"more than {MAX_NODES} nodes, or deeper than {MAX_TREE_DEPTH}, with its subtrees expanded; include fewer"
         )
     if element.tag == "SubTree":
         return _subtree(element, path, scope)
@@ -143,7 +145,7 @@ def _node(element: Element, above: str, scope: _Scope) -> Node:
     memory, policy = attributes.pop("memory", None), attributes.pop("policy", "")
     for own_field in ("memory", "policy"):
         declared.pop(own_field, None)
-    given = (_given(declared.pop(name, Port(name)), value, scope.keys) for name, value in attributes.items())
+    given = (_given(declared.pop(name, NodePort(name)), value, scope.keys) for name, value in attributes.items())
     return Node(
         path,
         element.name,
@@ -161,7 +163,7 @@ def _subtree(element: Element, path: str, scope: _Scope) -> Node:
     given = {name: value for name, value in element.attributes.items() if name not in ("ID", "name")}
     identifier = element.attributes.get("ID", "")
     node = Node(path, element.name, element.tag, "subtree", tree=scope.opened[-1], subtree=identifier)
-    ports = {name: _given(Port(name), value, scope.keys) for name, value in given.items()}
+    ports = {name: _given(NodePort(name), value, scope.keys) for name, value in given.items()}
     if identifier in scope.opened or not (tree := scope.trees.get(identifier)) or not tree.children:
         note = "includes itself" if identifier in scope.opened else "missing"
         return replace(node, ports=tuple(ports.values()), note=note)
@@ -169,12 +171,12 @@ def _subtree(element: Element, path: str, scope: _Scope) -> Node:
     child = _node(tree.children[0], path, inner)
     for name, value in tree.attributes.items():
         if name != "ID":
-            ports[name] = replace(ports.get(name, Port(name)), default=value)
+            ports[name] = replace(ports.get(name, NodePort(name)), default=value)
     typed = (_used(port, child) for port in ports.values())
     return replace(node, ports=tuple(typed), children=(child,))
 
 
-def _given(port: Port, value: str, keys: Mapping[str, str]) -> Port:
+def _given(port: NodePort, value: str, keys: Mapping[str, str]) -> NodePort:
     return replace(port, value=value, constant=_constant(value, keys))
 
 
@@ -187,13 +189,13 @@ def _constant(value: str, keys: Mapping[str, str]) -> str | None:
 
 
 def _constants(attributes: Mapping[str, str], keys: Mapping[str, str]) -> dict[str, str]:
-    """The literals that a tree's attributes hand to its inside."""
+    """The literals that a tree's attributes pass to its nodes."""
     known = {name: _constant(value, keys) for name, value in attributes.items() if name not in ("ID", "name")}
     return {name: value for name, value in known.items() if value is not None}
 
 
-def _used(port: Port, top: Node) -> Port:
-    """A subtree's key with type and direction from the ports inside that it is wired to."""
+def _used(port: NodePort, top: Node) -> NodePort:
+    """A subtree's key with type and direction of the ports inside to which it is wired."""
     inside = [p for node in _same_tree(top) for p in node.ports if p.value == f"{{{port.name}}}"]
     directions = {p.direction for p in inside} or {"input"}
     types = {p.type for p in inside}
@@ -211,32 +213,32 @@ def _same_tree(node: Node) -> Iterator[Node]:
             yield from _same_tree(child)
 
 
-def _declared(tag: str, leaf: Any) -> dict[str, Port]:
+def _declared(tag: str, leaf: Any) -> dict[str, NodePort]:
     """The ports that an element has, by name; none are known of a leaf without class."""
     if leaf is None:
         arguments = BUILT_IN[tag].attributes if tag in BUILT_IN else {}
-        return {name: Port(name, type=_name(argument.accepts)) for name, argument in arguments.items()}
-    ports: dict[str, Port] = {}
+        return {name: NodePort(name, type=_name(argument.accepts)) for name, argument in arguments.items()}
+    ports: dict[str, NodePort] = {}
     for name, port in leaf.input_ports().items():
         default = str(port.default_value) if port.has_default else None
-        ports[name] = Port(name, type=_name(port.data_type), default=default)
+        ports[name] = NodePort(name, type=_name(port.data_type), default=default)
     for name, port in leaf.output_ports().items():
-        ports[name] = Port(name, direction="output", type=_name(port.data_type))
+        ports[name] = NodePort(name, direction="output", type=_name(port.data_type))
     return ports
 
 
 def _name(kind: Any) -> str:
-    """Of a type; what takes one of several words is a str."""
+    """A type's name; an attribute that takes one of several words is a str."""
     return "str" if isinstance(kind, tuple) else getattr(kind, "__name__", str(kind))
 
 
-def _leaf_kind(leaf: Any, element: Element) -> Kind:
+def _leaf_kind(leaf: Any, element: Element) -> NodeKind:
     if element.children:
         return "decorator"
     at_once = getattr(leaf, "RETURNS", None) == {Status.SUCCESS, Status.FAILURE}  # an answer, with no work to wait for
     return "condition" if at_once else "action"
 
 
-def printable(text: str) -> str:
-    """What stands in a file must not steer a terminal or break a line."""
+def one_line(text: str) -> str:
+    """The text with spaces for unprintable characters: a file must not control a terminal or break lines."""
     return "".join(c if c.isprintable() else " " for c in text)

@@ -1,21 +1,21 @@
-"""What a tree file takes from outside: the defaults of its main tree, which a scenario may replace."""
+"""Inputs of a tree file: the default values of its main tree's keys, which a scenario may replace."""
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from regrasp.trees.check import Finding, check_runs, unknown
+from regrasp.trees.check import TreeFinding, check_runs, unknown
 from regrasp.trees.element import TreeSyntaxError, read_elements
-from regrasp.trees.vocabulary import Names, kinds
-from regrasp.trees.wiring import TooLarge
+from regrasp.trees.vocabulary import CellNames, element_kinds
+from regrasp.trees.wiring import TreeTooLarge
 
 
 def check_inputs(
-    path: Path, inputs: Mapping[str, str], leaves: Mapping[str, type] | None = None, names: Names | None = None
+    path: Path, inputs: Mapping[str, str], leaves: Mapping[str, type] | None = None, names: CellNames | None = None
 ) -> Iterator[tuple[str, str]]:
-    """Key and sentence for every input that a tree file does not take, and for all that is wrong only with its value.
+    """Key and message for every input that the tree does not take, or whose value causes a finding.
 
-    What `check_tree` finds without the inputs is not told again; a file that it cannot read at all gives nothing.
-    `leaves` and `names` as in `check_tree`.
+    Findings that `check_tree` has without the inputs are not repeated; a file that cannot be read gives none. `leaves`
+    and `names` as in `check_tree`.
     """
     if leaves is None:
         from regrasp.behaviors import LEAVES  # late, as in `check_tree`
@@ -29,16 +29,16 @@ def check_inputs(
     main = trees.get(root.attributes.get("main_tree_to_execute", ""))
     if main is None:
         return
-    known = kinds(leaves, names)
+    known = element_kinds(leaves, names)
 
-    def found() -> list[Finding]:
+    def found() -> list[TreeFinding]:
         try:
             return check_runs(root, trees, known)
-        except TooLarge:
+        except TreeTooLarge:
             return []
 
     alone = now = found()
-    blamed: dict[Finding, str] = {}  # the input whose value brings it
+    blamed: dict[TreeFinding, str] = {}  # the input whose value causes it
     for key, value in inputs.items():
         if key == "ID" or key not in main.attributes:
             yield key, unknown("input", key, main.attributes.keys() - {"ID"})

@@ -1,4 +1,4 @@
-"""From a tree file to a tree that ticks."""
+"""Builds py_trees behaviours from a tree file."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -6,13 +6,13 @@ from pathlib import Path
 import py_trees
 from py_trees.parsers.behaviour_tree_xml import parse_behaviour_tree_xml
 
-from regrasp.trees.check import Finding, check_tree
+from regrasp.trees.check import TreeFinding, check_tree
 
 
 class TreeError(ValueError):
     """A tree file with findings; the message names file and line of each."""
 
-    def __init__(self, path: Path, findings: list[Finding]) -> None:
+    def __init__(self, path: Path, findings: list[TreeFinding]) -> None:
         super().__init__("\n".join(f"{path}:{line}: {message}" for line, message in findings))
         self.findings = findings
 

@@ -20,7 +20,7 @@ def node_paths(root: py_trees.behaviour.Behaviour) -> dict[UUID, str]:
     """The path of each node by its id, in tree order: root/search/look, with the names of subtrees.
 
     A loaded node's name is already its dotted path; one built by hand gets its parent's path before its name. Equal
-    siblings, which a checked tree file cannot have, are told apart as name, name#2.
+    siblings, which a checked tree file cannot have, become name and name#2.
     """
     paths: dict[UUID, str] = {}
     taken: set[str] = set()
@@ -40,7 +40,7 @@ def node_paths(root: py_trees.behaviour.Behaviour) -> dict[UUID, str]:
 
 
 def find_path(name: str, paths: Iterable[str]) -> str:
-    """The one path that is `name` or ends with its parts: carry/move for root/carry/move.
+    """The only path that is `name` or ends with its parts: carry/move for root/carry/move.
 
     Raises:
         ValueError: none does, or several.

@@ -1,4 +1,4 @@
-"""What a recorded run did at each node, read from its tick log: every execution, and how many there were."""
+"""Executions of each node in a recorded run, read from its tick log, and their statistics."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -8,7 +8,10 @@ Change = tuple[float, str, str]  # simulated s, path, status: a line of the tick
 
 @dataclass(frozen=True, slots=True)
 class Execution:
-    """One execution of a node, in simulated seconds; INVALID: stopped from above; RUNNING: at work at the log's end."""
+    """One execution of a node, in simulated seconds.
+
+    Status INVALID: its parent stopped it; RUNNING: it still ran at the log's end.
+    """
 
     path: str
     started: float
@@ -17,9 +20,9 @@ class Execution:
 
 
 def executions(changes: Iterable[Change]) -> list[Execution]:
-    """Every execution of every node in the order of beginning, from the lines of a tick log in their order.
+    """Every execution of every node in the order of their beginning, from the lines of a tick log in their order.
 
-    What runs at the end of the log has run until its last line.
+    A node that runs at the end of the log counts as running until the last line.
     """
     made: list[Execution] = []
     running: dict[str, int] = {}  # of a path the index of its execution
@@ -27,7 +30,7 @@ def executions(changes: Iterable[Change]) -> list[Execution]:
     for now, path, status in changes:
         if path not in running:
             if status == "INVALID":
-                continue  # what had ended is reset
+                continue  # the reset of a node that had ended
             running[path] = len(made)
             made.append(Execution(path, now, now, "RUNNING"))
         if status != "RUNNING":
@@ -45,7 +48,7 @@ class NodeStats:
     visits: int = 0  # executions
     successes: int = 0
     failures: int = 0
-    stopped: int = 0  # from above, before it ended by itself
+    stopped: int = 0  # by its parent, before it ended by itself
     running_seconds: float = 0.0  # simulated
     last: str = "INVALID"  # how its last execution ended
 

@@ -1,12 +1,12 @@
-"""Tree files on scripted leaves: the tree's logic alone, tick by tick on the simulated clock, without a world.
+"""Tree files with scripted leaves: tests a tree's logic tick by tick on the simulated clock, without a world.
 
     tree = ScriptedTree(Path("trees/recovery.xml"), {"Carry": "3 failure, 2 success"})
     tree.run()
     print(tree.table())
 
-A leaf's script says, for each time it is entered, at which of its ticks it ends and how: "3 failure, 2 success" fails
-at its third tick and, when it is entered again, succeeds at its second; so ever after. "success" is "1 success", and
-"running" never ends.
+A leaf's script says, for each time it is entered, at which of its ticks it ends and how. With "3 failure, 2 success" it
+fails at its third tick; when it is entered again, and every time after that, it succeeds at its second tick. "success"
+is "1 success", and "running" never ends.
 """
 
 import re
@@ -27,7 +27,7 @@ from regrasp.trees.tick_table import TickTable
 from regrasp.trees.vocabulary import ANY_STATUS, BUILT_IN
 
 TICK = 0.05  # simulated s, as in a run
-MOST_TICKS = 10_000  # a tree that has not ended by then never will
+MAX_TICKS = 10_000  # a tree that has not ended by then never will
 _ACT = re.compile(r"(?:([1-9]\d{0,5})\s+)?(success|failure|running)")
 
 
@@ -91,7 +91,7 @@ def stand_ins(leaves: Mapping[str, Any]) -> dict[str, type]:
 
 
 def leaves_named_in(path: Path) -> dict[str, type]:
-    """Scripted classes for the leaves of a foreign tree file, whose own classes are not at hand; any value suits them.
+    """Scripted classes for the leaves of a tree file whose own classes are not available; their ports take any value.
 
     Raises:
         OSError: the file cannot be read.
@@ -118,7 +118,7 @@ def _stand_in(
 
 
 def _checked(path: str, acts: tuple[Act, ...], returns: frozenset[Status]) -> tuple[Act, ...]:
-    """The acts, if a leaf of these statuses can do them."""
+    """The acts. Raises ValueError where a leaf that returns these statuses cannot do them."""
     runs = {Status.RUNNING for act in acts if act.ticks > 1}
     if never := ({act.status for act in acts} | runs) - returns:
         raise ValueError(f"{path} never is {_listed(never)}; it is {_listed(returns)}")
@@ -126,7 +126,7 @@ def _checked(path: str, acts: tuple[Act, ...], returns: frozenset[Status]) -> tu
 
 
 def _able(act: Act, returns: frozenset[Status]) -> Act:
-    """The act, as far as a leaf of these statuses can do it."""
+    """The act, adapted to a leaf that returns these statuses."""
     status = act.status if act.status in returns else Status.RUNNING
     if Status.RUNNING in returns:
         return Act(act.ticks, status)
@@ -138,12 +138,13 @@ def _listed(statuses: Iterable[Status]) -> str:
 
 
 class ScriptedTree:
-    """A tree file on scripted leaves, before its first tick; it is ticked every `TICK` simulated seconds, from 0.
+    """A tree file with scripted leaves; it is ticked every `TICK` simulated seconds, from 0.
 
     `script` maps leaves, by tag, by tree path or by the path's last parts ("bring/carry"), to their scripts; a path
-    goes before a tag. The other leaves do as `default` says, as far as they can: one that never ends so keeps RUNNING,
-    one that never is RUNNING ends at once. `leaves` are the classes whose ports and statuses the leaves have, all of
-    ours if not given; `inputs` are those of `load_tree`. Two trees at a time share the blackboard.
+    goes before a tag. The other leaves follow the script `default` as far as they can: a leaf that never ends in its
+    status stays RUNNING, one that is never RUNNING ends at once. `leaves` are the real classes, whose ports and
+    statuses the scripted leaves take over, by default all of ours; `inputs` are those of `load_tree`. Two trees at a
+    time share the blackboard.
 
     Raises:
         trees.TreeError: the tree file has findings.
@@ -215,13 +216,13 @@ class ScriptedTree:
         self.tree.tick()
         return self.status
 
-    def run(self, until: int | None = None) -> Status:
+    def run(self, until: int | None = None, max_ticks: int = MAX_TICKS) -> Status:
         """Tick until the tree ends, or until tick number `until`; the root's status.
 
         Raises:
-            RuntimeError: without `until`, the tree has not ended after `MOST_TICKS`; the message says what still runs.
+            RuntimeError: without `until`, the tree has not ended after `max_ticks`; the message says what still runs.
         """
-        while self.ticks < (until or MOST_TICKS) and self.tick() is Status.RUNNING:
+        while self.ticks < (until or max_ticks) and self.tick() is Status.RUNNING:
             pass
         if until is None and self.status is Status.RUNNING:
             raise RuntimeError(

@@ -1,9 +1,9 @@
-"""A tree as text to look at."""
+"""A tree as indented text."""
 
 from collections.abc import Iterator
 from pathlib import Path
 
-from regrasp.trees.graph import Node, printable, read_graph
+from regrasp.trees.graph import Node, one_line, read_graph
 
 
 def show_tree(path: Path) -> str:
@@ -18,7 +18,7 @@ def show_tree(path: Path) -> str:
 
 
 def to_ascii(root: Node) -> str:
-    """The tree with its subtrees filled in, a line a node: name, type, memory or policy, ports; of a run, its stats."""
+    """The tree with its subtrees expanded, one line per node: name, type, memory or policy, ports, a run's stats."""
     return "\n".join([_label(root), *_below(root, "")])
 
 
@@ -35,4 +35,4 @@ def _label(node: Node) -> str:
     words += [f" ({node.note})"] * bool(node.note) + [f" +{node.hidden} nodes"] * bool(node.hidden)
     words += [f" [{node.stats.text}]"] if node.stats else []
     words += [" FAILED"] * node.failed
-    return printable(" ".join(filter(None, words)))
+    return one_line(" ".join(filter(None, words)))

@@ -13,9 +13,9 @@ _LETTERS = {Status.RUNNING: "R", Status.SUCCESS: "S", Status.FAILURE: "F", Statu
 
 
 class TickTable(py_trees.visitors.VisitorBase):
-    """A visitor that keeps a letter a tick for each node.
+    """A visitor that keeps one letter per tick for each node.
 
-    R running, S success, F failure, X stopped from above while it ran, a dot when it was not visited.
+    R running, S success, F failure, X stopped by its parent while it ran, a dot when it was not visited.
     """
 
     def __init__(self, root: py_trees.behaviour.Behaviour) -> None:

@@ -1,8 +1,8 @@
-"""What every tree must stand whatever its leaves do: it ends, and a stop at any tick leaves nothing at work.
+"""Tests that every tree must pass whatever its leaves do: it ends, and a stop at any tick leaves no leaf running.
 
-The leaves are scripted. In one trial all succeed at once that can, in one all fail, and in the others each draws from a
-seed how long it runs and how it ends, of the ways that the real leaf has; after a few times it succeeds at once, as a
-guard must that is asked at every tick.
+The leaves are scripted. In one trial all leaves succeed that can, in one all fail, and in the others a seed draws how
+long each runs and how it ends, among the statuses of the real leaf. After a few executions a leaf succeeds at once, as
+a guard must that is ticked at every tick.
 """
 
 from collections.abc import Iterator, Mapping
@@ -13,18 +13,26 @@ from random import Random
 import py_trees
 from py_trees.common import Status
 
-from regrasp.trees.scripted import MOST_TICKS, ScriptedTree
-
-SEEDS = 10
-DRAWN = 6  # acts of a leaf
-LENGTHS = (1, 2, 3, 8)  # ticks of an act
-FAILING = 0.25  # share of the acts: with more, most trials would end where the tree begins
-MOST_STOPS = 100  # of one trial: each runs the tree anew
+from regrasp.trees.scripted import MAX_TICKS, ScriptedTree
 
 
 @dataclass(frozen=True)
-class Trial:
-    """A tree file and its leaves' scripts by path, to be run as often as need be."""
+class TrialParameters:
+    """How many trials there are, and how the scripts are drawn."""
+
+    seeds: int = 10  # trials with drawn scripts; choice
+    acts: int = 6  # of a leaf, before it succeeds at once; choice
+    ticks: tuple[int, ...] = (1, 2, 3, 8)  # that an act may take; choice
+    failing_share: float = 0.25  # of the acts; choice: with more, most trials would end where the tree begins
+    max_stops: int = 100  # per trial; choice: each runs the tree anew
+
+
+_DEFAULTS = TrialParameters()
+
+
+@dataclass(frozen=True)
+class ScriptedTrial:
+    """A tree file and its leaves' scripts by path; it can be run many times."""
 
     name: str
     path: Path
@@ -37,43 +45,51 @@ class Trial:
         return ScriptedTree(self.path, self.script, leaves=self.leaves)
 
 
-def trials(path: Path, leaves: Mapping[str, type] | None = None) -> Iterator[Trial]:
+def trials(
+    path: Path, leaves: Mapping[str, type] | None = None, parameters: TrialParameters = _DEFAULTS
+) -> Iterator[ScriptedTrial]:
     """The trials of a tree file; `leaves` and errors as for `ScriptedTree`."""
-    returns = {at: leaf.RETURNS for at, leaf in Trial("", path, {}, leaves).tree().leaves.items()}
-    yield Trial("what can succeed does", path, {at: _ends(can)[-1] for at, can in returns.items()}, leaves)
-    yield Trial("what can fail does", path, {at: _ends(can)[0] for at, can in returns.items()}, leaves)
-    for seed in range(SEEDS):
+    returns = {at: leaf.RETURNS for at, leaf in ScriptedTrial("", path, {}, leaves).tree().leaves.items()}
+    yield ScriptedTrial("what can succeed does", path, {at: _ends(can)[-1] for at, can in returns.items()}, leaves)
+    yield ScriptedTrial("what can fail does", path, {at: _ends(can)[0] for at, can in returns.items()}, leaves)
+    for seed in range(parameters.seeds):
         random = Random(seed)
-        yield Trial(f"drawn from seed {seed}", path, {at: _drawn(random, can) for at, can in returns.items()}, leaves)
+        script = {at: _drawn(random, can, parameters) for at, can in returns.items()}
+        yield ScriptedTrial(f"drawn from seed {seed}", path, script, leaves)
 
 
 def _ends(returns: frozenset[Status]) -> list[str]:
-    """How a leaf of these statuses may end, failure first; one that never ends runs."""
+    """How a leaf that returns these statuses may end, failure first; one that never ends is running."""
     return sorted(status.value.lower() for status in returns - {Status.RUNNING}) or ["running"]
 
 
-def _drawn(random: Random, returns: frozenset[Status]) -> str:
+def _drawn(random: Random, returns: frozenset[Status], parameters: TrialParameters) -> str:
     fails, succeeds = _ends(returns)[0], _ends(returns)[-1]
-    lengths = LENGTHS if Status.RUNNING in returns else (1,)
-    acts = [(random.choice(lengths), fails if random.random() < FAILING else succeeds) for _ in range(DRAWN)]
+    lengths = parameters.ticks if Status.RUNNING in returns else (1,)
+    acts = [
+        (random.choice(lengths), fails if random.random() < parameters.failing_share else succeeds)
+        for _ in range(parameters.acts)
+    ]
     return ", ".join([*(f"{ticks} {end}" for ticks, end in acts), succeeds])
 
 
 def never_ends(path: Path, leaves: Mapping[str, type] | None = None) -> Iterator[str]:
-    """A paragraph for each trial in which the tree does not end, or leaves a leaf at work when it does."""
+    """A paragraph for each trial in which the tree does not end, or ends while a leaf is running."""
     for trial in trials(path, leaves):
         tree = trial.tree()
-        if tree.run(MOST_TICKS) is Status.RUNNING:
-            yield f"{trial.name}: the tree still runs after {MOST_TICKS} ticks, in {tree.unfinished}"
+        if tree.run(MAX_TICKS) is Status.RUNNING:
+            yield f"{trial.name}: the tree still runs after {MAX_TICKS} ticks, in {tree.unfinished}"
         elif tree.running:
             yield f"{trial.name}: the tree ended, but {', '.join(tree.running)} still runs\n{tree.table()}"
 
 
-def left_by_a_stop(path: Path, leaves: Mapping[str, type] | None = None) -> Iterator[str]:
-    """A paragraph for each trial and tick after which a stop of the tree leaves a leaf at work or stops it wrongly."""
+def left_by_a_stop(
+    path: Path, leaves: Mapping[str, type] | None = None, max_stops: int = TrialParameters.max_stops
+) -> Iterator[str]:
+    """A paragraph for each trial and tick after which a stop of the tree leaves a leaf running or stops it wrongly."""
     for trial in trials(path, leaves):
         tick = 0
-        while (tree := trial.tree()).run(until=(tick := tick + 1)) is Status.RUNNING and tick <= MOST_STOPS:
+        while (tree := trial.tree()).run(until=(tick := tick + 1)) is Status.RUNNING and tick <= max_stops:
             due = {leaf: node.stopped + (leaf in tree.running) for leaf, node in tree.leaves.items()}
             tree.cancel_at(tick)
             wrong = {leaf for leaf, node in tree.leaves.items() if node.stopped != due[leaf]}.union(tree.running)

@@ -1,7 +1,7 @@
-"""The words of a tree file: which elements there are, and which attributes and children each takes.
+"""The elements that a tree file may hold, and the attributes and children that each takes.
 
-Narrower than what py_trees' parser takes: what it would silently misread is left out (`success_on_selected` cannot be
-built from XML), and so is what reads the wall clock (`Timeout`) or the bare blackboard.
+This is less than py_trees' parser accepts. Left out are elements that it would silently misread (`success_on_selected`
+cannot be built from XML), and those that read the wall clock (`Timeout`) or the blackboard directly.
 """
 
 import inspect
@@ -19,18 +19,16 @@ from py_trees.ports_utils import convert_str_to_type, is_instance_of_type
 from regrasp.interfaces.quote import MOST, cut
 
 Accepts = Any  # a type, or the words that may stand there as a tuple of strings
-# The names that a kind of thing has: {"socket": ["back_1", "back_2"]}. In place of a list a mapping says of each name
-# why it cannot be used here; "" means that it can.
-Names = Mapping[str, Collection[str]]
+# The names in a cell by kind of object: {"socket": ["back_1", "back_2"]}. A mapping in place of the list gives for each
+# name the reason why it cannot be used here; "" means that it can.
+CellNames = Mapping[str, Collection[str]]
 ANY_STATUS = frozenset({Status.SUCCESS, Status.FAILURE, Status.RUNNING})
-MOST_LISTED = 12  # known words that are listed when none is near
-MOST_COMPARED = 200  # known words among which the nearest is looked for
 _EXAMPLES = {int: "a whole number such as 3", float: "a number such as 0.5", bool: "true or false"}
 
 
 @dataclass(frozen=True)
 class Attribute:
-    """What one attribute takes, and where its value goes. A number must be more than `above`."""
+    """What values an attribute takes, and whether it is a port. A number must be more than `above`."""
 
     accepts: Accepts
     required: bool = True
@@ -40,7 +38,7 @@ class Attribute:
     above: float | None = None
     default: Any = None
     about: str = ""
-    refused: Mapping[str, str] = field(default_factory=dict)  # of the words that it accepts: why one does not do here
+    refused: Mapping[str, str] = field(default_factory=dict)  # accepted words that cannot be used here, and why
 
     @property
     def takes(self) -> str:
@@ -51,11 +49,11 @@ class Attribute:
         return getattr(self.accepts, "__name__", str(self.accepts)) + limit
 
     def problem(self, value: str) -> str | None:
-        """Why this literal does not do, and what would; None if it does."""
+        """What is wrong with this literal, and what would be right; None if it is valid."""
         if isinstance(self.accepts, tuple):
             if value in self.accepts:
                 return self.refused.get(value)
-            return f"is unknown; {nearest(value, [word for word in self.accepts if word not in self.refused])}"
+            return f"is unknown; {suggestion(value, [word for word in self.accepts if word not in self.refused])}"
         right = f"write {_EXAMPLES.get(self.accepts, self.takes)}"
         try:
             converted, result = convert_str_to_type(value, self.accepts)
@@ -72,7 +70,7 @@ class Attribute:
 
 
 @dataclass(frozen=True)
-class Kind:
+class ElementKind:
     """One kind of element; `max_children` None for any number, `returns` the statuses that its `update` may return."""
 
     attributes: Mapping[str, Attribute] = field(default_factory=dict)
@@ -95,34 +93,36 @@ _DECORATORS = {
     "SuccessIsFailure": "FAILURE when the child succeeds.",
     "SuccessIsRunning": "RUNNING when the child succeeds.",
 }
-_SELECTOR = Kind(_MEMORY, 1, None, "Ticks its children in turn until one does not fail.")
+_SELECTOR = ElementKind(_MEMORY, 1, None, "Ticks its children in turn until one does not fail.")
 BUILT_IN = {
-    "Sequence": Kind(_MEMORY, 1, None, "Ticks its children in turn until one does not succeed."),
+    "Sequence": ElementKind(_MEMORY, 1, None, "Ticks its children in turn until one does not succeed."),
     "Fallback": _SELECTOR,
     "Selector": _SELECTOR,
-    "Parallel": Kind({"policy": _POLICY}, 1, None, "Ticks all its children at every tick; fails when one fails."),
-    "Retry": Kind(
+    "Parallel": ElementKind(
+        {"policy": _POLICY}, 1, None, "Ticks all its children at every tick; fails when one fails."
+    ),
+    "Retry": ElementKind(
         {"num_failures": Attribute(int, above=0, about="tries")}, 1, 1, "Ticks its child anew after a failure."
     ),
-    "Repeat": Kind(
+    "Repeat": ElementKind(
         {"num_success": Attribute(int, above=0, about="successes")}, 1, 1, "Ticks its child anew after a success."
     ),
-    "OneShot": Kind(
+    "OneShot": ElementKind(
         {"policy": Attribute(("on_completion", "on_successful_completion"))},
         1,
         1,
         "Ticks its child to its end once; later the same status again.",
     ),
-    "Condition": Kind(
+    "Condition": ElementKind(
         {"status": Attribute(("success", "failure", "running"))},
         1,
         1,
         "SUCCESS when the child has this status, RUNNING until then.",
     ),
-    **{tag: Kind({}, 1, 1, about) for tag, about in _DECORATORS.items()},
+    **{tag: ElementKind({}, 1, 1, about) for tag, about in _DECORATORS.items()},
 }
 
-COUNTERPARTS = {  # of BehaviorTree.CPP's words, and of py_trees' that are left out
+COUNTERPARTS = {  # for elements of BehaviorTree.CPP, and those of py_trees that are left out
     "ForceFailure": "<SuccessIsFailure>",
     "ForceSuccess": "<FailureIsSuccess>",
     "ReactiveFallback": '<Fallback memory="false">',
@@ -132,21 +132,22 @@ COUNTERPARTS = {  # of BehaviorTree.CPP's words, and of py_trees' that are left 
 }
 
 
-def nearest(word: str, known: Collection[str]) -> str:
-    """The words that help after an unknown one: the nearest known one, else all that there are."""
+def suggestion(word: str, known: Collection[str], max_listed: int = 12, max_compared: int = 200) -> str:
+    """What a message about an unknown word suggests: the nearest known word, else a list of the known ones."""
     words = sorted(known)
-    alike = [known for known in words if known.casefold() == word.casefold()]
-    if near := alike or get_close_matches(word[:MOST], words[:MOST_COMPARED], 1):
+    same = [known for known in words if known.casefold() == word.casefold()]
+    if near := same or get_close_matches(word[:MOST], words[:max_compared], 1):
         return f"did you mean {cut(near[0])}?"
-    more = f" and {len(words) - MOST_LISTED} more" if words[MOST_LISTED:] else ""
-    return f"there are {', '.join(map(cut, words[:MOST_LISTED]))}{more}" if words else "there are none, remove it"
+    more = f" and {len(words) - max_listed} more" if words[max_listed:] else ""
+    return f"there are {', '.join(map(cut, words[:max_listed]))}{more}" if words else "there are none, remove it"
 
 
-def kinds(leaves: Mapping[str, type], names: Names | None = None) -> dict[str, Kind]:
+def element_kinds(leaves: Mapping[str, type], names: CellNames | None = None) -> dict[str, ElementKind]:
     """Every element but SubTree: the built-in ones and the leaves.
 
-    A leaf may say more than py_trees asks: a port `above` and `names` (see `regrasp.behaviors.leaf.LeafPort`), the
-    class `RETURNS`. A port for a name takes those in `names`, or any string where there are none.
+    A leaf may declare more than py_trees asks for: its ports `above` and `names` (see
+    `regrasp.behaviors.leaf.LeafPort`), its class `RETURNS`. A port for a name takes those in `names`, or any string
+    where there are none.
 
     Raises:
         TypeError: a leaf class without ports, which the parser could not build.
@@ -154,7 +155,7 @@ def kinds(leaves: Mapping[str, type], names: Names | None = None) -> dict[str, K
     return BUILT_IN | {tag: _leaf_kind(tag, leaf, names or {}) for tag, leaf in leaves.items()}
 
 
-def _leaf_kind(tag: str, leaf: Any, names: Names) -> Kind:
+def _leaf_kind(tag: str, leaf: Any, names: CellNames) -> ElementKind:
     if not issubclass(leaf, PortsMixin) or not issubclass(leaf, py_trees.behaviour.Behaviour):
         raise TypeError(f"leaf {tag} must be a py_trees.ports.BehaviourWithPorts")
     ports = {
@@ -164,7 +165,7 @@ def _leaf_kind(tag: str, leaf: Any, names: Names) -> Kind:
     }
     is_composite = issubclass(leaf, py_trees.composites.Composite)
     is_parent = is_composite or issubclass(leaf, py_trees.decorators.Decorator)
-    return Kind(
+    return ElementKind(
         ports,
         min_children=int(is_parent),
         max_children=None if is_composite else int(is_parent),
@@ -173,7 +174,7 @@ def _leaf_kind(tag: str, leaf: Any, names: Names) -> Kind:
     )
 
 
-def _port(port: Any, is_output: bool, names: Names) -> Attribute:
+def _port(port: Any, is_output: bool, names: CellNames) -> Attribute:
     known = names.get(getattr(port, "names", None) or "")
     return Attribute(
         port.data_type if known is None else tuple(known),

@@ -1,4 +1,4 @@
-"""The tree that will run, subtrees filled in, and where its ports' values come from, as py_trees' parser does it."""
+"""The tree that will run, its subtrees expanded and its ports wired to blackboard keys as py_trees' parser does it."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -6,43 +6,44 @@ from typing import Any
 
 from regrasp.interfaces.quote import cut, quoted
 from regrasp.trees.element import Element, key_of
-from regrasp.trees.vocabulary import Attribute, Kind
+from regrasp.trees.vocabulary import Attribute, ElementKind
 
-# After subtrees are filled in: a few nested ones could stand for billions of nodes, and building and ticking recurse.
+# With subtrees expanded: a few nested ones could stand for billions of nodes, and building and ticking are recursive.
 MAX_NODES = 2000
 MAX_TREE_DEPTH = 150
 
 
 @dataclass(frozen=True)
 class Wire:
-    """A port on a blackboard path: what a sentence calls it, where it stands, and the type of its values.
+    """A port that is wired to a blackboard key.
 
-    The type is None where nobody knows it: at a misspelt port or element, which may mean to write.
+    `what` is its name in messages, `line` its place in the file, `path` the key, `type` that of its values. The type is
+    None where it is unknown: a misspelt port or element, which may be meant to write.
     """
 
     what: str
     line: int
     path: str
     type: Any
-    required: bool = False  # a reader that cannot do without
-    seeded: bool = False  # a writer whose default stands there from the start
+    required: bool = False  # a reader that needs a value
+    seeded: bool = False  # a writer whose default is on the blackboard from the start
 
 
 @dataclass(eq=False)
-class Node:
-    """A node of the tree that will run; `kind` None for a subtree and for an element that nobody knows.
+class ExpandedNode:
+    """A node of the tree that will run; `kind` is None for a subtree and for an unknown element.
 
-    `constants` are its attributes' literals, also those that came through a subtree's keys.
+    `constants` are its attributes' literals, also those passed through a subtree's keys.
     """
 
     element: Element
-    kind: Kind | None = None
-    children: list["Node"] = field(default_factory=list)
+    kind: ElementKind | None = None
+    children: list["ExpandedNode"] = field(default_factory=list)
     reads: list[Wire] = field(default_factory=list)
     writes: list[Wire] = field(default_factory=list)
     constants: dict[str, str] = field(default_factory=dict)
 
-    def walk(self) -> Iterator["Node"]:
+    def walk(self) -> Iterator["ExpandedNode"]:
         """This node and all below it, in tick order."""
         yield self
         for child in self.children:
@@ -51,7 +52,7 @@ class Node:
 
 @dataclass(frozen=True)
 class _Source:
-    """What a key stands for: a blackboard path, or a constant."""
+    """The source of a value: a blackboard path, or a constant."""
 
     text: str
     is_constant: bool
@@ -59,13 +60,13 @@ class _Source:
 
 @dataclass(frozen=True)
 class _Scope:
-    """One subtree instance: its namespace, and the keys that its caller maps."""
+    """One subtree instance: its namespace, and the keys that the SubTree element maps."""
 
     namespace: str
     keys: Mapping[str, _Source]
 
     def source(self, value: str) -> _Source:
-        """What an attribute's value stands for; braces that make no key are a finding elsewhere."""
+        """The source of an attribute's value; malformed braces count as a constant, `check_tree` reports them."""
         try:
             key = key_of(value)
         except ValueError:
@@ -75,46 +76,47 @@ class _Scope:
         return self.keys.get(key, _Source(f"{self.namespace}/{key}", is_constant=False))
 
     def inner(self, tree: Element, call: Element | None = None) -> "_Scope":
-        """The scope of a subtree that is called here; without a call, that of the main tree."""
+        """The scope of a subtree that is included here by `call`; without a call, that of the main tree."""
         values = {**tree.attributes, **(call.attributes if call else {})}
         keys = {name: self.source(value) for name, value in values.items() if name not in ("ID", "name")}
         return _Scope(f"{self.namespace}/{call.name}" if call else "", keys)
 
 
-class TooLarge(Exception):  # noqa: N818 - it stops the filling in
+class TreeTooLarge(Exception):  # noqa: N818 - it stops the expansion
     """The tree grows beyond `MAX_NODES` or `MAX_TREE_DEPTH`; the message is the finding."""
 
 
-class Filled:
-    """The main tree with its subtrees filled in: `root`, and the `findings` (line, sentence) about its wires.
+class ExpandedTree:
+    """The main tree with its subtrees expanded: `root`, and the `findings` (line, message) about its wires.
 
-    Raises TooLarge, also where trees include one another in a loop.
+    Raises:
+        TreeTooLarge: too many nodes or levels, also where trees include one another in a loop.
     """
 
-    def __init__(self, main: Element, trees: Mapping[str, Element], kinds: Mapping[str, Kind]) -> None:
+    def __init__(self, main: Element, trees: Mapping[str, Element], kinds: Mapping[str, ElementKind]) -> None:
         self._trees, self._kinds, self._count = trees, kinds, 0
         self.findings: list[tuple[int, str]] = []
-        self.root = Node(main)
-        self._fill(self.root, main, _Scope("", {}).inner(main), 1)
+        self.root = ExpandedNode(main)
+        self._expand(self.root, main, _Scope("", {}).inner(main), 1)
         self.findings += _mistyped([*self.root.walk()])
 
-    def _fill(self, node: Node, parent: Element, scope: _Scope, depth: int) -> None:
+    def _expand(self, node: ExpandedNode, parent: Element, scope: _Scope, depth: int) -> None:
         for child in parent.children:
             self._count += 1
             if self._count > MAX_NODES:
-                raise TooLarge(f"more than {MAX_NODES} nodes once the subtrees are filled in; include fewer")
+                raise TreeTooLarge(f"more than {MAX_NODES} nodes once the subtrees are expanded; include fewer")
             if depth > MAX_TREE_DEPTH:
-                raise TooLarge(f"deeper than {MAX_TREE_DEPTH} nodes once the subtrees are filled in; nest fewer")
-            inner = Node(child, self._kinds.get(child.tag))
+                raise TreeTooLarge(f"deeper than {MAX_TREE_DEPTH} nodes once the subtrees are expanded; nest fewer")
+            inner = ExpandedNode(child, self._kinds.get(child.tag))
             node.children.append(inner)
             if child.tag != "SubTree":
                 self._connect(inner, scope)
-                self._fill(inner, child, scope, depth + 1)
+                self._expand(inner, child, scope, depth + 1)
             elif tree := self._trees.get(child.attributes.get("ID", "")):
-                self._fill(inner, tree, scope.inner(tree, child), depth + 1)
+                self._expand(inner, tree, scope.inner(tree, child), depth + 1)
 
-    def _connect(self, node: Node, scope: _Scope) -> None:
-        """Sort the node's attributes into reads, writes and constants; findings where a key brings what does not do."""
+    def _connect(self, node: ExpandedNode, scope: _Scope) -> None:
+        """Sort the node's attributes into reads, writes and constants; add findings about values passed by keys."""
         element = node.element
         for name, value in element.attributes.items():
             source = scope.source(value)
@@ -129,7 +131,7 @@ class Filled:
             if value.startswith("{") and attribute.takes_key:  # literals are checked where they stand
                 self._wire(node, what, attribute, source)
 
-    def _wire(self, node: Node, what: str, attribute: Attribute, source: _Source) -> None:
+    def _wire(self, node: ExpandedNode, what: str, attribute: Attribute, source: _Source) -> None:
         wrong = None
         if source.is_constant and attribute.is_output:
             wrong = f"is an output, but {quoted(source.text)} is given for the key; give it a {{key}}"
@@ -147,8 +149,8 @@ class Filled:
             self.findings.append((node.element.line, f"{what} {wrong}"))
 
 
-def _mistyped(nodes: list[Node]) -> Iterator[tuple[int, str]]:
-    """A key that gets values of two types, or of a type that its reader does not take."""
+def _mistyped(nodes: list[ExpandedNode]) -> Iterator[tuple[int, str]]:
+    """Findings about keys that get values of two types, or of a type that their reader does not take."""
     first: dict[str, Wire] = {}
     for wire in (wire for node in nodes for wire in node.writes if wire.type is not None):
         other = first.setdefault(wire.path, wire)
@@ -163,7 +165,7 @@ def _mistyped(nodes: list[Node]) -> Iterator[tuple[int, str]]:
 
 
 def _never(written: Any, read: Any) -> bool:
-    """Whether no value of one type is of the other; False for what is no plain class."""
+    """Whether no value of one type is also of the other; False for anything but plain classes."""
     if not (isinstance(written, type) and isinstance(read, type)):
         return False
     return not issubclass(written, read) and not issubclass(read, written)

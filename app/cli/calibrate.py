@@ -63,11 +63,13 @@ def calibrate(
 
     board = steps.Board(columns, rows, square)
     if images is not None:
-        steps.run(steps.pictures_in(images), board, shown(images), out, draw, None)
+        steps.run_calibration(steps.pictures_in(images), board, shown(images), out, draw, None)
         return
     cameras = load_cell(resolve("cell", cell, Path())).known.cameras
     spec = next((c for c in cameras if c.name == camera), None)
     if spec is None:
         message = f"no camera {quoted(camera)}; {nearest(camera, [c.name for c in cameras])}"
         raise Findings([Finding("--camera", 0, message)])
-    steps.run(steps.rendered_pictures(spec, board, views, seed), board, "--views", out, draw, spec.intrinsics)
+    steps.run_calibration(
+        steps.rendered_pictures(spec, board, views, seed), board, "--views", out, draw, spec.intrinsics
+    )

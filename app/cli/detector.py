@@ -109,12 +109,12 @@ def evaluate_detector(
     if wrong:
         raise Findings(wrong)
     loaded = _load(cell)
-    from regrasp.app.studies.detector.score import answer, held_out_shots, summary
+    from regrasp.app.studies.detector.score import detector_figures, held_out_shots, score_picture
 
     detector = _detector(loaded, model)
     with _progress("drawing held-out pictures", 5 * held_out) as tell:
-        shots = held_out_shots(loaded, seed, held_out, tell=tell)
-    figures = summary([answer(detector, shot, loaded, number) for number, shot in enumerate(shots)])
+        shots = held_out_shots(loaded, seed, held_out, report_progress=tell)
+    figures = detector_figures([score_picture(detector, shot, loaded, number) for number, shot in enumerate(shots)])
     if out is not None:
         out.parent.mkdir(parents=True, exist_ok=True)
         write_whole(out, json.dumps(figures, indent=2) + "\n")
@@ -148,11 +148,11 @@ def _detector(cell: "Cell", model: Path | None) -> Any:
 
 
 def _print(figures: dict[str, Any]) -> None:
-    from regrasp.app.studies.demo import wilson
+    from regrasp.app.studies.statistics import wilson_interval
     from regrasp.app.studies.table import print_table
 
     lines = [
-        (name, f"{right}/{all_}", "{:.1f} to {:.1f} %".format(*(100 * x for x in wilson(right, all_))))
+        (name, f"{right}/{all_}", "{:.1f} to {:.1f} %".format(*(100 * x for x in wilson_interval(right, all_))))
         for name, (right, all_) in (*figures["recall_by_occlusion"].items(), ("all", figures["recall"]))
     ]
     print_table(("hidden", f"found at {figures['min_score']}", "95 % interval"), lines)

@@ -119,8 +119,8 @@ def perceive(
     with late_imports():
         from regrasp.app.frames import perceive as steps  # brings OpenCV and the compiler
 
-    files = [steps.Files(*each) for each in zip(rgb, depths, models, cameras, poses, strict=True)]
-    raise typer.Exit(0 if steps.run(technique, files, known, depth_unit, draw) else 1)
+    files = [steps.FrameFiles(*each) for each in zip(rgb, depths, models, cameras, poses, strict=True)]
+    raise typer.Exit(0 if steps.run_perceive(technique, files, known, depth_unit, draw) else 1)
 
 
 def _each(option: str, given: Sequence[T], count: int, wrong: list[Finding], once: bool = True) -> list[T]:
@@ -194,7 +194,9 @@ def snapshot(
     if wrong:
         raise Findings(wrong)
     with late_imports():
-        from regrasp.app.frames.snapshot import take  # brings the planner, the compiler and the physics: seconds
+        from regrasp.app.frames.snapshot import (
+            write_snapshot,
+        )  # brings the planner, the compiler and the physics: seconds
 
-    take(loaded, camera, frames, out)
+    write_snapshot(loaded, camera, frames, out)
     typer.echo(f"written to {shown(out)}")

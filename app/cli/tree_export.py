@@ -14,7 +14,7 @@ from regrasp.app.scenario.load import check_tree_file
 from regrasp.app.scenario.references import tree_text
 from regrasp.interfaces.quote import quoted
 from regrasp.trees import Node, TreeSyntaxError, collapsed, read_graph, recorded, run_stats
-from regrasp.trees.export import FORMATS, SUFFIXES, THEMES, export_tree
+from regrasp.trees.export import FORMAT_OF_SUFFIX, FORMATS, THEMES, export_tree
 
 MOST_MISSING = 3  # nodes that are named
 
@@ -68,21 +68,23 @@ def _form(request: Request) -> str:
 
 def _named(out: Path) -> str:
     """The format that a file's name ends like, '' for none."""
-    return SUFFIXES.get(out.suffix.lower(), "")
+    return FORMAT_OF_SUFFIX.get(out.suffix.lower(), "")
 
 
 def _wrong_form(form: str, out: Path | None) -> Iterator[Finding]:
     if form not in FORMATS:
         yield Finding("--format", 0, f"no format {quoted(form)}; {nearest(form, FORMATS)}")
     elif out and _named(out) not in ("", form):
-        other = out.with_suffix(next(suffix for suffix, name in SUFFIXES.items() if name == form))
+        other = out.with_suffix(next(suffix for suffix, name in FORMAT_OF_SUFFIX.items() if name == form))
         wrong = f"is a name of {_named(out)}, not of {form}; write {shown(other)}, or leave --format out"
         yield Finding(shown(out), 0, wrong)
 
 
 def _wrong_out(out: Path, form: str) -> Iterator[Finding]:
     if not form:
-        yield Finding(shown(out), 0, f"the name ends in none of {', '.join(SUFFIXES)}; rename it, or name a --format")
+        yield Finding(
+            shown(out), 0, f"the name ends in none of {', '.join(FORMAT_OF_SUFFIX)}; rename it, or name a --format"
+        )
     if not out.absolute().parent.is_dir():
         wrong = f"there is no folder {quoted(shown(out.absolute().parent))}; name a file in a folder that exists"
         yield Finding(shown(out), 0, wrong)

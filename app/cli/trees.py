@@ -121,9 +121,9 @@ def leaves(name: Annotated[str | None, typer.Argument(help="One element, in full
       regrasp trees leaves SpiralSearch
     """
     from regrasp.behaviors import LEAVES  # brings the planner and the compiler: a second
-    from regrasp.trees.catalogue import describe, words
+    from regrasp.trees.catalogue import all_elements, describe
 
-    known = words(LEAVES)
+    known = all_elements(LEAVES)
     if name is not None and name not in known:
         raise Findings([Finding(name, 0, f"no element {quoted(name)}; {nearest(name, known)}")])
     for tag, kind in known.items():

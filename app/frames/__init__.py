@@ -1,1 +1,1 @@
-"""A person's own frames: pictures and calibrations as files, and what is done with them."""
+"""A user's own frames: images and calibrations as files, calibration and pose estimation from them."""

@@ -1,4 +1,4 @@
-"""What `regrasp calibrate` does: pictures of a checkerboard in, a user's or rendered; a report and a file out."""
+"""`regrasp calibrate`: from a user's or rendered pictures of a checkerboard to a report and a calibration file."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -20,19 +20,25 @@ from regrasp.interfaces.frame import Intrinsics
 from regrasp.perception.camera.calibration import Calibration, calibrate, find_board
 from regrasp.sim.cameras.board import board_pictures, board_poses
 
-FloatArray = NDArray[np.float64]
-Picture = tuple[str, Callable[[], NDArray[np.uint8]]]  # a name, and what gives the RGB image
+Picture = tuple[str, Callable[[], NDArray[np.uint8]]]  # a name, and a function that returns the RGB image
 
-MIN_VIEWS = 5  # choice: three determine a camera, five say how well
-MIN_SIDE = 64  # pixels; a smaller picture shows no board
-ALIKE = 0.02  # of the picture's width, by which corners move on average; choice: views nearer to each other are one
-MOST_DOUBT = 0.01  # of the focal length; choice: more comes of views that are all alike
-MAGNIFIED = 50.0  # residuals in the drawn pictures
+
+@dataclass(frozen=True)
+class CalibrationChecks:
+    """What a set of pictures must fulfil to be used."""
+
+    min_views: int = 5  # choice: three determine a camera, five also its uncertainty
+    min_side: int = 64  # px, width and height; choice: a smaller picture shows no board
+    min_view_distance: float = 0.02  # of the picture's width, mean motion of the corners; choice: nearer views are one
+    max_focal_deviation: float = 0.01  # of the focal length, standard deviation; choice: more comes of similar views
+
+
+_DEFAULTS = CalibrationChecks()
 
 
 @dataclass(frozen=True)
 class Board:
-    """A checkerboard by its inner corners; `square` is the width of a square in metres."""
+    """A checkerboard: the numbers of its inner corners, and the width `square` of a square in metres."""
 
     columns: int
     rows: int
@@ -40,51 +46,71 @@ class Board:
 
 
 def rendered_pictures(camera: CameraSpec, board: Board, count: int, seed: int) -> list[Picture]:
-    """Pictures of a board that we draw, by the camera's colour imager."""
+    """`count` rendered pictures of a board as the camera's colour imager sees it."""
     k, shape = camera.intrinsics, (board.columns, board.rows, board.square)
     poses = board_poses(k, *shape, count, np.random.default_rng(seed))
     made = enumerate(board_pictures(k, poses, *shape), 1)
     return [(f"view_{number:03}", partial(np.asarray, rgb)) for number, rgb in made]
 
 
-def pictures_in(folder: Path) -> list[Picture]:
-    """The image files of a folder in the order of their names. Raises `Findings`."""
+def pictures_in(folder: Path, checks: CalibrationChecks = _DEFAULTS) -> list[Picture]:
+    """The image files of a folder in the order of their names.
+
+    Raises:
+        Findings: no folder, or too few images in it. Reading a picture raises it for what is no image, or too small.
+    """
     if not folder.is_dir():
         raise Findings([Finding(shown(folder), 0, "is no folder; name one that holds pictures of a checkerboard")])
     files = sorted(path for path in folder.iterdir() if path.suffix.lower() in IMAGE_SUFFIXES)
-    if len(files) < MIN_VIEWS:
-        message = f"holds {len(files)} images ({', '.join(IMAGE_SUFFIXES)}); take {MIN_VIEWS} or more of the board"
+    if len(files) < checks.min_views:
+        message = (
+            f"holds {len(files)} images ({', '.join(IMAGE_SUFFIXES)}); take {checks.min_views} or more of the board"
+        )
         raise Findings([Finding(shown(folder), 0, message)])
-    return [(path.name, partial(_read, path)) for path in files]
+    return [(path.name, partial(_read, path, checks.min_side)) for path in files]
 
 
-def _read(path: Path) -> NDArray[np.uint8]:
+def _read(path: Path, min_side: int) -> NDArray[np.uint8]:
     image = read_rgb(path)
-    if min(image.shape[:2]) < MIN_SIDE:
-        message = f"is {image.shape[1]}x{image.shape[0]} pixels; give pictures of at least {MIN_SIDE} each way"
+    if min(image.shape[:2]) < min_side:
+        message = f"is {image.shape[1]}x{image.shape[0]} pixels; give pictures of at least {min_side} each way"
         raise Findings([Finding(shown(path), 0, message)])
     return image
 
 
-def run(
-    pictures: Sequence[Picture], board: Board, source: str, out: Path, draw: Path | None, true: Intrinsics | None
+def run_calibration(
+    pictures: Sequence[Picture],
+    board: Board,
+    source: str,
+    out: Path,
+    draw: Path | None,
+    true: Intrinsics | None,
+    checks: CalibrationChecks = _DEFAULTS,
 ) -> None:
-    """Calibrate, print the report, write the file and the drawn pictures. Raises `Findings` at `source`."""
+    """Calibrate, print the report, and write the calibration to `out` and the drawn pictures to the folder `draw`.
+
+    `true` are the intrinsics to compare with, if known.
+
+    Raises:
+        Findings: too few different views, or views that leave the focal length uncertain. They name `source`.
+    """
     views, size = _find_boards(pictures, board, source)
     seen = {name: corners for name, corners in views.items() if corners is not None}
-    if len(seen) < MIN_VIEWS:
+    if len(seen) < checks.min_views:
         message = (
             f"a board of {board.columns} x {board.rows} inner corners is seen in {len(seen)} of {len(views)} pictures; "
-            f"take {MIN_VIEWS} or more that show all of it, and check --columns and --rows"
+            f"take {checks.min_views} or more that show all of it, and check --columns and --rows"
         )
         raise Findings([Finding(source, 0, message)])
-    if (different := _different(list(seen.values()), ALIKE * size[0])) < MIN_VIEWS:
-        message = f"only {different} of {len(seen)} views differ; hold the board in {MIN_VIEWS} or more ways"
+    if (different := _different(list(seen.values()), checks.min_view_distance * size[0])) < checks.min_views:
+        message = f"only {different} of {len(seen)} views differ; hold the board in {checks.min_views} or more ways"
         raise Findings([Finding(source, 0, message)])
     found = calibrate(list(seen.values()), *size, board.columns, board.rows, board.square)
-    doubt = max(found.deviations[0] / found.intrinsics.fx, found.deviations[1] / found.intrinsics.fy)
-    if not doubt < MOST_DOUBT:  # nan too
-        message = f"the views leave the focal length open by {100 * doubt:.1f} %; tilt the board more, and come nearer"
+    deviation = max(found.deviations[0] / found.intrinsics.fx, found.deviations[1] / found.intrinsics.fy)
+    if not deviation < checks.max_focal_deviation:  # nan too
+        message = (
+            f"the views leave the focal length open by {100 * deviation:.1f} %; tilt the board more, and come nearer"
+        )
         raise Findings([Finding(source, 0, message)])
     residuals = dict(zip(seen, found.residuals, strict=True))
     _report(views, residuals, found, true)
@@ -93,21 +119,21 @@ def run(
         _draw(draw, pictures, seen, residuals, board)
 
 
-def _different(views: Sequence[FloatArray], least: float) -> int:
-    """How many of the views (n, 2) are at least so many pixels, on average, from all that came before."""
-    kept: list[FloatArray] = []
+def _different(views: Sequence[NDArray[np.float64]], min_distance: float) -> int:
+    """The number of views (n, 2) px whose corners are on average at least so far from those of all earlier views."""
+    kept: list[NDArray[np.float64]] = []
     for view in views:
-        if all(np.linalg.norm(view - other, axis=1).mean() >= least for other in kept):
+        if all(np.linalg.norm(view - other, axis=1).mean() >= min_distance for other in kept):
             kept.append(view)
     return len(kept)
 
 
 def _find_boards(
     pictures: Sequence[Picture], board: Board, source: str
-) -> tuple[dict[str, FloatArray | None], tuple[int, int]]:
-    """The corners in each picture, None where the board is not found, and the pictures' width and height."""
+) -> tuple[dict[str, NDArray[np.float64] | None], tuple[int, int]]:
+    """The corners (n, 2) px in each picture, None where no board is found, and the pictures' width and height."""
     wrong: list[Finding] = []
-    views: dict[str, FloatArray | None] = {}
+    views: dict[str, NDArray[np.float64] | None] = {}
     sizes: dict[tuple[int, int], str] = {}
     for name, picture in pictures:
         try:
@@ -119,21 +145,26 @@ def _find_boards(
         if len(sizes) == 1 and not wrong:
             views[name] = find_board(rgb, board.columns, board.rows)
     if len(sizes) > 1:
-        told = ", ".join(f"{name} is {width}x{height}" for (width, height), name in sizes.items())
-        wrong.append(Finding(source, 0, f"pictures of several sizes: {told}; give those of one camera in one mode"))
+        sizes_text = ", ".join(f"{name} is {width}x{height}" for (width, height), name in sizes.items())
+        wrong.append(
+            Finding(source, 0, f"pictures of several sizes: {sizes_text}; give those of one camera in one mode")
+        )
     if wrong:
         raise Findings(wrong)
     return views, next(iter(sizes))
 
 
 def _report(
-    views: dict[str, FloatArray | None], residuals: dict[str, FloatArray], found: Calibration, true: Intrinsics | None
+    views: dict[str, NDArray[np.float64] | None],
+    residuals: dict[str, NDArray[np.float64]],
+    found: Calibration,
+    true: Intrinsics | None,
 ) -> None:
     lines = []
     for name in views:
         if name in residuals:
-            off = np.linalg.norm(residuals[name], axis=1)
-            lines.append((name, str(len(off)), f"{np.sqrt(np.mean(off**2)):.3f}", f"{off.max():.3f}"))
+            norms = np.linalg.norm(residuals[name], axis=1)
+            lines.append((name, str(len(norms)), f"{np.sqrt(np.mean(norms**2)):.3f}", f"{norms.max():.3f}"))
         else:
             lines.append((name, "not found", "-", "-"))
     print_table(("view", "corners", "rms px", "largest px"), lines)
@@ -141,8 +172,8 @@ def _report(
     figures = []
     for key, deviation in zip(("fx", "fy", "cx", "cy"), found.deviations, strict=True):
         value = getattr(k, key)
-        told = () if true is None else (f"{getattr(true, key):.2f}", f"{value - getattr(true, key):+.2f}")
-        figures.append((key, f"{value:.2f}", f"{deviation:.2f}", *told))
+        compared = () if true is None else (f"{getattr(true, key):.2f}", f"{value - getattr(true, key):+.2f}")
+        figures.append((key, f"{value:.2f}", f"{deviation:.2f}", *compared))
     typer.echo("")
     print_table(("pixels", "found", "deviation", *(() if true is None else ("true", "error"))), figures)
     k1, k2 = found.distortion[:2]
@@ -175,19 +206,20 @@ def _write(out: Path, found: Calibration) -> None:
 def _draw(
     folder: Path,
     pictures: Sequence[Picture],
-    seen: dict[str, FloatArray],
-    residuals: dict[str, FloatArray],
+    seen: dict[str, NDArray[np.float64]],
+    residuals: dict[str, NDArray[np.float64]],
     board: Board,
+    residual_scale: float = 50.0,
 ) -> None:
-    """A PNG of each view: the corners, joined row by row, and their residuals magnified."""
+    """A PNG of each view: the corners, joined row by row, and their residuals, enlarged."""
     folder.mkdir(parents=True, exist_ok=True)
     for name, picture in pictures:
         if name not in seen:
             continue
         image = cv2.cvtColor(picture(), cv2.COLOR_RGB2BGR)
         cv2.drawChessboardCorners(image, (board.columns, board.rows), seen[name].astype(np.float32), True)
-        for start, off in zip(seen[name], residuals[name], strict=True):
-            foot, tip = np.rint([start, start + MAGNIFIED * off]).astype(int).tolist()
+        for start, residual in zip(seen[name], residuals[name], strict=True):
+            foot, tip = np.rint([start, start + residual_scale * residual]).astype(int).tolist()
             cv2.arrowedLine(image, foot, tip, (255, 0, 255), 1, cv2.LINE_AA, tipLength=0.3)
         write_whole(folder / f"{name.removesuffix('.png')}.png", cv2.imencode(".png", image)[1].tobytes())
-    typer.echo(f"corners, and residuals {MAGNIFIED:.0f} times enlarged, drawn in {shown(folder)}")
+    typer.echo(f"corners, and residuals {residual_scale:.0f} times enlarged, drawn in {shown(folder)}")

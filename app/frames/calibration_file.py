@@ -29,21 +29,21 @@ class CalibrationFile(Model):
     cx: Number
     cy: Number
     distortion: tuple[Number, Number, Number, Number, Number] = (0.0, 0.0, 0.0, 0.0, 0.0)  # OpenCV's k1, k2, p1, p2, k3
-    rms: NotNegative | None = None  # of the corners' distances from where the board's should be
+    rms: NotNegative | None = None  # px, of the corners' residuals
 
     @property
     def intrinsics(self) -> Intrinsics:
-        """The camera without its distortion; its pictures fit once `undistorted` was applied to them."""
+        """The camera without its distortion, for pictures to which `undistorted` was applied."""
         return Intrinsics(self.width, self.height, self.fx, self.fy, self.cx, self.cy)
 
 
 def load_calibration(path: Path) -> CalibrationFile:
-    """Read a calibration file. Raises `Findings` for all that is wrong in it."""
+    """Read a calibration file. Raises `Findings` with everything that is wrong in it."""
     return validated(parse(read_text(path), shown(path)), CalibrationFile)
 
 
 def write_calibration(path: Path, calibration: CalibrationFile) -> None:
-    """Write it as YAML. Raises OSError where that cannot be."""
+    """Write it as YAML. Raises OSError."""
     write_whole(
         path,
         yaml.safe_dump(

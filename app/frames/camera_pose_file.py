@@ -1,4 +1,4 @@
-"""Camera pose files: where a camera stands in the world of a cell."""
+"""Camera pose files: a camera's pose in the world of a cell."""
 
 from pathlib import Path
 from typing import Annotated
@@ -15,12 +15,12 @@ from regrasp.app.files.whole_file import write_whole
 from regrasp.app.files.yaml_lines import parse
 from regrasp.interfaces.cell import Model, Number, Vector
 
-ROUNDED = 0.01  # that a quaternion's length may be off 1
+LENGTH_TOLERANCE = 0.01  # of a quaternion's length against 1; it is then normalized
 
 
 def _unit(q: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
     length = float(np.linalg.norm(q))
-    if abs(length - 1.0) > ROUNDED:
+    if abs(length - 1.0) > LENGTH_TOLERANCE:
         raise ValueError(f"a quaternion x, y, z, w has length 1, this one {length:.3g}")
     return q
 
@@ -33,17 +33,17 @@ class CameraPoseFile(Model):
 
     @property
     def world_from_camera(self) -> RigidTransform:
-        """The same as a transform."""
+        """The pose as a transform."""
         return RigidTransform.from_components(self.position, Rotation.from_quat(self.quaternion))
 
 
 def load_camera_pose(path: Path) -> RigidTransform:
-    """world_from_camera by a file. Raises `Findings` for all that is wrong in it."""
+    """Read world_from_camera from a file. Raises `Findings` with everything that is wrong in it."""
     return validated(parse(read_text(path), shown(path)), CameraPoseFile).world_from_camera
 
 
 def write_camera_pose(path: Path, world_from_camera: RigidTransform) -> None:
-    """Write it as YAML. Raises OSError where that cannot be."""
+    """Write it as YAML. Raises OSError."""
     content = {
         "position": world_from_camera.translation.round(6).tolist(),
         "quaternion": world_from_camera.rotation.as_quat().round(9).tolist(),

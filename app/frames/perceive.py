@@ -1,4 +1,4 @@
-"""What `regrasp perceive` does: a person's own frames in; the connector's pose, or why there is none, out as JSON."""
+"""`regrasp perceive`: from a user's own frames to the connector's pose, or why there is none, as JSON."""
 
 import json
 import re
@@ -32,12 +32,11 @@ from regrasp.perception.pose.technique import TECHNIQUES, Technique, TechniqueNa
 
 NEEDS_NO_DEPTH = ("fiducial",)
 TIP_NOT_TOLD = "the picture does not tell which end is the tip"
-FOCAL = (0.2, 20.0)  # of the picture's width; choice: a fisheye has 0.3, a long lens 10
 
 
 @dataclass(frozen=True)
-class Files:
-    """The files of one frame, and the camera that took it: its name in the cell, and where it stands."""
+class FrameFiles:
+    """The files of one frame, the name of its camera in the cell, and the file of the camera's pose."""
 
     rgb: Path
     depth: Path | None
@@ -47,44 +46,57 @@ class Files:
 
 
 @dataclass(frozen=True, eq=False)
-class Look:
-    """A frame, where its camera stands, and what the technique made of it."""
+class FrameResult:
+    """A frame, its camera's pose, and the technique's result."""
 
-    files: Files
+    files: FrameFiles
     frame: RgbdFrame
     world_from_camera: RigidTransform
     result: Estimate | NoEstimate
 
 
-def run(technique: str, files: Sequence[Files], known: KnownCell, unit: float, draw: Path | None) -> bool:
-    """Print what is found as JSON, and draw it on the first frame. Whether anything is. Raises `Findings`.
+def run_perceive(technique: str, files: Sequence[FrameFiles], known: KnownCell, unit: float, draw: Path | None) -> bool:
+    """Print the result as JSON, and draw it on the first frame, to the file `draw`; whether the connector is found.
 
-    Poses are in the world of `known` where all cameras' places are known, else in the one camera's frame.
+    Poses are in the world of `known` where the poses of all cameras are known, else in the frame of the one camera.
+    `unit`: metres that an integer of a depth image counts.
+
+    Raises:
+        Findings: a file, an option or the technique is wrong.
     """
     name = _technique(technique)
     frames = _frames(name, files, known, unit)
     in_world = _in_world(files)
-    told = known if in_world else known.model_copy(update={"boxes": ()})
+    cell = known if in_world else known.model_copy(update={"boxes": ()})
     try:
-        finder = make_technique(name, told)
+        estimator = make_technique(name, cell)
     except ValueError as error:
         raise Findings([Finding("--cell", 0, str(error))]) from None
-    looks = [Look(f, frame, pose, finder.estimate(frame, pose)) for f, (frame, pose) in zip(files, frames, strict=True)]
-    seen = [look.result for look in looks if isinstance(look.result, Estimate)]
-    result = fuse(seen) if seen else _commonest([look.result for look in looks if isinstance(look.result, NoEstimate)])
+    results = [
+        FrameResult(f, frame, pose, estimator.estimate(frame, pose))
+        for f, (frame, pose) in zip(files, frames, strict=True)
+    ]
+    estimates = [each.result for each in results if isinstance(each.result, Estimate)]
+    failures = [each.result for each in results if isinstance(each.result, NoEstimate)]
+    result = fuse(estimates) if estimates else _most_common(failures)
     answer = {
         "technique": name,
         "frame": "world" if in_world else "camera",
-        **_told(result),
+        **_result_fields(result),
         "frames": [
-            {**_names(look.files), "camera": look.frame.camera, **_told(look.result), **_clip(finder, look)}
-            for look in looks
+            {
+                **_file_names(each.files),
+                "camera": each.frame.camera,
+                **_result_fields(each.result),
+                **_clip_fields(estimator, each),
+            }
+            for each in results
         ],
     }
     if draw is not None:
-        _draw(draw, looks[0], result, told, name)
+        _draw(draw, results[0], result, cell, name)
     typer.echo(_json(answer))
-    return bool(seen)
+    return bool(estimates)
 
 
 def _technique(name: str) -> TechniqueName:
@@ -94,8 +106,8 @@ def _technique(name: str) -> TechniqueName:
     raise Findings([Finding("--technique", 0, f"no technique {quoted(name)}; {nearest(name, TECHNIQUES)}")])
 
 
-def _in_world(files: Sequence[Files]) -> bool:
-    """Whether the cameras' places are known. Raises `Findings` for several cameras, of some of which they are not."""
+def _in_world(files: Sequence[FrameFiles]) -> bool:
+    """Whether all cameras' poses are known. Raises `Findings` where only some of several cameras' are."""
     placed = [f.camera is not None or f.pose is not None for f in files]
     if not all(placed) and (any(placed) or len({real(f.intrinsics) for f in files}) > 1):
         message = "frames of several cameras meet in the world; give --camera or --camera-pose for each, too"
@@ -104,9 +116,9 @@ def _in_world(files: Sequence[Files]) -> bool:
 
 
 def _frames(
-    technique: TechniqueName, files: Sequence[Files], known: KnownCell, unit: float
+    technique: TechniqueName, files: Sequence[FrameFiles], known: KnownCell, unit: float
 ) -> list[tuple[RgbdFrame, RigidTransform]]:
-    """Frames and their world_from_camera. Raises `Findings` for all that is wrong in any file."""
+    """Frames and their world_from_camera. Raises `Findings` with everything that is wrong in any file."""
     frames, wrong = [], []
     number_of = {path: i for i, path in enumerate(dict.fromkeys(f.intrinsics for f in files), 1)}
     for number, f in enumerate(files, 1):
@@ -114,11 +126,11 @@ def _frames(
             if f.depth is None and technique not in NEEDS_NO_DEPTH:
                 message = f"the technique {technique} needs depth; give --depth FILE for each --rgb"
                 raise Findings([Finding("--depth", 0, message)])
-            lens = load_calibration(f.intrinsics)
-            rgb, depth = _images(f, lens, unit)
+            calibration = load_calibration(f.intrinsics)
+            rgb, depth = _images(f, calibration, unit)
             camera = f.camera or ("camera" if len(number_of) == 1 else f"camera {number_of[f.intrinsics]}")
-            frame = RgbdFrame(camera, number, 0.0, rgb, depth, lens.intrinsics)
-            frames.append((frame, _place(f, known)))
+            frame = RgbdFrame(camera, number, 0.0, rgb, depth, calibration.intrinsics)
+            frames.append((frame, _camera_pose(f, known)))
         except Findings as error:
             wrong += error.items
     if wrong:
@@ -126,11 +138,16 @@ def _frames(
     return frames
 
 
-def _images(files: Files, camera: CalibrationFile, unit: float) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
-    """Colour and depth as the camera without its distortion would give them."""
+def _images(
+    files: FrameFiles, camera: CalibrationFile, unit: float, focal_range: tuple[float, float] = (0.2, 20.0)
+) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
+    """Undistorted colour and depth.
+
+    `focal_range`: plausible focal lengths over the picture's width; a fisheye lens has 0.3, a long lens 10.
+    """
     k, source = camera.intrinsics, shown(files.intrinsics)
-    if not all(FOCAL[0] <= f / k.width <= FOCAL[1] for f in (k.fx, k.fy)):
-        right = f"expected {FOCAL[0] * k.width:.0f} to {FOCAL[1] * k.width:.0f} for pictures {k.width} wide"
+    if not all(focal_range[0] <= f / k.width <= focal_range[1] for f in (k.fx, k.fy)):
+        right = f"expected {focal_range[0] * k.width:.0f} to {focal_range[1] * k.width:.0f} for pictures {k.width} wide"
         raise Findings([Finding(source, 0, f"fx, fy are {k.fx:g}, {k.fy:g} pixels; {right}")])
     if not (abs(k.cx - k.width / 2) < k.width and abs(k.cy - k.height / 2) < k.height):
         right = f"expected a point near the middle of {k.width}x{k.height} pixels"
@@ -154,18 +171,21 @@ def _images(files: Files, camera: CalibrationFile, unit: float) -> tuple[NDArray
 
 
 def _folds(camera: CalibrationFile) -> bool:
-    """Whether the distortion folds the picture, or more than doubles it, nearer to its middle than its sides are.
+    r"""Whether the radial distortion folds the picture, or more than doubles a radius, within its shorter half side.
 
-    Further out, where a calibration may have seen nothing, it may.
+    .. math:: r_d = r (1 + k_1 r^2 + k_2 r^4 + k_3 r^6)
+
+    It folds where :math:`r_d` no longer grows with r (Brown 1971). Further out it may: a calibration may have seen no
+    corner there.
     """
     k, (k1, k2, _, _, k3) = camera.intrinsics, camera.distortion
     r = np.linspace(0.0, 0.5 * min(k.width / k.fx, k.height / k.fy), 100)
     with np.errstate(over="ignore", invalid="ignore"):
-        bent = r * (1.0 + k1 * r**2 + k2 * r**4 + k3 * r**6)
-        return not bool(np.all(np.diff(bent) > 0) and bent[-1] < 2.0 * r[-1])  # NaN too
+        distorted = r * (1.0 + k1 * r**2 + k2 * r**4 + k3 * r**6)
+        return not bool(np.all(np.diff(distorted) > 0) and distorted[-1] < 2.0 * r[-1])  # NaN too
 
 
-def _place(files: Files, known: KnownCell) -> RigidTransform:
+def _camera_pose(files: FrameFiles, known: KnownCell) -> RigidTransform:
     """world_from_camera; the identity where it is not known."""
     spec = next((c for c in known.cameras if c.name == files.camera), None)
     if files.camera is not None and spec is None:
@@ -181,16 +201,16 @@ def _place(files: Files, known: KnownCell) -> RigidTransform:
     return spec.mount.world_from_camera
 
 
-def _commonest(results: Sequence[NoEstimate]) -> NoEstimate:
+def _most_common(results: Sequence[NoEstimate]) -> NoEstimate:
     reason = Counter(result.reason for result in results).most_common(1)[0][0]
     return next(result for result in results if result.reason == reason)
 
 
-def _names(files: Files) -> dict[str, str]:
+def _file_names(files: FrameFiles) -> dict[str, str]:
     return {"rgb": shown(files.rgb)} | ({} if files.depth is None else {"depth": shown(files.depth)})
 
 
-def _told(result: Estimate | NoEstimate) -> dict[str, Any]:
+def _result_fields(result: Estimate | NoEstimate) -> dict[str, Any]:
     if isinstance(result, NoEstimate):
         return {"found": False, "reason": str(result.reason), "message": result.message}
     pose = {
@@ -205,11 +225,11 @@ def _told(result: Estimate | NoEstimate) -> dict[str, Any]:
     return {"found": True, "pose": pose, "points": result.points, "mask_area": result.mask_area}
 
 
-def _clip(finder: Technique, look: Look) -> dict[str, Any]:
-    """Where the stow clip's seat is, for a technique that reads the clip's tag."""
-    if not isinstance(finder, Fiducial):
+def _clip_fields(technique: Technique, frame_result: FrameResult) -> dict[str, Any]:
+    """The pose of the stow clip's seat, if the technique reads the clip's tag."""
+    if not isinstance(technique, Fiducial):
         return {}
-    seat = finder.seat(look.frame, look.world_from_camera)
+    seat = technique.seat(frame_result.frame, frame_result.world_from_camera)
     if isinstance(seat, NoEstimate):
         return {"clip": {"found": False, "reason": str(seat.reason), "message": seat.message}}
     pose = {
@@ -230,35 +250,37 @@ def _json(answer: dict[str, Any]) -> str:
     return re.sub(r"\[\n[-+.,e\d\s]+\]", lambda numbers: f"[{' '.join(numbers[0][1:-1].split())}]", text)
 
 
-def _draw(path: Path, look: Look, result: Estimate | NoEstimate, known: KnownCell, technique: str) -> None:
-    """The result on the look's picture."""
-    place = look.world_from_camera
-    if technique == "fused":  # which sets the camera right first
-        errors = expected_errors(known, look.frame.camera)
-        place = register(look.frame, place, known.boxes, errors).world_from_camera
-    found = (result, place.inv()) if isinstance(result, Estimate) else None
+def _draw(
+    path: Path, frame_result: FrameResult, result: Estimate | NoEstimate, known: KnownCell, technique: str
+) -> None:
+    """The result on the frame's picture."""
+    camera_pose = frame_result.world_from_camera
+    if technique == "fused":  # it corrects the camera's pose first
+        errors = expected_errors(known, frame_result.frame.camera)
+        camera_pose = register(frame_result.frame, camera_pose, known.boxes, errors).world_from_camera
+    found = (result, camera_pose.inv()) if isinstance(result, Estimate) else None
     size = (known.connector.radius, known.connector.length)
-    image = draw_pose(look.frame.rgb, look.frame.intrinsics, found, *size, _lines(technique, result))
+    image = draw_pose(frame_result.frame.rgb, frame_result.frame.intrinsics, found, *size, _caption(technique, result))
     ok, data = cv2.imencode(path.suffix, cv2.cvtColor(image, cv2.COLOR_RGB2BGR))
     assert ok
     path.parent.mkdir(parents=True, exist_ok=True)
     write_whole(path, data.tobytes())
 
 
-def _lines(technique: str, result: Estimate | NoEstimate) -> list[str]:
-    """The result in words, for the picture."""
+def _caption(technique: str, result: Estimate | NoEstimate) -> list[str]:
+    """The result as lines of text, for the picture."""
     if isinstance(result, NoEstimate):
         return [f"{technique}: not found, {result.reason}", result.message]
-    spread = float(np.sqrt(np.linalg.eigvalsh(result.covariance[:3, :3])[-1]))
+    deviation = float(np.sqrt(np.linalg.eigvalsh(result.covariance[:3, :3])[-1]))
     across = np.linalg.svd(result.axis[None])[2][1:]
-    turn = float(np.sqrt(np.linalg.eigvalsh(across @ result.covariance[3:, 3:] @ across.T)[-1]))
-    part = "whole" if result.whole else f"{1e3 * result.extent:.0f} mm of it seen"
+    axis_deviation = float(np.sqrt(np.linalg.eigvalsh(across @ result.covariance[3:, 3:] @ across.T)[-1]))
+    visible = "whole" if result.whole else f"{1e3 * result.extent:.0f} mm of it seen"
     return [
-        f"{technique}: found, {part}; {'the arrow points to the tip' if result.sign_seen else TIP_NOT_TOLD}",
-        f"position {_words(result.position, 4)} m, +-{1e3 * spread:.1f} mm",
-        f"axis {_words(result.axis, 3)}, +-{np.rad2deg(turn):.1f} deg",
+        f"{technique}: found, {visible}; {'the arrow points to the tip' if result.sign_seen else TIP_NOT_TOLD}",
+        f"position {_numbers(result.position, 4)} m, +-{1e3 * deviation:.1f} mm",
+        f"axis {_numbers(result.axis, 3)}, +-{np.rad2deg(axis_deviation):.1f} deg",
     ]
 
 
-def _words(values: NDArray[np.float64], digits: int) -> str:
+def _numbers(values: NDArray[np.float64], digits: int) -> str:
     return " ".join(f"{value:.{digits}f}" for value in values)

@@ -1,4 +1,4 @@
-"""What `regrasp snapshot` does: frames of a scenario's first moments as files that `regrasp perceive` reads."""
+"""`regrasp snapshot`: writes a scenario's first frames as files that `regrasp perceive` reads."""
 
 from pathlib import Path
 
@@ -13,11 +13,11 @@ from regrasp.app.scenario.load import Scenario
 from regrasp.interfaces.cell import FixedMount
 from regrasp.interfaces.frame import RgbdFrame
 
-MILLIMETRES = 1000.0  # in a metre: the depth file's unit
+DEPTH_COUNTS_PER_METRE = 1000.0  # the depth file counts millimetres
 
 
-def take(scenario: Scenario, camera: str, count: int, out: Path) -> None:
-    """Write `count` frames of a camera, its intrinsics and, of a fixed one, its pose as the robot knows it to `out`."""
+def write_snapshot(scenario: Scenario, camera: str, count: int, out: Path) -> None:
+    """Write `count` frames of a camera to the folder `out`, its intrinsics and, if it is fixed, its nominal pose."""
     spec = scenario.cell.known.camera(camera)
     world = build_world(scenario, scenario.file.seed)
     try:
@@ -34,7 +34,7 @@ def take(scenario: Scenario, camera: str, count: int, out: Path) -> None:
 def write_frame(out: Path, frame: RgbdFrame, suffix: str = "") -> None:
     """Write rgb.png, depth.png (16 bit, millimetres) and intrinsics.yaml to a folder. Raises OSError."""
     out.mkdir(parents=True, exist_ok=True)
-    depth = np.rint(MILLIMETRES * frame.depth).astype(np.uint16)
+    depth = np.rint(DEPTH_COUNTS_PER_METRE * frame.depth).astype(np.uint16)
     for name, image in (("rgb", cv2.cvtColor(frame.rgb, cv2.COLOR_RGB2BGR)), ("depth", depth)):
         write_whole(out / f"{name}{suffix}.png", cv2.imencode(".png", image)[1].tobytes())
     k = frame.intrinsics

@@ -1,7 +1,6 @@
-"""Studies: many runs, counted."""
+"""`regrasp study demo`: the whole demonstration over many seeds, counted."""
 
 import json
-import math
 import statistics
 import sys
 from collections.abc import Sequence
@@ -13,10 +12,10 @@ from regrasp.app.records.folders import folder_name
 from regrasp.app.records.result import plain, versions
 from regrasp.app.run.batch import Episode, Row, Run, Settings, run_all
 from regrasp.app.scenario.load import Scenario, cases
+from regrasp.app.studies.statistics import wilson_interval
 from regrasp.app.studies.table import print_table
 
 SCENARIOS = ("no_obstacle", "short_obstacle", "tall_obstacle")
-_Z = 1.959964  # of the normal distribution, for 95 %
 
 
 def run_demo(
@@ -27,11 +26,11 @@ def run_demo(
     settings: Settings = Settings(),  # noqa: B008 - it does not change
     episode: Episode | None = None,
 ) -> int:
-    """The whole demonstration: every case of three scenarios with every seed, each run in its own process.
+    """Run every case of three scenarios with every seed, each run in its own process.
 
-    Progress goes to stderr, a table to stdout; with `out`, runs go to out/runs/ and the figures to out/demo.json, which
-    is whole after every run. Returns the exit code: 0 when all runs came to an end, however they went, 130 after
-    Ctrl-C, 2 when `out` holds a study. `episode` stands in for `run_episode` in tests.
+    Progress goes to stderr, a table to stdout. With `out`, the runs' records go to out/runs/ and the figures to
+    out/demo.json, which is complete after every run. Returns the exit code: 0 when all runs came to an end, also to a
+    failure; 130 after Ctrl-C; 2 when `out` already holds a study. `episode` replaces `run_episode` in tests.
 
     Raises:
         Findings: a scenario with these overrides is wrong.
@@ -45,7 +44,7 @@ def run_demo(
     done, interrupted = run_all(runs, jobs, lambda rows: _write(out, rows, runs, overrides), settings, episode)
     rows = list(done.values())
     _write(out, rows, runs, overrides)
-    print_table(_HEADER, table(rows))
+    print_table(_HEADER, table_lines(rows))
     return 130 if interrupted else 0
 
 
@@ -70,21 +69,11 @@ def _write(out: Path | None, rows: list[Row], runs: Sequence[Run], overrides: Se
     write_whole(out / "demo.json", json.dumps(plain(summary), indent=2, allow_nan=False) + "\n")
 
 
-def wilson(k: int, n: int) -> tuple[float, float]:
-    """The 95 % score interval of a share from k successes in n trials (Wilson 1927); (0, 1) without trials."""
-    if n == 0:
-        return 0.0, 1.0
-    p, z2 = k / n, _Z**2
-    middle = (p + z2 / (2 * n)) / (1 + z2 / n)
-    half = _Z / (1 + z2 / n) * math.sqrt(p * (1 - p) / n + z2 / (4 * n**2))
-    return min(p, max(0.0, middle - half)), max(p, min(1.0, middle + half))  # rounding: the share itself lies in it
-
-
 _HEADER = ("case", "succeeded", "95 % interval", "median sim s", "median x real time", "max force N")
 
 
-def table(rows: Sequence[Row]) -> list[tuple[str, ...]]:
-    """The lines below the header: one a case that has runs, in their order, and one over all."""
+def table_lines(rows: Sequence[Row]) -> list[tuple[str, ...]]:
+    """The lines below the header: one for each case that has runs, in their order, and one for all runs."""
     groups: dict[str, list[Row]] = {}
     for row in rows:
         groups.setdefault(f"{row.scenario} {row.case}", []).append(row)
@@ -93,7 +82,7 @@ def table(rows: Sequence[Row]) -> list[tuple[str, ...]]:
 
 def _line(name: str, rows: Sequence[Row]) -> tuple[str, ...]:
     succeeded = sum(row.succeeded for row in rows)
-    low, high = wilson(succeeded, len(rows))
+    low, high = wilson_interval(succeeded, len(rows))
     forces = [row.unintended_force for row in rows if row.unintended_force is not None]
     return (
         name,

@@ -6,11 +6,11 @@ from typing import Any
 from hypothesis import strategies as st
 
 from regrasp.trees import Node, NodeStats
-from regrasp.trees.graph import Port
+from regrasp.trees.graph import NodePort
 
 TEXTS = st.text(st.characters(codec="utf-8", exclude_categories=["Cc", "Cs", "Zl", "Zp"]), max_size=80)
 _PORT = st.builds(
-    Port, name=st.sampled_from(["ticks", "a_long_name_of_a_port"]), value=TEXTS, constant=TEXTS | st.none()
+    NodePort, name=st.sampled_from(["ticks", "a_long_name_of_a_port"]), value=TEXTS, constant=TEXTS | st.none()
 )
 _STATS = st.builds(NodeStats, *[st.integers(0, 9)] * 4, st.floats(0, 1e4)) | st.none()
 _FIELDS: dict[str, Any] = {

@@ -13,7 +13,7 @@ from test_golden import features, features_with_run
 
 from regrasp import trees
 from regrasp.trees import Node, read_graph
-from regrasp.trees.export import FORMATS, SUFFIXES, export_tree
+from regrasp.trees.export import FORMAT_OF_SUFFIX, FORMATS, export_tree
 
 # BehaviorTree.CPP's own nodes that we write; all others must be in the model.
 BUILT_IN = {
@@ -108,4 +108,4 @@ def test_json_and_ascii_tell_every_node(node: Node) -> None:
 
 
 def test_every_format_has_an_ending() -> None:
-    assert set(SUFFIXES.values()) == set(FORMATS)
+    assert set(FORMAT_OF_SUFFIX.values()) == set(FORMATS)

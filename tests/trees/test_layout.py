@@ -4,20 +4,20 @@ from hypothesis import given
 from random_nodes import nodes
 
 from regrasp.trees import Node
-from regrasp.trees.export.layout import GAP_X, Box, lay_out
+from regrasp.trees.export.layout import NodeBox, Spacing, lay_out
 
 SIZES = {"sequence": (60.0, 26.0), "decorator": (180.0, 40.0), "condition": (20.0, 80.0), "subtree": (300.0, 27.0)}
 
 
-def place(node: Node) -> list[Box]:
+def place(node: Node) -> list[NodeBox]:
     return list(lay_out(node, lambda n: SIZES.get(n.kind, (110.0, 26.0))).walk())
 
 
-def overlap(a: Box, b: Box) -> bool:
+def overlap(a: NodeBox, b: NodeBox) -> bool:
     return a.x < b.right and b.x < a.right and a.y < b.bottom and b.y < a.bottom
 
 
-def inside(a: Box, b: Box) -> bool:
+def inside(a: NodeBox, b: NodeBox) -> bool:
     return b.x < a.x and a.right < b.right and b.y < a.y and a.bottom < b.bottom
 
 
@@ -36,7 +36,7 @@ def test_children_stand_right_of_their_parent_from_top_to_bottom_with_it_at_thei
         if box.children and not box.is_frame:
             middles = [child.middle for child in box.children]
             assert middles == sorted(middles)
-            assert all(child.x == box.right + GAP_X for child in box.children)
+            assert all(child.x == box.right + Spacing.gap_x for child in box.children)
             assert abs(box.y + box.height / 2 - (middles[0] + middles[-1]) / 2) < 1e-6
 
 
@@ -46,7 +46,7 @@ def test_links_cross_no_box(node: Node) -> None:
     for parent in boxes:
         if parent.children and not parent.is_frame:
             first, last = parent.children[0], parent.children[-1]
-            room = Box(node, parent.right + 0.01, first.middle, GAP_X - 0.02, last.middle - first.middle)
+            room = NodeBox(node, parent.right + 0.01, first.middle, Spacing.gap_x - 0.02, last.middle - first.middle)
             assert not any(overlap(room, box) for box in boxes if not box.is_frame or box in parent.children)
 
 

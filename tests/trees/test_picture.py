@@ -10,7 +10,7 @@ from test_golden import features, features_with_run
 from regrasp.trees import Node, collapsed
 from regrasp.trees.export import THEMES, export_tree
 from regrasp.trees.export.picture import picture
-from regrasp.trees.export.scene import Rect, Text
+from regrasp.trees.export.shapes import Rect, Text
 from regrasp.trees.export.text_width import shortened, text_width
 
 LIGHT, SVG = THEMES["light"], "{http://www.w3.org/2000/svg}"
@@ -20,13 +20,13 @@ ASCII = "".join(map(chr, range(32, 127)))
 @given(nodes)
 @settings(max_examples=50)
 def test_texts_stay_within_their_boxes_and_all_within_the_picture(node: Node) -> None:
-    scene = picture(node, LIGHT)
-    for group in scene.groups:
+    drawing = picture(node, LIGHT)
+    for group in drawing.groups:
         body = next((s for s in group.shapes if isinstance(s, Rect)), None)
         for text in (s for s in group.shapes if isinstance(s, Text)):
             right = text.x + text_width(text.text, text.size, text.bold)
-            assert right <= scene.width
-            assert text.y <= scene.height
+            assert right <= drawing.width
+            assert text.y <= drawing.height
             if body and group.title:
                 assert body.x < text.x
                 assert right <= body.x + body.width
@@ -66,12 +66,12 @@ def test_svg_is_xml_with_a_tooltip_for_each_node_and_nothing_from_elsewhere(node
 )
 def test_png_shows_the_picture(node: Node, theme: str) -> None:
     image = cv2.imdecode(np.frombuffer(export_tree(node, "png", theme), np.uint8), cv2.IMREAD_COLOR)
-    scene = picture(node, THEMES[theme])
+    drawing = picture(node, THEMES[theme])
     assert image is not None
-    assert abs(image.shape[1] - 2 * scene.width) <= 2
-    assert abs(image.shape[0] - 2 * scene.height) <= 2
+    assert abs(image.shape[1] - 2 * drawing.width) <= 2
+    assert abs(image.shape[0] - 2 * drawing.height) <= 2
     assert len(np.unique(image[:, :, 0])) > 50  # smooth edges
-    for group in scene.groups:
+    for group in drawing.groups:
         if group.title:
             body = next(s for s in reversed(group.shapes) if isinstance(s, Rect) and s.width > 30)
             # Just inside the right edge there is no text.

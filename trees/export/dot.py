@@ -17,8 +17,8 @@ def to_dot(root: Node, theme: Theme) -> str:
         ' fontname="Helvetica", fontsize=11];',
         f'  edge [arrowhead=none, color="{theme.line}"];',
     ]
-    # A link inside a cluster would draw both its ends into it.
-    edges = [f"  {ids[a.path]} -> {ids[b.path]}{_red(a.failed and b.failed, theme)};" for a, b in links(root)]
+    # Links come last: one inside a cluster would draw both its ends into the cluster.
+    edges = [f"  {ids[a.path]} -> {ids[b.path]}{_failed_style(a.failed and b.failed, theme)};" for a, b in links(root)]
     return "\n".join([*head, *_nodes(root, ids, theme, "  "), *edges, "}"])
 
 
@@ -41,7 +41,7 @@ def _nodes(node: Node, ids: Mapping[str, str], theme: Theme, indent: str) -> Ite
         yield f"{indent}}}"
 
 
-def _red(failed: bool, theme: Theme) -> str:
+def _failed_style(failed: bool, theme: Theme) -> str:
     return f' [color="{theme.failed}", penwidth=2]' if failed else ""
 
 

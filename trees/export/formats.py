@@ -1,4 +1,4 @@
-"""The formats by name."""
+"""The export formats by name and by file suffix."""
 
 from collections.abc import Callable
 
@@ -27,7 +27,7 @@ FORMATS: dict[str, Callable[[Node, Theme], str | bytes]] = {
     "png": _png,
     "svg": to_svg,
 }
-SUFFIXES = {
+FORMAT_OF_SUFFIX = {
     ".txt": "ascii",
     ".dot": "dot",
     ".gv": "dot",
@@ -41,7 +41,7 @@ SUFFIXES = {
 
 
 def export_tree(root: Node, name: str, theme: str = "light") -> bytes:
-    """The tree in the format of that name, text as UTF-8 with an end of line.
+    """The tree in the format of that name; text is UTF-8 and ends with a newline.
 
     Raises:
         KeyError: no such format or theme.

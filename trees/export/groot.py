@@ -1,13 +1,13 @@
 """A tree as BehaviorTree.CPP v4 XML with its TreeNodesModel, which Groot2 opens.
 
-What has a counterpart there becomes it: Sequence and Fallback are the ones that go on where they were, without memory
-ReactiveSequence and ReactiveFallback. Decorators without one, and all leaves, are named in the model. A tree's default
-keys become ports of its model; those of the main tree, which nobody calls, are written out where they are used.
+Elements with a counterpart there become it: with memory Sequence and Fallback, without memory ReactiveSequence and
+ReactiveFallback. Decorators without a counterpart, and all leaves, are declared in the model. The default keys of a
+tree become ports of its model; those of the main tree, which no SubTree includes, are replaced by their values.
 """
 
 from xml.etree import ElementTree as ET
 
-from regrasp.trees.graph import Node, Port
+from regrasp.trees.graph import Node, NodePort
 
 _BUILT_IN = {"ForceFailure", "ForceSuccess", "Inverter", "Repeat", "RetryUntilSuccessful", "RunOnce"}
 _RENAMED = {
@@ -16,7 +16,7 @@ _RENAMED = {
     "Inverter": ("Inverter", {}),
     "FailureIsSuccess": ("ForceSuccess", {}),
     "SuccessIsFailure": ("ForceFailure", {}),
-    "Condition": ("StatusCondition", {}),  # the word is taken: leaves that answer at once
+    "Condition": ("StatusCondition", {}),  # "Condition" there means a leaf that returns at once
 }
 _TYPES = {"str": "std::string", "float": "double", "int": "int", "bool": "bool"}
 
@@ -42,20 +42,20 @@ def _trees(root: Node) -> dict[str, list[Node]]:
 
 
 def _element(instances: list[Node], is_main: bool) -> ET.Element:
-    """One node, which may stand for several: its tree is written once, however often it is included."""
+    """The element for all `instances` of a node: its tree is written once, however often it is included."""
     node = instances[0]
-    tag, ports = _words(node, is_main)
+    tag, ports = _tag_and_attributes(node, is_main)
     subtree = {"ID": node.subtree} if node.kind == "subtree" else {}
     element = ET.Element(tag, subtree | {"name": node.name} | ports)
-    told = [f"{n.path}: {n.stats.text}{' (failed here)' if n.failed else ''}" for n in instances if n.stats]
-    if told:
-        element.set("_description", "; ".join(told))
+    descriptions = [f"{n.path}: {n.stats.text}{' (failed here)' if n.failed else ''}" for n in instances if n.stats]
+    if descriptions:
+        element.set("_description", "; ".join(descriptions))
     if node.kind != "subtree":
         element.extend(_element(list(same), is_main) for same in zip(*(n.children for n in instances), strict=False))
     return element
 
 
-def _words(node: Node, is_main: bool) -> tuple[str, dict[str, str]]:
+def _tag_and_attributes(node: Node, is_main: bool) -> tuple[str, dict[str, str]]:
     """The element's name there, and its attributes."""
     ports = {port.name: _value(port, is_main) for port in node.given}
     if node.kind in ("sequence", "fallback"):
@@ -71,15 +71,15 @@ def _words(node: Node, is_main: bool) -> tuple[str, dict[str, str]]:
     return tag, {names.get(name, name): value for name, value in ports.items()} | policy
 
 
-def _value(port: Port, is_main: bool) -> str:
+def _value(port: NodePort, is_main: bool) -> str:
     return port.constant if is_main and port.constant is not None else str(port.value)
 
 
 def _model(root: Node) -> ET.Element:
-    """What Groot2 must be told: leaves, decorators of our own, and the keys of subtrees."""
+    """The TreeNodesModel: leaves, decorators that Groot2 does not know, and the keys of subtrees."""
     entries: dict[tuple[str, str], Node] = {}
     for node in root.walk():
-        word = node.subtree or _words(node, False)[0]
+        word = node.subtree or _tag_and_attributes(node, False)[0]
         if node.kind in ("action", "condition", "subtree") or (node.kind == "decorator" and word not in _BUILT_IN):
             kind = "SubTree" if node.kind == "subtree" else node.kind.capitalize()
             entries.setdefault((kind, word), node)
@@ -88,11 +88,11 @@ def _model(root: Node) -> ET.Element:
         entry = ET.SubElement(model, kind, {"ID": word})
         entry.extend(_port(port) for port in sorted(node.ports, key=lambda port: port.name))
         if node.policy:
-            entry.append(_port(Port("policy")))
+            entry.append(_port(NodePort("policy")))
     return model
 
 
-def _port(port: Port) -> ET.Element:
+def _port(port: NodePort) -> ET.Element:
     attributes = {"name": port.name, "type": _TYPES.get(port.type, "BT::AnyTypeAllowed")}
     if port.default is not None:
         attributes["default"] = port.default

@@ -6,11 +6,11 @@
   kind      sequence, fallback, parallel, decorator, action, condition or subtree
   memory    true, false, or null where it has no meaning
   policy    of a Parallel or OneShot, else ""
-  ports     [{name, value, constant, direction, type, default}]: value as written or null, constant the literal that it
-            stands for or null, direction input, output or inout
+  ports     [{name, value, constant, direction, type, default}]: value as written or null, constant its literal
+            value or null, direction input, output or inout
   tree      ID of the tree that it is written in
   subtree   ID of a SubTree's tree, else ""
-  hidden    number of nodes below that --depth left out
+  hidden    number of nodes below that --depth leaves out
   run       null, or of a recorded run {visits, successes, failures, stopped, running_seconds, last}; seconds simulated
   failed    whether it lies on the path by which the run failed
   children  [NODE]; of a SubTree the top node of its tree

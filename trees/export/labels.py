@@ -1,10 +1,10 @@
-"""What is written on a node, in words that the pictures share."""
+"""The texts on a node that the picture formats share."""
 
 from collections.abc import Iterator
 
-from regrasp.trees.graph import Kind, Node
+from regrasp.trees.graph import Node, NodeKind
 
-SYMBOLS: dict[Kind, str] = {"sequence": "→", "fallback": "?", "parallel": "⇉", "decorator": "δ"}
+SYMBOLS: dict[NodeKind, str] = {"sequence": "→", "fallback": "?", "parallel": "⇉", "decorator": "δ"}
 
 
 def heading(node: Node) -> str:
@@ -14,9 +14,9 @@ def heading(node: Node) -> str:
 
 
 def details(node: Node) -> list[str]:
-    """Lines below the name: type (unless symbol or name say it), policy and ports; what is left out; a run's stats.
+    """Lines below the name: type (unless symbol or name say it), policy and ports; hidden nodes; a run's stats.
 
-    That a run never came to a node is for colours to say.
+    Colours, not texts, show that a run never visited a node.
     """
     said = node.type if _says_type(node) else ""
     about = " ".join(filter(None, [said, node.policy, node.subtree, *(port.text for port in node.given)]))
@@ -26,7 +26,7 @@ def details(node: Node) -> list[str]:
 
 
 def tooltip(node: Node) -> str:
-    """All that is known of a node, a fact a line."""
+    """Everything known about a node, one fact per line."""
     memory = {True: " with memory", False: " without memory", None: ""}[node.memory]
     facts = [node.path, f"{node.type}{memory}", node.policy, node.subtree]
     facts += [f"{port.direction} {port.text}" for port in node.given]
@@ -46,7 +46,7 @@ def identifiers(root: Node) -> dict[str, str]:
 
 
 def links(root: Node) -> Iterator[tuple[Node, Node]]:
-    """Each node with each of its children; a subtree stands for the top node inside it."""
+    """Each node with each of its children; in place of a subtree the top node inside it."""
     for parent in root.walk():
         if parent.kind != "subtree":
             for child in parent.children:

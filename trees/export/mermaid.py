@@ -4,9 +4,9 @@ from collections.abc import Iterator, Mapping
 
 from regrasp.trees.export.labels import details, heading, identifiers, links
 from regrasp.trees.export.themes import THEMES
-from regrasp.trees.graph import Kind, Node
+from regrasp.trees.graph import Node, NodeKind
 
-_SHAPES: dict[Kind, tuple[str, str]] = {"decorator": ("{{", "}}"), "action": ("(", ")"), "condition": ("([", "])")}
+_SHAPES: dict[NodeKind, tuple[str, str]] = {"decorator": ("{{", "}}"), "action": ("(", ")"), "condition": ("([", "])")}
 _LIGHT = THEMES["light"]  # every node brings its colours, so that it is read on a dark page too
 _CODES = {'"': "#quot;", "#": "#35;", "&": "#amp;", "<": "#lt;", ">": "#gt;", "`": "#96;", "\\": "#92;", "\n": "<br/>"}
 

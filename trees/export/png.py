@@ -5,12 +5,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regrasp.trees.export.picture import picture
-from regrasp.trees.export.scene import Curve, Lines, Rect, Scene, Shape, Text
+from regrasp.trees.export.shapes import Curve, Drawing, Lines, Rect, Shape, Text
 from regrasp.trees.export.themes import Theme
 from regrasp.trees.graph import Node
 
-_MAX_PIXELS = 60e6  # of a very large tree the picture gets coarser
-_SHIFT = 4  # bits below the pixel in OpenCV's coordinates
+_SHIFT = 4  # fractional bits of OpenCV's fixed-point coordinates
 
 
 def to_png(root: Node, theme: Theme) -> bytes:
@@ -19,12 +18,13 @@ def to_png(root: Node, theme: Theme) -> bytes:
     return bytes(cv2.imencode(".png", image, [cv2.IMWRITE_PNG_COMPRESSION, 6])[1])  # half of what it makes by default
 
 
-def _drawn(scene: Scene) -> NDArray[np.uint8]:
-    scale = min(2.0, float(np.sqrt(_MAX_PIXELS / (scene.width * scene.height))))
-    shape = (int(np.ceil(scene.height * scale)), int(np.ceil(scene.width * scale)), 3)
-    image = np.full(shape, _bgr(scene.background), np.uint8)
+def _drawn(drawing: Drawing, max_pixels: float = 60e6) -> NDArray[np.uint8]:
+    """The image (H, W, 3), BGR, at twice the size, or smaller where that exceeds `max_pixels`."""
+    scale = min(2.0, float(np.sqrt(max_pixels / (drawing.width * drawing.height))))
+    shape = (int(np.ceil(drawing.height * scale)), int(np.ceil(drawing.width * scale)), 3)
+    image = np.full(shape, _bgr(drawing.background), np.uint8)
     font = cv2.FontFace("sans")
-    for group in scene.groups:
+    for group in drawing.groups:
         for item in group.shapes:
             _draw(image, item, scale, font)
     return image
@@ -37,7 +37,7 @@ def _draw(image: NDArray[np.uint8], shape: Shape, scale: float, font: cv2.FontFa
         cv2.putText(image, shape.text, place, _bgr(shape.colour), font, round(shape.size * scale), weight)
         return
     closed = isinstance(shape, Rect)
-    points = _outline(shape) if isinstance(shape, Rect) else _path(shape)
+    points = _corner_points(shape) if isinstance(shape, Rect) else _path(shape)
     fixed = [np.round(points * scale * 2**_SHIFT).astype(np.int32)]
     if isinstance(shape, Rect):
         cv2.fillPoly(image, fixed, _bgr(shape.fill), cv2.LINE_AA, _SHIFT)
@@ -46,8 +46,8 @@ def _draw(image: NDArray[np.uint8], shape: Shape, scale: float, font: cv2.FontFa
         cv2.polylines(image, fixed, closed, _bgr(shape.stroke), width, cv2.LINE_AA, _SHIFT)
 
 
-def _outline(rect: Rect) -> NDArray[np.float64]:
-    """Points round a rectangle with round corners."""
+def _corner_points(rect: Rect) -> NDArray[np.float64]:
+    """Points (n, 2) px along a rectangle with round corners."""
     r = min(rect.radius, rect.width / 2, rect.height / 2)
     turn = np.linspace(0.0, np.pi / 2, 12)
     corners = []

@@ -3,7 +3,7 @@
 from xml.sax.saxutils import escape, quoteattr
 
 from regrasp.trees.export.picture import picture
-from regrasp.trees.export.scene import Curve, Group, Lines, Rect, Scene, Shape
+from regrasp.trees.export.shapes import Curve, Drawing, Group, Lines, Rect, Shape
 from regrasp.trees.export.themes import Theme
 from regrasp.trees.graph import Node
 
@@ -11,18 +11,18 @@ _FONTS = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial,
 
 
 def to_svg(root: Node, theme: Theme) -> str:
-    """The picture of the tree; pointing at a node tells all that is known of it."""
+    """The picture of the tree; a node's tooltip holds everything known about it."""
     return _document(picture(root, theme))
 
 
-def _document(scene: Scene) -> str:
-    width, height = _n(scene.width), _n(scene.height)
+def _document(drawing: Drawing) -> str:
+    width, height = _px(drawing.width), _px(drawing.height)
     lines = [
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" viewBox="0 0 {width} {height}"'
         f' role="img" font-family="{_FONTS}">',
-        f"<title>{escape(scene.title)}</title>",
-        f'<rect width="{width}" height="{height}" fill="{scene.background}"/>',
-        *map(_group, scene.groups),
+        f"<title>{escape(drawing.title)}</title>",
+        f'<rect width="{width}" height="{height}" fill="{drawing.background}"/>',
+        *map(_group, drawing.groups),
         "</svg>",
     ]
     return "\n".join(lines)
@@ -35,24 +35,24 @@ def _group(group: Group) -> str:
 
 def _shape(shape: Shape) -> str:
     if isinstance(shape, Rect):
-        place = f'x="{_n(shape.x)}" y="{_n(shape.y)}" width="{_n(shape.width)}" height="{_n(shape.height)}"'
-        return f'<rect {place} rx="{_n(shape.radius)}" fill="{shape.fill}"{_stroke(shape)}/>'
+        place = f'x="{_px(shape.x)}" y="{_px(shape.y)}" width="{_px(shape.width)}" height="{_px(shape.height)}"'
+        return f'<rect {place} rx="{_px(shape.radius)}" fill="{shape.fill}"{_stroke(shape)}/>'
     if isinstance(shape, Curve):
         (x0, y0), *others = shape.points
-        pulls = " ".join(f"{_n(x)},{_n(y)}" for x, y in others)
-        return f'<path d="M{_n(x0)},{_n(y0)} C{pulls}" fill="none"{_stroke(shape)}/>'
+        controls = " ".join(f"{_px(x)},{_px(y)}" for x, y in others)
+        return f'<path d="M{_px(x0)},{_px(y0)} C{controls}" fill="none"{_stroke(shape)}/>'
     if isinstance(shape, Lines):
-        points = " ".join(f"{_n(x)},{_n(y)}" for x, y in shape.points)
+        points = " ".join(f"{_px(x)},{_px(y)}" for x, y in shape.points)
         ends = ' stroke-linecap="round" stroke-linejoin="round"'
         return f'<polyline points="{points}" fill="none"{_stroke(shape)}{ends}/>'
     weight = ' font-weight="600"' if shape.bold else ""
-    place = f'x="{_n(shape.x)}" y="{_n(shape.y)}" font-size="{_n(shape.size)}"'
+    place = f'x="{_px(shape.x)}" y="{_px(shape.y)}" font-size="{_px(shape.size)}"'
     return f"<text {place}{weight} fill={quoteattr(shape.colour)}>{escape(shape.text)}</text>"
 
 
 def _stroke(shape: Rect | Curve | Lines) -> str:
-    return f' stroke="{shape.stroke}" stroke-width="{_n(shape.stroke_width)}"' if shape.stroke_width else ""
+    return f' stroke="{shape.stroke}" stroke-width="{_px(shape.stroke_width)}"' if shape.stroke_width else ""
 
 
-def _n(value: float) -> str:
+def _px(value: float) -> str:
     return f"{value:.1f}".removesuffix(".0")

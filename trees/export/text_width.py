@@ -1,4 +1,4 @@
-"""How wide a text gets before it is drawn, in a font that nobody knows yet."""
+"""Upper bounds of a text's width, for whatever font a viewer will use."""
 
 # In ems, rounded up from the wider of DejaVu Sans Bold, the widest font that browsers take for sans-serif, and the one
 # that comes with OpenCV.

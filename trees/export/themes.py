@@ -1,9 +1,9 @@
-"""The colours of pictures. Text has a contrast of at least 4.5 to what it stands on, and lines of 3 (WCAG 2.2 AA)."""
+"""Colours of pictures. Contrast to the background is at least 4.5 for text and 3 for lines (WCAG 2.2 AA)."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from regrasp.trees.graph import Kind, Node
+from regrasp.trees.graph import Node, NodeKind
 
 
 @dataclass(frozen=True)
@@ -12,15 +12,15 @@ class Theme:
 
     background: str
     surface: str  # of a node
-    frame: str  # the ground of a subtree
+    frame: str  # the background of a subtree
     frame_line: str
     text: str
     muted: str  # small text
     line: str  # links
     failed: str
     failed_surface: str
-    icon: str  # on a kind's colour
-    kinds: Mapping[Kind, str]
+    icon: str  # drawn on the colour of its kind
+    kinds: Mapping[NodeKind, str]
 
 
 THEMES = {
@@ -70,7 +70,7 @@ THEMES = {
 
 
 def colour_of(node: Node, theme: Theme) -> str:
-    """By kind; red on the path that failed, grey where a run never came."""
+    """A node's colour: by kind, or red on the path that failed, grey for a node that was not visited."""
     if node.failed:
         return theme.failed
     return theme.line if node.unvisited else theme.kinds[node.kind]

@@ -1,1 +1,1 @@
-"""The detector's pictures, its training, and its score."""
+"""The detector's training data, its training, and its evaluation."""

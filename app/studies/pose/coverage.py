@@ -1,4 +1,4 @@
-"""Whether covariances mean something: how often the truth lies in an estimate's 95 % regions, frame by frame."""
+"""Coverage of the covariances: how often the truth lies in the 95 % region of an estimate from a single frame."""
 
 import json
 import statistics
@@ -15,120 +15,128 @@ from scipy.stats import chi2
 
 from regrasp.app.files.whole_file import write_whole
 from regrasp.app.records.result import plain, versions
-from regrasp.app.studies.demo import wilson
 from regrasp.app.studies.pose.scenes import HEADLINE
 from regrasp.app.studies.pose.tasks import run_tasks
 from regrasp.app.studies.pose.trial import Setup
+from regrasp.app.studies.statistics import wilson_interval
 from regrasp.app.studies.table import print_table
 from regrasp.perception.pose.estimate import Estimate
 
-FRAMES = 10  # of a seed: 200 seeds give 2,000
 LEVEL = 0.95
 POSITION_LIMIT, AXIS_LIMIT = float(chi2.ppf(LEVEL, 3)), float(chi2.ppf(LEVEL, 2))  # squared Mahalanobis distances
 
 
 @dataclass(frozen=True)
-class Cover:
+class FrameCoverage:
     """One frame's estimate against the truth."""
 
     technique: str
     configuration: str
     seed: int
-    position: float  # squared Mahalanobis distance of the truth, 3 degrees of freedom
-    axis: float  # the same of the axis, 2 degrees of freedom
+    position_mahalanobis_sq: float  # 3 degrees of freedom
+    axis_mahalanobis_sq: float  # 2 degrees of freedom
     error_m: float
     axis_error_deg: float
 
 
 @dataclass(frozen=True)
-class Look:
-    """What one technique gave in the frames of a scene."""
+class SceneCoverage:
+    """One technique in the frames of a scene: `found` holds those in which it found the connector."""
 
     technique: str
     frames: int
-    covers: tuple[Cover, ...]
+    found: tuple[FrameCoverage, ...]
 
     def __str__(self) -> str:
-        inside = sum(c.position <= POSITION_LIMIT for c in self.covers)
-        return f"{self.technique} {inside} of {len(self.covers)} inside"
+        inside = sum(frame.position_mahalanobis_sq <= POSITION_LIMIT for frame in self.found)
+        return f"{self.technique} {inside} of {len(self.found)} inside"
 
 
-def run_coverage(setups: Sequence[Setup], seeds: range, jobs: int, out: Path | None) -> int:
-    """Ten frames of every seed, which also chooses the configuration, to each technique by itself, without a mean.
+def run_coverage(setups: Sequence[Setup], seeds: range, jobs: int, out: Path | None, frames_per_seed: int = 10) -> int:
+    """Give each technique the first frames of a scene for every seed, each frame by itself, and count.
 
-    Progress goes to stderr, a table to stdout, the figures to out/coverage.json. Returns the exit code as `run_tasks`.
+    The seed also chooses the configuration. Progress goes to stderr, a table to stdout, the figures to
+    out/coverage.json. Returns the exit code of `run_tasks`.
 
-    Raises OSError when `out` cannot be written.
+    Raises:
+        OSError: `out` cannot be written.
     """
     tasks = {}
     for seed, setup in product(seeds, setups):
         name = HEADLINE[seed % len(HEADLINE)]
-        tasks[f"{', '.join(setup.techniques)} in configuration {name} seed {seed}"] = partial(look, setup, name, seed)
+        title = f"{', '.join(setup.techniques)} in configuration {name} seed {seed}"
+        tasks[title] = partial(cover_scene, setup, name, seed, frames_per_seed)
     techniques = [name for setup in setups for name in setup.techniques]
-    looks, code = run_tasks(tasks, jobs, lambda some: _write(out, some, techniques, seeds))
-    _write(out, looks, techniques, seeds)
-    print_table(_HEADER, [_line(name, coverage(name, looks)) for name in techniques])
+    scenes, code = run_tasks(tasks, jobs, lambda so_far: _write(out, so_far, techniques, seeds))
+    _write(out, scenes, techniques, seeds)
+    print_table(_HEADER, [_line(name, coverage_figures(name, scenes)) for name in techniques])
     return code
 
 
-def look(setup: Setup, configuration: str, seed: int) -> list[Look]:
-    """What each technique gives in the first frames of a scene, every frame new to it."""
+def cover_scene(setup: Setup, configuration: str, seed: int, frame_count: int = 10) -> list[SceneCoverage]:
+    """Each technique in the first frames of a scene; it is made anew for every frame."""
     with setup.scene(configuration, seed) as scene:
-        frames, truth = list(scene.frames(FRAMES)), scene.truth.connector_pose()
-        found = []
+        frames, truth = list(scene.frames(frame_count)), scene.truth.connector_pose()
+        scenes = []
         for name in setup.techniques:
-            estimates = [setup.technique(name).estimate(frame, scene.world_from_camera) for frame in frames]
-            covers = tuple(
-                Cover(name, configuration, seed, *distances(e, truth), *errors(e, truth))
-                for e in estimates
+            results = [setup.technique(name).estimate(frame, scene.world_from_camera) for frame in frames]
+            found = tuple(
+                FrameCoverage(name, configuration, seed, *mahalanobis_sq(e, truth), *pose_errors(e, truth))
+                for e in results
                 if isinstance(e, Estimate)
             )
-            found.append(Look(name, len(frames), covers))
-    return found
+            scenes.append(SceneCoverage(name, len(frames), found))
+    return scenes
 
 
-def distances(estimate: Estimate, truth: RigidTransform) -> tuple[float, float]:
-    """Squared Mahalanobis distances of the true position and of the true axis' line, which either end may lead."""
-    away = truth.translation - estimate.position
-    position = float(away @ np.linalg.solve(estimate.covariance[:3, :3], away))
+def mahalanobis_sq(estimate: Estimate, truth: RigidTransform) -> tuple[float, float]:
+    r"""Squared Mahalanobis distances of the true position and of the true axis (Mahalanobis 1936).
+
+    .. math:: d^2 = e^T \Sigma^{-1} e
+
+    For the position, e is the error (3,) in m. For the axis, e is the rotation (2,) in rad, across the estimated axis,
+    that turns it to the true one; axes are lines, so the true axis is taken with the nearer sign.
+    """
+    error = truth.translation - estimate.position
+    position = float(error @ np.linalg.solve(estimate.covariance[:3, :3], error))
     true_axis = truth.rotation.apply([1.0, 0.0, 0.0])
     turn = np.cross(estimate.axis, true_axis * (1.0 if true_axis @ estimate.axis >= 0 else -1.0))
     sine = float(np.linalg.norm(turn))
     turn *= float(np.arcsin(min(1.0, sine))) / max(sine, 1e-12)
-    across = np.linalg.svd(estimate.axis[None])[2][1:]  # (2, 3): the turns that move the axis
-    within = across @ estimate.covariance[3:, 3:] @ across.T
-    return position, float(across @ turn @ np.linalg.solve(within, across @ turn))
+    across = np.linalg.svd(estimate.axis[None])[2][1:]  # (2, 3): the rotations that move the axis
+    covariance = across @ estimate.covariance[3:, 3:] @ across.T
+    return position, float(across @ turn @ np.linalg.solve(covariance, across @ turn))
 
 
-def errors(estimate: Estimate, truth: RigidTransform) -> tuple[float, float]:
-    """Distance in m, and degrees between the axes' lines."""
+def pose_errors(estimate: Estimate, truth: RigidTransform) -> tuple[float, float]:
+    """The distance in m, and the angle between the axes as lines in degrees."""
     cosine = abs(float(estimate.axis @ truth.rotation.apply([1.0, 0.0, 0.0])))
     return float(np.linalg.norm(estimate.position - truth.translation)), float(np.rad2deg(np.arccos(min(1.0, cosine))))
 
 
-def coverage(technique: str, looks: Sequence[Look]) -> dict[str, Any]:
-    """Counts [k, n] of the truths within the 95 % regions, and errors, of one technique. None: no estimate."""
-    own = [look for look in looks if look.technique == technique]
-    covers = [cover for look in own for cover in look.covers]
-    by_name = {name: [c for c in covers if c.configuration == name] for name in HEADLINE}
+def coverage_figures(technique: str, scenes: Sequence[SceneCoverage]) -> dict[str, Any]:
+    """A technique's figures: counts [k, n] of the truths within the 95 % regions, and errors. None: no estimate."""
+    own = [scene for scene in scenes if scene.technique == technique]
+    found = [frame for scene in own for frame in scene.found]
+    by_name = {name: [frame for frame in found if frame.configuration == name] for name in HEADLINE}
     return {
-        "estimates": [len(covers), sum(look.frames for look in own)],
-        **_inside(covers),
-        "mean_error_m": statistics.fmean(c.error_m for c in covers) if covers else None,
-        "median_axis_error_deg": statistics.median(c.axis_error_deg for c in covers) if covers else None,
-        "by_configuration": {name: _inside(some) for name, some in by_name.items() if some},
+        "estimates": [len(found), sum(scene.frames for scene in own)],
+        **_inside(found),
+        "mean_error_m": statistics.fmean(frame.error_m for frame in found) if found else None,
+        "median_axis_error_deg": statistics.median(frame.axis_error_deg for frame in found) if found else None,
+        "by_configuration": {name: _inside(frames) for name, frames in by_name.items() if frames},
     }
 
 
-def _inside(covers: Sequence[Cover]) -> dict[str, list[int]]:
+def _inside(frames: Sequence[FrameCoverage]) -> dict[str, list[int]]:
     return {
-        "position": [sum(c.position <= POSITION_LIMIT for c in covers), len(covers)],
-        "axis": [sum(c.axis <= AXIS_LIMIT for c in covers), len(covers)],
+        "position": [sum(frame.position_mahalanobis_sq <= POSITION_LIMIT for frame in frames), len(frames)],
+        "axis": [sum(frame.axis_mahalanobis_sq <= AXIS_LIMIT for frame in frames), len(frames)],
     }
 
 
-def _write(out: Path | None, looks: Sequence[Look], techniques: Sequence[str], seeds: range) -> None:
-    if out is None or not looks:  # nothing was done, and nothing stands in the way of another try
+def _write(out: Path | None, scenes: Sequence[SceneCoverage], techniques: Sequence[str], seeds: range) -> None:
+    if out is None or not scenes:  # nothing was done: no file that would refuse another try
         return
     out.mkdir(parents=True, exist_ok=True)
     figures = {
@@ -136,7 +144,7 @@ def _write(out: Path | None, looks: Sequence[Look], techniques: Sequence[str], s
         "level": LEVEL,
         "seeds": list(seeds),
         "versions": versions(),
-        "techniques": {name: coverage(name, looks) for name in techniques},
+        "techniques": {name: coverage_figures(name, scenes) for name in techniques},
     }
     write_whole(out / "coverage.json", json.dumps(plain(figures), indent=2, allow_nan=False) + "\n")
 
@@ -159,7 +167,7 @@ def _line(name: str, found: dict[str, Any]) -> tuple[str, ...]:
     shares = []
     for key in ("position", "axis"):
         k, n = found[key]
-        low, high = wilson(k, n)
+        low, high = wilson_interval(k, n)
         shares += [f"{100 * k / n:.1f} %", f"{100 * low:.1f} to {100 * high:.1f} %"]
     k, n = found["estimates"]
     return name, f"{k}/{n}", *shares, f"{1e3 * found['mean_error_m']:.1f}", f"{found['median_axis_error_deg']:.1f}"

@@ -1,12 +1,13 @@
 """A grasp attempt at an estimated pose by the right arm, with the leaves of the recovery, judged by ground truth."""
 
 import logging
+from dataclasses import dataclass
 
 import structlog
 from py_trees.common import Status
 from scipy.spatial.transform import RigidTransform
 
-from regrasp.app.studies.pose.scenes import Scene
+from regrasp.app.studies.pose.scenes import StudyScene
 from regrasp.behaviors.cable.hand import HANDLING_ARM
 from regrasp.behaviors.cable.regrasp import Regrasp
 from regrasp.behaviors.common.start_up import StartUp
@@ -17,13 +18,19 @@ from regrasp.motion.service import Motion
 from regrasp.perception.service import Perception
 
 TICK = 0.05  # simulated seconds
-DRAWN = 0.05  # m straight back
-FOLLOWED = 0.04  # m that the connector must have come along; choice: it may slide a little, and the arm errs
-HELD_SECONDS = 2.0
 FRESH = 0.2  # s until the camera shows the scene as it is: its first picture is older than the foam piece's place
 
 
-def services_of(scene: Scene) -> Services:
+@dataclass(frozen=True)
+class GraspParameters:
+    """When the connector counts as grasped."""
+
+    retreat: float = 0.05  # m, straight back after the jaw has closed; choice
+    min_followed: float = 0.04  # m that the connector must come along; choice: it may slide a little, and the arm errs
+    hold_seconds: float = 2.0  # simulated, with both pads on the connector; choice
+
+
+def services_of(scene: StudyScene) -> Services:
     """A robot in the scene, which has looked at nothing yet; its cameras show the scene as it is."""
     scene.world.advance(FRESH)
     world, known = scene.world, scene.world.cell.known
@@ -34,18 +41,24 @@ def services_of(scene: Scene) -> Services:
     return Services(known, world, motion, perception, structlog.wrap_logger(None, wrapper_class=silent))
 
 
-def grasp(scene: Scene, services: Services, pose: RigidTransform) -> str:
-    """Why the right arm could not take the connector believed at `pose` out of the stand, or '' if it could.
+def grasp(
+    scene: StudyScene,
+    services: Services,
+    pose: RigidTransform,
+    parameters: GraspParameters = GraspParameters(),
+) -> str:
+    """Let the right arm take the connector out of the stand: '' if it could, else why not.
 
-    Grasped, drawn back 5 cm and held for 2 s, by ground truth; the scene's things move.
+    `pose` is the estimated world_from_connector. The connector counts as grasped when, by ground truth, it is held and
+    followed the arm back. The scene's objects move.
     """
     services.belief.connector = pose
-    why = done(scene, services, StartUp(name="start_up")) or done(scene, services, Regrasp(name="regrasp"))
-    return why or _drawn_back(services, scene)
+    why = run_leaf(scene, services, StartUp(name="start_up")) or run_leaf(scene, services, Regrasp(name="regrasp"))
+    return why or _pull_out(services, scene, parameters)
 
 
-def done(scene: Scene, services: Services, leaf: Leaf) -> str:
-    """Tick a leaf to its end while the world runs; why it failed, or ''."""
+def run_leaf(scene: StudyScene, services: Services, leaf: Leaf) -> str:
+    """Tick a leaf to its end while the world runs: '' if it succeeds, else why it failed."""
     leaf.setup(services=services)
     leaf.tick_once()
     while leaf.status is Status.RUNNING:
@@ -57,18 +70,19 @@ def done(scene: Scene, services: Services, leaf: Leaf) -> str:
     return f"{cause.code.value}: {cause.message}"
 
 
-def _drawn_back(services: Services, scene: Scene) -> str:
+def _pull_out(services: Services, scene: StudyScene, parameters: GraspParameters) -> str:
     motion, truth = services.motion, scene.truth
     start = truth.connector_pose().translation
-    task = motion.shift(HANDLING_ARM, motion.tool(HANDLING_ARM).rotation.apply([-DRAWN, 0.0, 0.0]), checked=False)
+    back = motion.tool(HANDLING_ARM).rotation.apply([-parameters.retreat, 0.0, 0.0])
+    task = motion.shift(HANDLING_ARM, back, checked=False)
     try:
         while not task.poll():
             scene.world.advance(TICK)
     except PlanningError as error:
         return f"{error.code.value}: {error}"
-    for _ in range(round(HELD_SECONDS / TICK)):
+    for _ in range(round(parameters.hold_seconds / TICK)):
         if not truth.held():
-            return "lost: a pad touches the connector no more"
+            return "lost: a pad no longer touches the connector"
         scene.world.advance(TICK)
-    moved = float(((truth.connector_pose().translation - start) ** 2).sum() ** 0.5)
-    return "" if moved >= FOLLOWED else f"stayed: the connector came {1e3 * moved:.0f} mm along"
+    followed = float(((truth.connector_pose().translation - start) ** 2).sum() ** 0.5)
+    return "" if followed >= parameters.min_followed else f"stayed: the connector came {1e3 * followed:.0f} mm along"

@@ -1,4 +1,4 @@
-"""Pictures without the connector: a black plug in its socket, and look-alikes. What is identified there is false."""
+"""Pictures without the connector: a black plug in its socket, and look-alikes. Every estimate there is false."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -15,16 +15,26 @@ from regrasp.perception.pose.estimate import Estimate
 from regrasp.sim.render.renderer import RendererName
 from regrasp.sim.world import World
 
-FRAMES = 10  # of a seed, each with other things in other places: 20 seeds give the 200
-LOW, HIGH = np.array([0.20, -0.30, 0.08]), np.array([0.46, 0.35, 0.50])  # m: in the rear camera's sight
-SHOWN = 0.5  # share of the pictures that show a thing
 OTHER_COLORS: tuple[Color, ...] = ((0.05, 0.45, 0.10), (0.08, 0.15, 0.70), (0.85, 0.70, 0.05), (0.80, 0.35, 0.02))
-PATCH = 0  # the number of the prop that lies on the panel
+STICKER = 0  # the index of the look-alike that lies on the panel
+
+
+@dataclass(frozen=True)
+class NegativeParameters:
+    """Which pictures without a connector are drawn."""
+
+    frames: int = 10  # per seed, with the look-alikes in other places; choice: 20 seeds give 200
+    lowest: tuple[float, float, float] = (0.20, -0.30, 0.08)  # m, world: a corner of the box that holds the look-alikes
+    highest: tuple[float, float, float] = (0.46, 0.35, 0.50)  # m, world: its other corner, in the rear camera's view
+    shown_share: float = 0.5  # of the pictures, for each look-alike; choice
+
+
+_DEFAULTS = NegativeParameters()
 
 
 @dataclass(frozen=True)
 class Negative:
-    """How many of so many pictures without a connector a technique found one in."""
+    """In how many of `frames` pictures without a connector a technique found one."""
 
     technique: str
     seed: int
@@ -35,20 +45,22 @@ class Negative:
         return f"{self.technique} {self.false} of {self.frames} false"
 
 
-def run_negatives(setup: Setup, seed: int) -> list[Negative]:
-    """Each technique on the same `FRAMES` pictures of one seed."""
+def run_negatives(setup: Setup, seed: int, parameters: NegativeParameters = _DEFAULTS) -> list[Negative]:
+    """Count each technique's false estimates in the same pictures of one seed."""
     mount = setup.cell.known.camera("rear").mount
     assert isinstance(mount, FixedMount)
     made = {name: setup.technique(name) for name in setup.techniques}
     false = dict.fromkeys(setup.techniques, 0)
-    for frame in negative_frames(setup.cell, seed, setup.renderer):
+    for frame in negative_frames(setup.cell, seed, setup.renderer, parameters):
         for name, technique in made.items():
             false[name] += isinstance(technique.estimate(frame, mount.world_from_camera), Estimate)
-    return [Negative(name, seed, FRAMES, false[name]) for name in setup.techniques]
+    return [Negative(name, seed, parameters.frames, false[name]) for name in setup.techniques]
 
 
-def negative_frames(cell: Cell, seed: int, renderer: RendererName = "auto") -> Iterator[RgbdFrame]:
-    """The rear camera's `FRAMES` pictures of one seed."""
+def negative_frames(
+    cell: Cell, seed: int, renderer: RendererName = "auto", parameters: NegativeParameters = _DEFAULTS
+) -> Iterator[RgbdFrame]:
+    """The rear camera's pictures of one seed."""
     rng = np.random.default_rng([seed, 6])
     black = cell.known.connector.model_copy(update={"color": cell.hidden.cable.color, "tag": None})
     props = look_alikes(cell, rng)
@@ -57,12 +69,12 @@ def negative_frames(cell: Cell, seed: int, renderer: RendererName = "auto") -> I
     try:
         panel = next(box for box in cell.known.boxes if box.name == "back_panel")
         face = panel.center[0] - 0.5 * panel.size[0]
-        for _ in range(FRAMES):
+        for _ in range(parameters.frames):
             for number in range(len(props)):
-                place, turn = rng.uniform(LOW, HIGH), Rotation.random(rng=rng)
-                if number == PATCH:
+                place, turn = rng.uniform(parameters.lowest, parameters.highest), Rotation.random(rng=rng)
+                if number == STICKER:
                     place[0], turn = face, Rotation.from_euler("x", float(rng.uniform(0.0, np.pi)))
-                shown = rng.random() < SHOWN
+                shown = rng.random() < parameters.shown_share
                 world.place_prop(number, RigidTransform.from_components(place, turn) if shown else None)
             world.advance(1.0 / world.cameras[CAMERA].spec.rate)
             yield next(world.cameras[CAMERA].still(1))
@@ -71,15 +83,15 @@ def negative_frames(cell: Cell, seed: int, renderer: RendererName = "auto") -> I
 
 
 def look_alikes(cell: Cell, rng: np.random.Generator) -> tuple[Prop, ...]:
-    """Things of the connector's colour in other shapes and sizes, and of its shape in another colour."""
+    """Objects of the connector's colour in other shapes and sizes, and one of its shape in another colour."""
     connector = cell.known.connector
     color, length, radius = connector.color, connector.length, connector.radius
     edges = rng.uniform(0.02, 0.08, 3)
-    patch = (0.002, *rng.uniform(0.03, 0.10, 2).tolist())  # a sticker
-    stout, thin = float(rng.uniform(1.8, 3.0)), float(rng.uniform(0.3, 0.5))  # of the connector's size
+    sticker = (0.002, *rng.uniform(0.03, 0.10, 2).tolist())
+    stout, thin = float(rng.uniform(1.8, 3.0)), float(rng.uniform(0.3, 0.5))  # over the connector's size
     other = OTHER_COLORS[int(rng.integers(len(OTHER_COLORS)))]
     return (
-        Prop("box", patch, color),
+        Prop("box", sticker, color),
         Prop("box", tuple(edges.tolist()), color),
         Prop("ball", (float(rng.uniform(0.01, 0.04)),), color),
         Prop("rod", (stout * length, stout * radius), color),

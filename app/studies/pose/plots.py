@@ -1,4 +1,4 @@
-"""The pose study drawn: each trial's error by configuration, and the shares identified and grasped."""
+"""Plots of the pose study: each trial's error by configuration, and the shares identified and grasped."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -7,17 +7,17 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from regrasp.app.studies.demo import wilson
 from regrasp.app.studies.pose.scenes import CONFIGURATIONS, HEADLINE
 from regrasp.app.studies.pose.trial import Trial
+from regrasp.app.studies.statistics import wilson_interval
 
 # Hwang 2024, table 5: mean error in mm of the RGB-D technique by the share hidden, in its configurations 3 and 6 to 9.
 THESIS_RGBD = {"3": 4.4, "6": 8.8, "7": 13.6, "8": 17.0, "9": 35.7}
-WIDTH = 0.8  # of a group of techniques, in configurations
+_GROUP_WIDTH = 0.8  # of the distance between two configurations or bars
 
 
-def draw(folder: Path, trials: Sequence[Trial], techniques: Sequence[str], thesis: Mapping[str, Any]) -> None:
-    """Write errors.png and shares.png to `folder`; `thesis` has the figures of pose.json's `thesis`."""
+def write_plots(folder: Path, trials: Sequence[Trial], techniques: Sequence[str], thesis: Mapping[str, Any]) -> None:
+    """Write errors.png and shares.png to `folder`; `thesis` holds the same as `thesis` in pose.json."""
     _errors(trials, techniques).savefig(folder / "errors.png", dpi=120)
     _shares(trials, techniques, thesis).savefig(folder / "shares.png", dpi=120)
 
@@ -28,7 +28,7 @@ def _errors(trials: Sequence[Trial], techniques: Sequence[str]) -> Figure:
     present = {t.configuration for t in trials}
     names = [c for c in CONFIGURATIONS if c in present]
     for number, technique in enumerate(techniques):
-        shift = WIDTH * ((number + 0.5) / len(techniques) - 0.5)
+        shift = _GROUP_WIDTH * ((number + 0.5) / len(techniques) - 0.5)
         points = [
             (names.index(t.configuration) + shift, 1e3 * t.error_m)
             for t in trials
@@ -62,8 +62,10 @@ def _shares(trials: Sequence[Trial], techniques: Sequence[str], thesis: Mapping[
             tried = [bool(getattr(t, what)) for t in own if getattr(t, what) is not None]
             if tried:
                 k, n = sum(tried), len(tried)
-                low, high = wilson(k, n)
-                axes.bar(number, 100 * k / n, WIDTH, yerr=[[100 * (k / n - low)], [100 * (high - k / n)]], capsize=4)
+                low, high = wilson_interval(k, n)
+                axes.bar(
+                    number, 100 * k / n, _GROUP_WIDTH, yerr=[[100 * (k / n - low)], [100 * (high - k / n)]], capsize=4
+                )
             if technique in thesis:
                 k, n = thesis[technique][what]
                 axes.plot(number, 100 * k / n, "k_", markersize=40, label="thesis" if technique == first else None)

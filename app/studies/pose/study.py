@@ -1,4 +1,4 @@
-"""The thesis's pose experiment (Hwang 2024, tables 3 to 6): every technique, configuration and seed, counted."""
+"""`regrasp study pose`: the thesis's pose experiment (Hwang 2024, tables 3 to 6) over many seeds, counted."""
 
 import csv
 import io
@@ -14,12 +14,12 @@ from typing import Any
 
 from regrasp.app.files.whole_file import write_whole
 from regrasp.app.records.result import plain, versions
-from regrasp.app.studies.demo import wilson
 from regrasp.app.studies.pose.both_cameras import BOTH, run_both
 from regrasp.app.studies.pose.negatives import Negative, run_negatives
 from regrasp.app.studies.pose.scenes import CONFIGURATIONS, HEADLINE
 from regrasp.app.studies.pose.tasks import run_tasks
 from regrasp.app.studies.pose.trial import Setup, Trial, run_trials
+from regrasp.app.studies.statistics import wilson_interval
 from regrasp.app.studies.table import print_table
 
 # Hwang 2024, table 3: of 27 trials identified and grasped, mean error and its standard deviation in m.
@@ -29,7 +29,7 @@ THESIS: dict[str, dict[str, Any]] = {
     "detector": {"identified": [21, 27], "grasped": [17, 27], "mean_error_m": 0.02913, "std_m": 9.0e-3},
 }
 
-Task = Callable[[], Sequence[Trial | Negative]]
+SceneTask = Callable[[], Sequence[Trial | Negative]]
 
 
 def run_pose(
@@ -40,15 +40,16 @@ def run_pose(
     configurations: Sequence[str] = tuple(CONFIGURATIONS),
     both: bool = False,
 ) -> int:
-    """Each technique in every configuration with every seed, and on ten pictures a seed that show no connector.
+    """Try each technique in every configuration with every seed, and on pictures that show no connector.
 
-    Progress goes to stderr, tables to stdout; with `out`, the figures go to out/pose.json and out/pose.csv, which are
-    whole after every scene, and are drawn in the end. With `both` cameras each technique has a second row. Returns the
-    exit code: 0, 130 after Ctrl-C, 1 when a scene broke off.
+    Progress goes to stderr, tables to stdout. With `out`, the figures go to out/pose.json and out/pose.csv, which are
+    complete after every scene, and plots are written in the end. With `both`, each technique has a second row, with
+    both cameras. Returns the exit code: 0, 130 after Ctrl-C, 1 when a scene ended with an error.
 
-    Raises OSError when `out` cannot be written.
+    Raises:
+        OSError: `out` cannot be written.
     """
-    tasks: dict[str, Task] = {}
+    tasks: dict[str, SceneTask] = {}
     for seed, setup in product(seeds, setups):
         for name in configurations:
             title = f"{', '.join(setup.techniques)} in configuration {name} seed {seed}"
@@ -58,14 +59,14 @@ def run_pose(
         tasks[f"{', '.join(setup.techniques)} without connector seed {seed}"] = partial(run_negatives, setup, seed)
     techniques = [name for setup in setups for name in setup.techniques]
     rows = [*techniques, *(f"{name}, {BOTH}" for name in techniques if both)]
-    found, code = run_tasks(tasks, jobs, lambda some: _write(out, some, rows, seeds))
+    found, code = run_tasks(tasks, jobs, lambda so_far: _write(out, so_far, rows, seeds))
     _write(out, found, rows, seeds)
     trials = _trials(found)
     if out is not None and trials:
-        from regrasp.app.studies.pose.plots import draw  # late: it brings matplotlib
+        from regrasp.app.studies.pose.plots import write_plots  # late: it brings matplotlib
 
-        draw(out, trials, rows, THESIS)
-    _print({name: of_technique(name, found) for name in rows})
+        write_plots(out, trials, rows, THESIS)
+    _print({name: technique_figures(name, found) for name in rows})
     return code
 
 
@@ -73,20 +74,20 @@ def _trials(found: Sequence[Trial | Negative]) -> list[Trial]:
     return [part for part in found if isinstance(part, Trial)]
 
 
-def of_technique(name: str, found: Sequence[Trial | Negative]) -> dict[str, Any]:
-    """A technique's figures: of the headline's configurations together, and of each that was tried."""
+def technique_figures(name: str, found: Sequence[Trial | Negative]) -> dict[str, Any]:
+    """A technique's figures in pose.json: of the `HEADLINE` configurations together, and of each that was tried."""
     own = [trial for trial in _trials(found) if trial.technique == name]
-    blanks = [part for part in found if isinstance(part, Negative) and part.technique == name]
+    negatives = [part for part in found if isinstance(part, Negative) and part.technique == name]
     by_name = {c: [t for t in own if t.configuration == c] for c in CONFIGURATIONS}
     return {
-        **summary([t for t in own if t.configuration in HEADLINE]),
-        "false_identifications": [sum(n.false for n in blanks), sum(n.frames for n in blanks)],
-        "by_configuration": {c: summary(some) for c, some in by_name.items() if some},
+        **trial_figures([t for t in own if t.configuration in HEADLINE]),
+        "false_identifications": [sum(n.false for n in negatives), sum(n.frames for n in negatives)],
+        "by_configuration": {c: trial_figures(trials) for c, trials in by_name.items() if trials},
     }
 
 
-def summary(trials: Sequence[Trial]) -> dict[str, Any]:
-    """Counts [k, n] and errors of these trials. None: nothing to count."""
+def trial_figures(trials: Sequence[Trial], max_force: float = 5.0) -> dict[str, Any]:
+    """Counts [k, n] and errors of these trials. None: no value. Contacts with more than `max_force` N count."""
     errors = [t.error_m for t in trials if t.error_m is not None]
     axes = [t.axis_error_deg for t in trials if t.axis_error_deg is not None]
     forces = [t.unintended_force for t in trials if t.unintended_force is not None]
@@ -98,7 +99,7 @@ def summary(trials: Sequence[Trial]) -> dict[str, Any]:
         "std_m": statistics.stdev(errors) if len(errors) > 1 else None,
         "median_axis_error_deg": statistics.median(axes) if axes else None,
         "way_round": [sum(bool(t.way_round) for t in trials), len(axes)],
-        "unintended_contacts": [sum(force > 5.0 for force in forces), len(forces)],
+        "unintended_contacts": [sum(force > max_force for force in forces), len(forces)],
     }
 
 
@@ -111,7 +112,7 @@ def _write(out: Path | None, found: Sequence[Trial | Negative], techniques: Sequ
         "seeds": list(seeds),
         "versions": versions(),
         "thesis": THESIS,
-        "techniques": {name: of_technique(name, found) for name in techniques},
+        "techniques": {name: technique_figures(name, found) for name in techniques},
     }
     write_whole(out / "pose.json", json.dumps(plain(figures), indent=2, allow_nan=False) + "\n")
     rows = io.StringIO(newline="")
@@ -171,7 +172,7 @@ def _share(pair: Sequence[int] | None) -> str:
 
 
 def _interval(pair: Sequence[int]) -> str:
-    low, high = wilson(*pair)
+    low, high = wilson_interval(*pair)
     return f"{100 * low:.0f} to {100 * high:.0f} %" if pair[1] else "-"
 
 

@@ -11,7 +11,8 @@ import pytest
 
 from regrasp.app.records.result import Expectation, Result, Slip
 from regrasp.app.scenario.load import Scenario
-from regrasp.app.studies.demo import run_demo, wilson
+from regrasp.app.studies.demo import run_demo
+from regrasp.app.studies.statistics import wilson_interval
 from regrasp.interfaces.cause import Cause, CauseCode
 
 
@@ -127,11 +128,11 @@ def test_ctrl_c_keeps_what_was_done_and_stops_what_runs(tmp_path: Path) -> None:
     ],
 )
 def test_wilson_interval(k: int, n: int, low: float, high: float) -> None:
-    assert wilson(k, n) == pytest.approx((low, high), abs=5e-5)
+    assert wilson_interval(k, n) == pytest.approx((low, high), abs=5e-5)
 
 
 def test_a_share_lies_in_its_interval() -> None:
     for n in range(1, 200):
         for k in (0, n // 2, n):
-            low, high = wilson(k, n)
+            low, high = wilson_interval(k, n)
             assert low <= k / n <= high

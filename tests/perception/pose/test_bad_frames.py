@@ -13,7 +13,7 @@ from scene import LEFTWARDS, PLACE, REAR, blocks, plug, seen
 
 from regrasp.app.files.resources import shipped
 from regrasp.app.scenario.cell_file import load_cell
-from regrasp.app.studies.pose.trial import CELLS
+from regrasp.app.studies.pose.trial import CELL_OF_TECHNIQUE
 from regrasp.interfaces.cell import KnownCell
 from regrasp.interfaces.frame import RgbdFrame
 from regrasp.perception.pose.detector import Detector
@@ -73,7 +73,9 @@ def whole(known: KnownCell) -> RgbdFrame:
 @pytest.fixture(scope="session", params=TECHNIQUES)
 def technique(request: pytest.FixtureRequest) -> Technique:
     """Each in a cell that it can work in."""
-    return make_technique(request.param, load_cell(shipped("cell")[CELLS.get(request.param, "thesis")]).known)
+    return make_technique(
+        request.param, load_cell(shipped("cell")[CELL_OF_TECHNIQUE.get(request.param, "thesis")]).known
+    )
 
 
 def owns(result: Estimate | NoEstimate) -> bool:

@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from regrasp.app.studies.detector.data import PATCH, Pictures, Target, draw_patch, make_pictures, target_maps
+from regrasp.app.studies.detector.crops import AugmentationParameters, Target, draw_crop, target_maps
+from regrasp.app.studies.detector.data import Pictures, make_pictures
 from regrasp.interfaces.cell import Cell
 from regrasp.perception.pose.detector import decode
 
@@ -39,23 +40,23 @@ def test_masks_and_axes_belong_to_the_connector(pictures: Pictures) -> None:
     assert not pictures.masks[5::6].any()  # every sixth is without
 
 
-def test_patches_depend_on_the_generator_alone(pictures: Pictures) -> None:
+def test_crops_depend_on_the_generator_alone(pictures: Pictures) -> None:
     for i in range(10):
-        (a, sizes, truth), (b, same, again) = (draw_patch(pictures, np.random.default_rng(i)) for _ in range(2))
+        (a, sizes, truth), (b, same, again) = (draw_crop(pictures, np.random.default_rng(i)) for _ in range(2))
         assert np.array_equal(a, b)
         assert np.array_equal(sizes, same)
         assert truth == again
 
 
-def test_patches_keep_the_connector_in_its_box(pictures: Pictures, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_crops_keep_the_connector_in_its_box(pictures: Pictures, monkeypatch: pytest.MonkeyPatch) -> None:
     """A white connector in a black picture reaches all four edges of its box, and no pixel of it is outside."""
-    monkeypatch.setattr("regrasp.app.studies.detector.data._cut_out", lambda *_: None)
-    monkeypatch.setattr("regrasp.app.studies.detector.data._recolored", lambda image, _rng: image)
+    monkeypatch.setattr("regrasp.app.studies.detector.crops._cut_out", lambda *_: None)
+    monkeypatch.setattr("regrasp.app.studies.detector.crops._recolored", lambda image, *_: image)
     white = replace(pictures, images=np.zeros_like(pictures.images))
     white.images[pictures.masks >= 128] = 255
     compared = 0
     for i in range(100):
-        image, _, targets = draw_patch(white, np.random.default_rng(i))
+        image, _, targets = draw_crop(white, np.random.default_rng(i))
         if len(targets) == 1 and targets[0].counts:
             compared += 1
             u0, v0, width, height = cv2.boundingRect((image[..., 0] >= 128).astype(np.uint8))
@@ -63,7 +64,7 @@ def test_patches_keep_the_connector_in_its_box(pictures: Pictures, monkeypatch: 
     assert compared > 20
 
 
-corner = st.floats(8, PATCH - 60)
+corner = st.floats(8, AugmentationParameters.crop_size - 60)
 edge = st.floats(6, 50)
 
 

@@ -1,4 +1,5 @@
 import json
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -33,12 +34,12 @@ def test_a_tiny_training_leaves_a_network_and_its_figures_and_the_seed_decides(t
 
 
 def test_another_training_goes_on_from_a_network(tmp_path: Path) -> None:
-    from regrasp.app.studies.detector.train import Network, read_weights, take_over, to_onnx
+    from regrasp.app.studies.detector.train import Network, load_weights, read_weights, to_onnx
 
     model = shipped_network()
     network = Network()
     inputs = np.random.default_rng(0).random((4, 13, 120, 216), np.float32)
-    take_over(network, read_weights(model), torch.from_numpy(inputs))
+    load_weights(network, read_weights(model), torch.from_numpy(inputs))
     answers = []
     for file in (model, to_onnx(network)):
         net = cv2.dnn.readNetFromONNX(np.frombuffer(file, np.uint8))
@@ -85,7 +86,8 @@ def test_ctrl_c_keeps_the_best_so_far(tmp_path: Path, monkeypatch: pytest.Monkey
         drawn.append(1)
         return batch(*args)
 
-    monkeypatch.setattr(detector_train, "CHECK_EVERY", 1)
+    every_step = partial(detector_train.train, parameters=detector_train.TrainingParameters(check_every=1))
+    monkeypatch.setattr(detector_train, "train", every_step)
     monkeypatch.setattr(detector_train, "_batch", interrupted)
     assert train(tmp_path / "out").exit_code == 130
     assert [f.name for f in (tmp_path / "out").iterdir()] == ["detector.onnx"]

@@ -7,12 +7,12 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from regrasp.app.studies.pose.coverage import (
     AXIS_LIMIT,
     POSITION_LIMIT,
-    Cover,
-    Look,
+    FrameCoverage,
+    SceneCoverage,
     _write,
-    coverage,
-    distances,
-    errors,
+    coverage_figures,
+    mahalanobis_sq,
+    pose_errors,
 )
 from regrasp.perception.pose.estimate import ROLL_VARIANCE, Estimate
 
@@ -40,7 +40,7 @@ def test_honest_covariances_hold_the_truth_in_95_of_100() -> None:
         turned = Rotation.from_rotvec(draw[3:]).apply(axis) * rng.choice([-1.0, 1.0])  # either end may lead
         told = covariance.copy()
         told[3:, 3:] += ROLL_VARIANCE * np.outer(turned, turned)
-        found = distances(estimate(truth.translation + draw[:3], turned, told), truth)
+        found = mahalanobis_sq(estimate(truth.translation + draw[:3], turned, told), truth)
         inside += np.array(found) <= [POSITION_LIMIT, AXIS_LIMIT]
     np.testing.assert_allclose(inside / 4000, 0.95, atol=0.015)  # four standard deviations
 
@@ -48,17 +48,17 @@ def test_honest_covariances_hold_the_truth_in_95_of_100() -> None:
 def test_errors_by_hand() -> None:
     truth = RigidTransform.from_components([0.0, 0.0, 0.0], Rotation.identity())
     found = estimate(np.array([0.003, 0.0, 0.004]), -Rotation.from_euler("z", 10, degrees=True).apply(X), np.eye(6))
-    assert errors(found, truth) == pytest.approx((0.005, 10.0))
-    assert distances(found, truth) == pytest.approx((25e-6, np.deg2rad(10) ** 2))
+    assert pose_errors(found, truth) == pytest.approx((0.005, 10.0))
+    assert mahalanobis_sq(found, truth) == pytest.approx((25e-6, np.deg2rad(10) ** 2))
 
 
 def test_coverage_counts_each_techniques_own() -> None:
-    covers = (Cover("a", "1", 0, 1.0, 1.0, 0.002, 1.0), Cover("a", "1", 0, 9.0, 5.0, 0.004, 3.0))
-    found = coverage("a", [Look("a", 3, covers), Look("b", 3, ())])
+    covers = (FrameCoverage("a", "1", 0, 1.0, 1.0, 0.002, 1.0), FrameCoverage("a", "1", 0, 9.0, 5.0, 0.004, 3.0))
+    found = coverage_figures("a", [SceneCoverage("a", 3, covers), SceneCoverage("b", 3, ())])
     assert (found["estimates"], found["position"], found["axis"]) == ([2, 3], [1, 2], [2, 2])
     assert found["mean_error_m"] == pytest.approx(0.003)
     assert found["by_configuration"] == {"1": {"position": [1, 2], "axis": [2, 2]}}
-    assert coverage("b", [Look("b", 3, ())])["mean_error_m"] is None
+    assert coverage_figures("b", [SceneCoverage("b", 3, ())])["mean_error_m"] is None
 
 
 def test_where_nothing_was_done_nothing_is_written(tmp_path: Path) -> None:

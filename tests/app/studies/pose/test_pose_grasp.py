@@ -3,13 +3,13 @@ import pytest
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.app.studies.pose.grasp import grasp, services_of
-from regrasp.app.studies.pose.scenes import Scene, study_cell
+from regrasp.app.studies.pose.scenes import StudyScene, study_cell
 from regrasp.interfaces.cell import pose_along
 
 SMALL = [f"known.cameras.{i}.{key}={size}" for i in (0, 1) for key, size in (("width", 212), ("height", 120))]
 
 
-def believed(scene: Scene, off: float = 0.0) -> RigidTransform:
+def believed(scene: StudyScene, off: float = 0.0) -> RigidTransform:
     """The true pose with another roll, raised by `off` m."""
     pose = scene.truth.connector_pose()
     x, y, z = pose.translation.tolist()
@@ -19,7 +19,7 @@ def believed(scene: Scene, off: float = 0.0) -> RigidTransform:
 
 @pytest.mark.parametrize("name", ["2", "4", "9"])
 def test_the_right_pose_is_grasped(name: str) -> None:
-    with Scene(study_cell(overrides=SMALL), name, 0) as scene:
+    with StudyScene(study_cell(overrides=SMALL), name, 0) as scene:
         assert grasp(scene, services_of(scene), believed(scene)) == ""
         assert scene.truth.held()
         assert not scene.truth.plugged()  # drawn off the stand
@@ -28,7 +28,7 @@ def test_the_right_pose_is_grasped(name: str) -> None:
 
 def test_an_arm_that_is_far_off_sees_itself_and_takes_hold() -> None:
     """By its encoders alone the jaw closed beside the connector."""
-    with Scene(study_cell(), "5", 525) as scene:
+    with StudyScene(study_cell(), "5", 525) as scene:
         services = services_of(scene)
         assert grasp(scene, services, believed(scene)) == ""
         arm = scene.world.arms["right"]
@@ -38,7 +38,7 @@ def test_an_arm_that_is_far_off_sees_itself_and_takes_hold() -> None:
 
 
 def test_a_wrong_pose_is_not_grasped() -> None:
-    with Scene(study_cell(overrides=SMALL), "2", 0) as scene:
+    with StudyScene(study_cell(overrides=SMALL), "2", 0) as scene:
         assert grasp(scene, services_of(scene), believed(scene, 0.05)).startswith(
             "grasp_empty: the jaw closed on nothing"
         )
@@ -46,6 +46,6 @@ def test_a_wrong_pose_is_not_grasped() -> None:
 
 
 def test_a_pose_out_of_reach_is_said() -> None:
-    with Scene(study_cell(overrides=SMALL), "2", 0) as scene:
+    with StudyScene(study_cell(overrides=SMALL), "2", 0) as scene:
         away = RigidTransform.from_translation([0.6, 0.6, 0.9]) * believed(scene)
         assert grasp(scene, services_of(scene), away).startswith("out_of_reach: ")

@@ -8,8 +8,8 @@ from regrasp.app.files.findings import Findings
 from regrasp.app.studies.pose.scenes import (
     CONFIGURATIONS,
     HEADLINE,
-    POSITION_JITTER,
-    Scene,
+    SceneParameters,
+    StudyScene,
     connector_pose,
     frames,
     study_cell,
@@ -60,7 +60,7 @@ def test_poses_are_as_asked_and_jittered(small: Cell, name: str, toward: float, 
         assert abs(found[0] - toward) < 6.0  # 5 of jitter; it counts for more where the axis is raised
         assert abs(found[1] - up) < 5.1
         distance = float(np.linalg.norm(pose.translation - camera.translation))
-        assert abs(distance - 0.75) < np.sqrt(3) * POSITION_JITTER
+        assert abs(distance - 0.75) < np.sqrt(3) * SceneParameters.position_jitter
     assert len({tuple(pose.translation) for pose in poses}) == 30
 
 
@@ -87,7 +87,7 @@ def test_a_hidden_one_is_the_third_behind_a_piece(small: Cell) -> None:
 
 @pytest.mark.parametrize("name", ["6", "9", "7 shadow"])
 def test_so_much_is_hidden_by_the_true_mask(small: Cell, name: str) -> None:
-    with Scene(small, name, 2) as scene:
+    with StudyScene(small, name, 2) as scene:
         wanted = scene.configuration.hidden
         assert abs(scene.truth.hidden_share("rear") - wanted) < 0.01
         fine = scene.world.cameras["rear"].spec.model_copy(update={"width": 1696, "height": 960}).intrinsics
@@ -100,7 +100,7 @@ def test_so_much_is_hidden_by_the_true_mask(small: Cell, name: str) -> None:
         assert left_stays == scene.configuration.shadow
 
 
-def _red(scene: Scene, poses: np.ndarray, camera: object) -> np.ndarray:
+def _red(scene: StudyScene, poses: np.ndarray, camera: object) -> np.ndarray:
     """The columns of the connector's pixels."""
     ids = scene.world.cameras["rear"].ids(poses, camera)  # type: ignore[arg-type]
     cable = scene.world.cable
@@ -109,13 +109,13 @@ def _red(scene: Scene, poses: np.ndarray, camera: object) -> np.ndarray:
 
 
 def test_nothing_is_hidden_without_a_piece(small: Cell) -> None:
-    with Scene(small, "3", 2) as scene:
+    with StudyScene(small, "3", 2) as scene:
         assert scene.truth.hidden_share("rear") == 0.0
 
 
 @pytest.mark.parametrize("name", ["2", "4", "5"])
 def test_the_stand_holds_the_cable_where_it_was_asked(small: Cell, name: str) -> None:
-    with Scene(small, name, 1) as scene:
+    with StudyScene(small, name, 1) as scene:
         asked = connector_pose(CONFIGURATIONS[name], rear(small).translation, 1)
         scene.world.advance(1.0)
         off = asked.inv() * scene.truth.connector_pose()
@@ -137,7 +137,7 @@ def test_frames_come_alike_again_and_differ_by_their_noise(small: Cell) -> None:
 
 
 def test_a_still_frame_is_the_cameras_own(small: Cell) -> None:
-    with Scene(small, "1", 0) as scene:
+    with StudyScene(small, "1", 0) as scene:
         still = next(scene.frames(1))
         scene.world.advance(1 / 15)
         scene.world.advance(0.04)
@@ -178,4 +178,4 @@ def test_a_share_that_cannot_be_hidden_is_said(small: Cell, monkeypatch: pytest.
     whole = dataclasses.replace(CONFIGURATIONS["9"], hidden=1.5)
     monkeypatch.setitem(CONFIGURATIONS, "9", whole)
     with pytest.raises(RuntimeError, match="no place"):
-        Scene(small, "9", 0)
+        StudyScene(small, "9", 0)

@@ -11,10 +11,10 @@ from typer.testing import CliRunner
 
 from regrasp.app.cli.commands import app
 from regrasp.app.studies.pose.coverage import run_coverage
-from regrasp.app.studies.pose.negatives import FRAMES, Negative, negative_frames
-from regrasp.app.studies.pose.plots import draw
+from regrasp.app.studies.pose.negatives import Negative, NegativeParameters, negative_frames
+from regrasp.app.studies.pose.plots import write_plots
 from regrasp.app.studies.pose.scenes import study_cell
-from regrasp.app.studies.pose.study import THESIS, of_technique, run_pose
+from regrasp.app.studies.pose.study import THESIS, run_pose, technique_figures
 from regrasp.app.studies.pose.trial import Setup, Trial
 from regrasp.interfaces.cell import FixedMount, KnownCell
 from regrasp.interfaces.frame import RgbdFrame
@@ -59,7 +59,7 @@ def test_a_study_of_one_scene(tmp_path: Path, capfd: pytest.CaptureFixture[str])
     assert blind["mean_error_m"] is None
     assert rgbd["median_axis_error_deg"] < 30
     assert rgbd["false_identifications"][0] > 0  # colour is all that it knows
-    assert blind["false_identifications"] == [0, FRAMES]
+    assert blind["false_identifications"] == [0, NegativeParameters.frames]
     assert found["thesis"]["rgbd"]["grasped"] == [20, 27]
 
     rows = list(csv.DictReader((tmp_path / "pose.csv").open()))
@@ -83,24 +83,24 @@ def test_figures_of_a_technique() -> None:
         Trial("a", "9 shadow", 0, False, grasped=False),
         Trial("b", "1", 0, False),
     ]
-    found = of_technique("a", [*trials, Negative("a", 0, 10, 3), Negative("b", 0, 10, 0)])
+    found = technique_figures("a", [*trials, Negative("a", 0, 10, 3), Negative("b", 0, 10, 0)])
     assert (found["identified"], found["grasped"], found["way_round"]) == ([2, 2], [1, 2], [1, 2])
     assert (found["mean_error_m"], found["median_axis_error_deg"]) == pytest.approx((0.003, 2.0))
     assert found["std_m"] == pytest.approx(0.001 * 2**0.5)
     assert (found["unintended_contacts"], found["false_identifications"]) == ([1, 1], [3, 10])
     assert found["by_configuration"]["9 shadow"]["identified"] == [0, 1]  # the other side's are apart
-    assert of_technique("b", trials)["grasped"] == [0, 0]
+    assert technique_figures("b", trials)["grasped"] == [0, 0]
 
 
 def test_negatives_show_no_connector_but_much_of_its_colour() -> None:
     cell = study_cell()
     frames = list(negative_frames(cell, 3))
     again = list(negative_frames(cell, 3))
-    assert len(frames) == FRAMES
+    assert len(frames) == NegativeParameters.frames
     for a, b in zip(frames, again, strict=True):
         np.testing.assert_array_equal(a.rgb, b.rgb)
         np.testing.assert_array_equal(a.depth, b.depth)
-    assert len({f.number for f in frames}) == FRAMES
+    assert len({f.number for f in frames}) == NegativeParameters.frames
     reddish = [int(np.count_nonzero((f.rgb[..., 0] > 80) & (f.rgb[..., 1] < 40))) for f in frames]
     assert sum(count > 200 for count in reddish) >= 5
     rear = cell.known.camera("rear").mount
@@ -164,5 +164,5 @@ def test_a_folder_with_a_study_is_refused(tmp_path: Path) -> None:
 def test_plots_of_any_techniques_say_what_the_marks_are(tmp_path: Path) -> None:
     for names in (["fused"], ["fused", "rgbd"]):
         trials = [Trial(name, "1", 0, True, error_m=0.002, grasped=True) for name in names]
-        draw(tmp_path, trials, names, THESIS)
+        write_plots(tmp_path, trials, names, THESIS)
         assert np.std(np.asarray(cv2.imread(str(tmp_path / "shares.png")))) > 5

@@ -5,7 +5,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
-from regrasp.app.studies.pose.trial import looked
+from regrasp.app.studies.pose.trial import mean_estimate
 from regrasp.interfaces.frame import Intrinsics, RgbdFrame
 from regrasp.perception.pose.estimate import Estimate, NoEstimate, pose_covariance
 from regrasp.perception.pose.segmentation import NotSeen
@@ -44,7 +44,7 @@ def frames() -> Iterator[RgbdFrame]:
 
 def test_the_mean_is_over_three_seconds_from_the_first_estimate() -> None:
     told = Told(lambda t: None if t < 1.99 else (TRUTH.translation + 0.001 * (t > 3.499) * X, X))
-    seen = looked(told, frames(), EYE, TRUTH)
+    seen = mean_estimate(told, frames(), EYE, TRUTH)
     assert seen.seconds == pytest.approx(2.0)
     assert (len(seen.estimates), told.asked) == (45, 75)
     assert seen.world_from_connector is not None
@@ -53,21 +53,21 @@ def test_the_mean_is_over_three_seconds_from_the_first_estimate() -> None:
 
 def test_what_shows_after_five_seconds_is_not_identified() -> None:
     told = Told(lambda t: None if t < 4.999 else (TRUTH.translation, X))
-    seen = looked(told, frames(), EYE, TRUTH)
+    seen = mean_estimate(told, frames(), EYE, TRUTH)
     assert (seen.world_from_connector, seen.why, told.asked) == (None, "nothing red", 75)
-    late = looked(Told(lambda t: None if t < 4.9 else (TRUTH.translation, X)), frames(), EYE, TRUTH)
+    late = mean_estimate(Told(lambda t: None if t < 4.9 else (TRUTH.translation, X)), frames(), EYE, TRUTH)
     assert len(late.estimates) == 45
 
 
 def test_something_else_is_not_the_connector() -> None:
-    seen = looked(Told(lambda _: (TRUTH.translation + 0.2 * X, X)), frames(), EYE, TRUTH)
+    seen = mean_estimate(Told(lambda _: (TRUTH.translation + 0.2 * X, X)), frames(), EYE, TRUTH)
     assert seen.world_from_connector is None
     assert seen.why == "what was identified is 0.20 m from the connector"
 
 
 def test_an_axis_that_now_and_then_turns_round_keeps_its_line() -> None:
     tilted = np.array([np.cos(0.2), np.sin(0.2), 0.0])
-    seen = looked(Told(lambda t: (TRUTH.translation, -X if t < 0.5 else tilted)), frames(), EYE, TRUTH)
+    seen = mean_estimate(Told(lambda t: (TRUTH.translation, -X if t < 0.5 else tilted)), frames(), EYE, TRUTH)
     assert seen.world_from_connector is not None
     axis = seen.world_from_connector.rotation.apply(X)
     assert axis @ X > 0.9  # where most pointed

@@ -21,7 +21,7 @@ class Rect:
 
 @dataclass(frozen=True)
 class Curve:
-    """A cubic Bézier curve by its two ends and the two points between that pull it."""
+    """A cubic Bézier curve: start, two control points, end."""
 
     points: tuple[Point, Point, Point, Point]
     stroke: str
@@ -54,15 +54,15 @@ Shape = Rect | Curve | Lines | Text
 
 @dataclass(frozen=True)
 class Group:
-    """Shapes that are one thing; the title shows when the pointer rests on it."""
+    """Shapes that belong together; the title is their tooltip."""
 
     shapes: tuple[Shape, ...]
     title: str = ""
 
 
 @dataclass
-class Scene:
-    """A whole picture; later groups lie on earlier ones."""
+class Drawing:
+    """A whole picture; later groups cover earlier ones."""
 
     title: str
     width: float
