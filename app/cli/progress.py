@@ -3,30 +3,23 @@
 import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any, NamedTuple
+from typing import Any
 
 from rich.console import Console
 
 from regrasp.app.cli.options import LogLevel
 from regrasp.app.files.findings import printable
 from regrasp.app.interrupts import interruptible
-from regrasp.app.records.record import OnEvent, Progress
 from regrasp.app.records.summary import in_words
+from regrasp.app.run.observers import Observers
 
 QUIET_SECONDS = 5.0  # simulated, between two lines of a leaf that goes on
 LEVELS = ("debug", "info", "warning", "error")
 
 
-class Shown(NamedTuple):
-    """What `run_episode` calls: at each tick, and for each event."""
-
-    tick: Progress
-    event: OnEvent
-
-
 @contextmanager
-def shown_progress(quiet: bool, level: LogLevel = None) -> Iterator[Shown]:
-    """Callbacks for `run_episode`: one live line on a terminal, else a line a leaf; `quiet` shows nothing.
+def shown_progress(quiet: bool, level: LogLevel = None) -> Iterator[Observers]:
+    """Observers of an episode: one live line on a terminal, else a line a leaf; `quiet` shows nothing.
 
     Events from `level` on are shown as lines; None shows none. While it is open, Ctrl-C raises KeyboardInterrupt from
     the tick's callback, so between two ticks; a second one at once.
@@ -46,7 +39,7 @@ def shown_progress(quiet: bool, level: LogLevel = None) -> Iterator[Shown]:
 
     with interruptible() as check:
         if quiet:
-            yield Shown(lambda _time, _leaf: check(), event)
+            yield Observers(tick=lambda _time, _leaf: check(), event=event)
         elif console.is_terminal:
             with console.status("starting") as status:
 
@@ -54,7 +47,7 @@ def shown_progress(quiet: bool, level: LogLevel = None) -> Iterator[Shown]:
                     check()
                     status.update(f"{time:7.1f} s  {leaf}")
 
-                yield Shown(live, event)
+                yield Observers(tick=live, event=event)
         else:
             lines = _Lines()
 
@@ -62,7 +55,7 @@ def shown_progress(quiet: bool, level: LogLevel = None) -> Iterator[Shown]:
                 check()
                 lines.show(time, leaf)
 
-            yield Shown(plain, event)
+            yield Observers(tick=plain, event=event)
 
 
 class _Lines:

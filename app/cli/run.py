@@ -118,7 +118,7 @@ def _run(scenario: Scenario, folder: Path, settings: Settings, gui: bool, log_le
     with late_imports():
         from regrasp.app.run.episode import run_episode  # brings the planner, the compiler and the physics: seconds
 
-    with shown_progress(settings.quiet, log_level) as show:
+    with shown_progress(settings.quiet, log_level) as observers:
         return run_episode(
             scenario,
             folder,
@@ -126,8 +126,7 @@ def _run(scenario: Scenario, folder: Path, settings: Settings, gui: bool, log_le
             video=settings.video,
             gui=gui,
             renderer=settings.renderer,
-            progress=show.tick,
-            on_event=show.event,
+            observers=observers,
         )
 
 

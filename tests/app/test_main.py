@@ -83,8 +83,8 @@ def test_what_is_only_written_at_the_end_finds_no_reader_either(no_reader: IO[st
 
 def test_a_run_that_nobody_watches_ends_as_by_ctrl_c(monkeypatch: pytest.MonkeyPatch, no_reader: IO[str]) -> None:
     monkeypatch.setattr("sys.stderr", no_reader)
-    with shown_progress(quiet=False) as show, pytest.raises(KeyboardInterrupt):
-        show.tick(0.0, "carry")
+    with shown_progress(quiet=False) as observers, pytest.raises(KeyboardInterrupt):
+        observers.tick(0.0, "carry")
 
 
 def test_an_encoding_without_a_sign_shows_a_question_mark() -> None:

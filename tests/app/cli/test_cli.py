@@ -18,6 +18,7 @@ from regrasp.app.files.resources import shipped
 from regrasp.app.records.folders import new_folder
 from regrasp.app.records.result import Expectation, Result, Slip
 from regrasp.app.run.batch import Settings
+from regrasp.app.run.observers import Observers
 from regrasp.interfaces.cause import Cause, CauseCode
 
 Episode = Callable[..., Result]
@@ -53,10 +54,10 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> list[SimpleNamespace]:
     """What `run_episode` was called with; it ticks five simulated seconds and succeeds."""
     made: list[SimpleNamespace] = []
 
-    def episode(scenario: Any, out: Path, progress: Callable[[float, str], None], **rest: Any) -> Result:
+    def episode(scenario: Any, out: Path, observers: Observers, **rest: Any) -> Result:
         made.append(SimpleNamespace(scenario=scenario, out=out, **rest))
         for tick in range(100):
-            progress(tick / 20, "carry" if tick < 60 else "look")
+            observers.tick(tick / 20, "carry" if tick < 60 else "look")
         return result()
 
     use_episode(monkeypatch, episode)
@@ -105,14 +106,14 @@ def test_what_was_not_met_exits_1_with_the_cause(monkeypatch: pytest.MonkeyPatch
 def test_ctrl_c_reaches_the_episode_between_two_ticks(monkeypatch: pytest.MonkeyPatch) -> None:
     ticks: list[str] = []
 
-    def episode(*_: Any, progress: Callable[[float, str], None], **__: Any) -> Result:
+    def episode(*_: Any, observers: Observers, **__: Any) -> Result:
         try:
             for tick in range(9):
                 ticks.append(f"{tick} begins")
                 if tick == 3:
                     os.kill(os.getpid(), signal.SIGINT)
                 ticks.append(f"{tick} ends")
-                progress(tick / 20, "carry")
+                observers.tick(tick / 20, "carry")
         except KeyboardInterrupt:
             return result(outcome="interrupted", succeeded=False)
         raise AssertionError("not interrupted")

@@ -13,6 +13,7 @@ from regrasp.app.records.explain import explanation
 from regrasp.app.records.reader import read_record
 from regrasp.app.records.result import Result
 from regrasp.app.run.episode import run_episode
+from regrasp.app.run.observers import Observers
 from regrasp.app.scenario.load import Scenario, load_scenario
 from regrasp.behaviors.leaf import Failed, Leaf, Steps, StepsLeaf
 from regrasp.interfaces.cause import CauseCode
@@ -214,7 +215,7 @@ def test_ctrl_c_between_two_ticks_leaves_a_whole_record(tmp_path: Path, ends: li
             raise KeyboardInterrupt
 
     made = scenario(tmp_path, '<Swing name="swing"/>')
-    result = run_episode(made, tmp_path / "run", seed=0, progress=progress)
+    result = run_episode(made, tmp_path / "run", seed=0, observers=Observers(tick=progress))
     read = check_record(tmp_path / "run", result)
     assert (result.outcome, read["cause"]["code"]) == ("interrupted", "interrupted")
     assert read["cause"]["node"].endswith("swing")
