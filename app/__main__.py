@@ -4,7 +4,7 @@ import io
 import os
 import sys
 
-from regrasp.app.interrupts import stoppable
+from regrasp.app.interrupts import EXIT_INTERRUPTED, stoppable
 
 # What a shell reports of cat or git when the reader of their pipe has gone. Not 0, for not all was told; not 1, which
 # says that a run did not come out. SIGPIPE itself stays ignored: it would kill us, too, when a child process dies.
@@ -28,7 +28,7 @@ def _run() -> None:
             sys.stdout.flush()  # what `print` left; the interpreter's own flush could not be caught
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
-        sys.exit(130)
+        sys.exit(EXIT_INTERRUPTED)
     except (BrokenPipeError, SystemExit) as end:
         # Typer makes exit code 1 of a broken pipe.
         if isinstance(end, SystemExit) and not isinstance(end.__context__, BrokenPipeError):

@@ -11,6 +11,7 @@ from multiprocessing.connection import wait
 from types import FrameType
 from typing import NoReturn
 
+EXIT_INTERRUPTED = 130  # what a shell reports of a program that Ctrl-C ended
 STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 WALL_LIMIT_SIGNAL = signal.SIGALRM  # what a parent sends to a run that has taken too long
 BURST = 0.5  # seconds: signals that come so soon after one that counted are the same request
@@ -84,7 +85,7 @@ def _follow(sentinel: int) -> None:
 
 
 @contextmanager
-def held_back() -> Iterator[None]:
+def signals_deferred() -> Iterator[None]:
     """Signals that stop a run come at the end of it: in the middle a record would be torn.
 
     They are noted by handlers. To block them would not do: another thread, as libraries start them, would take them.
@@ -106,7 +107,7 @@ def held_back() -> Iterator[None]:
         signal.raise_signal(came[0])
 
 
-late_imports = held_back  # in the middle of their import libraries in C++ swallow signals, or die of them
+late_imports = signals_deferred  # in the middle of their import libraries in C++ swallow signals, or die of them
 
 
 @contextmanager

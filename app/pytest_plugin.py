@@ -72,9 +72,9 @@ def pytest_configure(config: pytest.Config) -> None:
             f"--scenario-wall-limit {limit:g} is no limit; write seconds of at least 1, such as 600"
         )
     if records is not None:
-        from regrasp.app.records.folders import findings
+        from regrasp.app.records.folders import run_folder_findings
 
-        for finding in findings(records):
+        for finding in run_folder_findings(records):
             raise pytest.UsageError(f"--scenario-records: {finding}")
 
 
@@ -128,14 +128,14 @@ def _overrides(seed: str | None) -> list[str]:
     return [f"vary.seed='{seed}'" if ":" in seed else f"seed={seed}"]
 
 
-class Failed(Exception):  # noqa: N818 - the message is all of the report
+class ItemFailed(Exception):  # noqa: N818 - the message is all of the report
     """A test of ours failed; its message says why, and a traceback would say nothing more."""
 
 
 class _Item(pytest.Item):
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
         """The message alone."""
-        return str(excinfo.value) if isinstance(excinfo.value, Failed) else super().repr_failure(excinfo, style)
+        return str(excinfo.value) if isinstance(excinfo.value, ItemFailed) else super().repr_failure(excinfo, style)
 
     def reportinfo(self) -> tuple[Path, int | None, str]:
         """File and test, for headings."""
@@ -152,7 +152,7 @@ class ScenarioCase(_Item):
             self.add_marker(marker)
 
     def runtest(self) -> None:
-        """Run it in a process of its own. Raises `Failed` with the explanation when it did not come out as expected."""
+        """Run it in a process of its own. Raises `ItemFailed` with the explanation of a run that is not as expected."""
         from regrasp.app.run.batch import Run, result_of
         from regrasp.app.run.processes import run_each
 
@@ -164,9 +164,9 @@ class ScenarioCase(_Item):
         result = result_of(Run(self.scenario, self.scenario.file.seed, folder), done)
         if done.value is None:
             page = _explained(folder) if (folder / "events.jsonl").exists() else f"record  {folder}"
-            raise Failed(f"{done.error}\n{page}")
+            raise ItemFailed(f"{done.error}\n{page}")
         if not result.succeeded:
-            raise Failed(_explained(folder))
+            raise ItemFailed(_explained(folder))
 
     def _folder(self) -> Path:
         """A new folder for the record."""
@@ -219,9 +219,9 @@ class TreeTrial(_Item):
         self._trial = trial
 
     def runtest(self) -> None:
-        """Raises `Failed` with the first thing that went wrong."""
+        """Raises `ItemFailed` with the first thing that went wrong."""
         if wrong := next(self._trial(self.path), None):
-            raise Failed(wrong)
+            raise ItemFailed(wrong)
 
     def teardown(self) -> None:
         """Leave nothing of the tree on the blackboard."""

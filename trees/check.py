@@ -12,7 +12,7 @@ from pathlib import Path
 from regrasp.interfaces.quote import cut, quoted
 from regrasp.trees.element import Element, TreeSyntaxError, key_of, read_elements
 from regrasp.trees.flow import check_flow
-from regrasp.trees.vocabulary import COUNTERPARTS, Kind, Names, kinds, nearest
+from regrasp.trees.vocabulary import COUNTERPARTS, Kind, Names, kinds, suggestion
 from regrasp.trees.wiring import Filled, TooLarge
 
 Finding = tuple[int, str]  # line from 1 (0: the file itself), "what is wrong; what would be right"
@@ -78,8 +78,8 @@ def check_runs(root: Element, trees: Mapping[str, Element], known: Mapping[str, 
 
 
 def unknown(what: str, word: str, known: Collection[str]) -> str:
-    """The sentence about a word that is not known, with the nearest that is."""
-    return f"unknown {what} {quoted(word)}; {nearest(word, known)}"
+    """The sentence about a word that is not known, with the suggestion that is."""
+    return f"unknown {what} {quoted(word)}; {suggestion(word, known)}"
 
 
 def _check_document(root: Element, trees: Mapping[str, Element]) -> Iterator[Finding]:
@@ -91,7 +91,7 @@ def _check_document(root: Element, trees: Mapping[str, Element]) -> Iterator[Fin
     if not main:
         yield root.line, "root does not state main_tree_to_execute; write the ID of the tree to run"
     elif main not in trees:
-        right = nearest(main, trees) if trees else "write a BehaviorTree with this ID"
+        right = suggestion(main, trees) if trees else "write a BehaviorTree with this ID"
         yield root.line, f"unknown main tree {quoted(main)}; {right}"
     for tree in root.children:
         if tree.tag in ("Include", "Import"):

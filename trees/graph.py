@@ -38,7 +38,7 @@ class Port:
     def text(self) -> str:
         """What is written, with the constant behind a key beside it: tries={tries}=5."""
         behind = "" if self.constant in (None, self.value) else f"={self.constant}"
-        return printable(f"{self.name}={self.value}{behind}")
+        return on_one_line(f"{self.name}={self.value}{behind}")
 
 
 @dataclass(frozen=True)
@@ -237,6 +237,6 @@ def _leaf_kind(leaf: Any, element: Element) -> Kind:
     return "condition" if at_once else "action"
 
 
-def printable(text: str) -> str:
-    """What stands in a file must not steer a terminal or break a line."""
+def on_one_line(text: str) -> str:
+    """The text with a blank for each control character: it stems from a file, and could steer a terminal."""
     return "".join(c if c.isprintable() else " " for c in text)

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from pathlib import Path
 
-from regrasp.trees.graph import Node, printable, read_graph
+from regrasp.trees.graph import Node, on_one_line, read_graph
 
 
 def show_tree(path: Path) -> str:
@@ -35,4 +35,4 @@ def _label(node: Node) -> str:
     words += [f" ({node.note})"] * bool(node.note) + [f" +{node.hidden} nodes"] * bool(node.hidden)
     words += [f" [{node.stats.text}]"] if node.stats else []
     words += [" FAILED"] * node.failed
-    return printable(" ".join(filter(None, words)))
+    return on_one_line(" ".join(filter(None, words)))

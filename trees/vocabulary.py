@@ -8,7 +8,6 @@ import inspect
 import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 from typing import Any
 
 import py_trees
@@ -16,15 +15,14 @@ from py_trees.common import Status
 from py_trees.ports import PortsMixin
 from py_trees.ports_utils import convert_str_to_type, is_instance_of_type
 
-from regrasp.interfaces.quote import MOST, cut
+from regrasp.interfaces.quote import nearest
 
 Accepts = Any  # a type, or the words that may stand there as a tuple of strings
 # The names that a kind of thing has: {"socket": ["back_1", "back_2"]}. In place of a list a mapping says of each name
 # why it cannot be used here; "" means that it can.
 Names = Mapping[str, Collection[str]]
 ANY_STATUS = frozenset({Status.SUCCESS, Status.FAILURE, Status.RUNNING})
-MOST_LISTED = 12  # known words that are listed when none is near
-MOST_COMPARED = 200  # known words among which the nearest is looked for
+MAX_COMPARED = 200  # known words that are searched for the closest one
 _EXAMPLES = {int: "a whole number such as 3", float: "a number such as 0.5", bool: "true or false"}
 
 
@@ -55,7 +53,7 @@ class Attribute:
         if isinstance(self.accepts, tuple):
             if value in self.accepts:
                 return self.refused.get(value)
-            return f"is unknown; {nearest(value, [word for word in self.accepts if word not in self.refused])}"
+            return f"is unknown; {suggestion(value, [word for word in self.accepts if word not in self.refused])}"
         right = f"write {_EXAMPLES.get(self.accepts, self.takes)}"
         try:
             converted, result = convert_str_to_type(value, self.accepts)
@@ -132,14 +130,9 @@ COUNTERPARTS = {  # of BehaviorTree.CPP's words, and of py_trees' that are left 
 }
 
 
-def nearest(word: str, known: Collection[str]) -> str:
-    """The words that help after an unknown one: the nearest known one, else all that there are."""
-    words = sorted(known)
-    alike = [known for known in words if known.casefold() == word.casefold()]
-    if near := alike or get_close_matches(word[:MOST], words[:MOST_COMPARED], 1):
-        return f"did you mean {cut(near[0])}?"
-    more = f" and {len(words) - MOST_LISTED} more" if words[MOST_LISTED:] else ""
-    return f"there are {', '.join(map(cut, words[:MOST_LISTED]))}{more}" if words else "there are none, remove it"
+def suggestion(word: str, known: Collection[str]) -> str:
+    """What to write in place of an unknown word: the closest known one, else a list of the known ones."""
+    return nearest(word, known, compared=MAX_COMPARED) if known else "there are none, remove it"
 
 
 def kinds(leaves: Mapping[str, type], names: Names | None = None) -> dict[str, Kind]:

@@ -2,20 +2,16 @@
 
 import errno
 from importlib.metadata import version
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 from typer.core import TyperGroup
 
 from regrasp.app.cli import calibrate, detector, perceive, records, run, scenarios, studies, trees
-from regrasp.app.files.findings import Findings, printable
-from regrasp.interfaces.quote import MOST, cut
-
-if TYPE_CHECKING:
-    pass
-
-EXIT_UNMET, EXIT_BAD_INPUT, EXIT_INTERRUPTED = 1, 2, 130
-
+from regrasp.app.cli.options import EXIT_BAD_INPUT, EXIT_UNMET
+from regrasp.app.files.findings import Findings
+from regrasp.app.interrupts import EXIT_INTERRUPTED
+from regrasp.interfaces.quote import MOST, cut, printable
 
 COMMANDS = (  # in the order of their use
     "run",
@@ -107,4 +103,4 @@ def doctor() -> None:
     for check in checks():
         typer.echo(f"{check.status:<6}{check.name:<24}{check.seen}")
         wrong |= check.status == "wrong"
-    raise typer.Exit(1 if wrong else 0)
+    raise typer.Exit(EXIT_UNMET if wrong else 0)

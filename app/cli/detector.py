@@ -12,14 +12,14 @@ from regrasp.app.files.findings import Finding, Findings, shown
 from regrasp.app.files.resources import resolve
 from regrasp.app.files.whole_file import write_whole
 from regrasp.app.records import folders
-from regrasp.app.scenario.schema import MOST_SEED
+from regrasp.app.scenario.schema import MAX_SEED
 
 if TYPE_CHECKING:
     from regrasp.interfaces.cell import Cell
 
 TRAINING_SEED, HELD_OUT_SEED = 0, 1_000_000  # choice: far apart, so that no one trains on what is held out
 _Cell = Annotated[str, typer.Option("--cell", help="A shipped cell's name, or a path to a .yaml file.")]
-_Seed = Annotated[int, typer.Option(min=0, max=MOST_SEED, help="Draws the pictures and all else.")]
+_Seed = Annotated[int, typer.Option(min=0, max=MAX_SEED, help="Draws the pictures and all else.")]
 
 
 def add_to(app: typer.Typer) -> None:
@@ -50,7 +50,7 @@ def train_detector(
       regrasp train-detector --out results/detector
       regrasp train-detector --out results/more --start perception/detector.onnx
     """
-    wrong = folders.unwritable(out)
+    wrong = folders.folder_findings(out)
     if (out / "detector.onnx").exists():
         wrong.append(Finding(shown(out), 0, "already holds detector.onnx; name another folder"))
     try:
@@ -101,7 +101,7 @@ def evaluate_detector(
     Example:
       regrasp evaluate-detector perception/detector.onnx --out evaluation.json
     """
-    wrong = folders.unwritable_file(out, new=True) if out else []
+    wrong = folders.file_findings(out, new=True) if out else []
     if out is not None and out.suffix.lower() == ".onnx":
         wrong.append(Finding(shown(out), 0, "is a network's name, and the figures are JSON; end it in .json"))
     if model is not None and not model.is_file():

@@ -58,7 +58,7 @@ def package(name: str) -> Check:
 
 def output_folder(out: Path) -> Check:
     """Whether runs can be written below `out`."""
-    wrong = folders.findings(out / "doctor")
+    wrong = folders.run_folder_findings(out / "doctor")
     return Check("output", "wrong", wrong[0].message) if wrong else Check("output", "ok", f"can write in {out}")
 
 

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 # What terminals send; a name stands for all that mean the same.
-NAMES = {
+KEY_NAMES = {
     **dict.fromkeys(("\x1b[C", "\x1bOC", "\x1b[B", "\x1bOB"), "forward"),
     **dict.fromkeys(("\x1b[D", "\x1bOD", "\x1b[A", "\x1bOA"), "back"),
     **dict.fromkeys(("\x1b[H", "\x1bOH", "\x1b[1~", "\x1b[7~"), "home"),
@@ -50,7 +50,7 @@ def keyboard() -> Iterator[Callable[[], str | None]]:
                 text += os.read(stdin, 1024).decode(errors="replace")
             waiting.extend(_KEY.findall(text))
         key = waiting.popleft()
-        return NAMES.get(key, key)
+        return KEY_NAMES.get(key, key)
 
     try:
         tty.setcbreak(stdin)

@@ -8,21 +8,21 @@ from typing import Annotated, TypeVar
 import typer
 
 from regrasp.app.cli.options import Sets
-from regrasp.app.files.findings import Finding, Findings, nearest, real, shown
+from regrasp.app.files.findings import Finding, Findings, real_path, shown
 from regrasp.app.files.resources import resolve
 from regrasp.app.interrupts import late_imports
 from regrasp.app.records import folders
 from regrasp.app.scenario.cell_file import load_cell
 from regrasp.app.scenario.load import load_scenario
-from regrasp.app.scenario.schema import MOST_SEED
+from regrasp.app.scenario.schema import MAX_SEED
 from regrasp.interfaces.cell import Color
-from regrasp.interfaces.quote import quoted
+from regrasp.interfaces.quote import nearest, quoted
 
 T = TypeVar("T")
 
-SUFFIXES = (".png", ".jpg", ".jpeg")  # of a drawing
+DRAWING_SUFFIXES = (".png", ".jpg", ".jpeg")  # of a drawing
 # Of these a snapshot writes some; a camera pose that an earlier one left would not be that of its pictures.
-SNAPSHOT = ("rgb.png", "rgb_001.png", "depth.png", "depth_001.png", "intrinsics.yaml", "camera_pose.yaml")
+SNAPSHOT_FILES = ("rgb.png", "rgb_001.png", "depth.png", "depth_001.png", "intrinsics.yaml", "camera_pose.yaml")
 LEAST_SATURATION = 0.2  # choice: with less a colour is grey, and all that is grey would be the connector's
 
 
@@ -135,15 +135,22 @@ def _each(option: str, given: Sequence[T], count: int, wrong: list[Finding], onc
 
 def _bad_drawing(draw: Path, inputs: Sequence[Path]) -> list[Finding]:
     """Why nothing can be drawn there."""
-    if draw.suffix.lower() not in SUFFIXES:
-        return [Finding("--draw", 0, f"{quoted(draw.name)} is no name of a picture; end it in {' or '.join(SUFFIXES)}")]
-    if any(real(draw) == real(path) or (draw.exists() and path.exists() and draw.samefile(path)) for path in inputs):
+    if draw.suffix.lower() not in DRAWING_SUFFIXES:
+        return [
+            Finding(
+                "--draw", 0, f"{quoted(draw.name)} is no name of a picture; end it in {' or '.join(DRAWING_SUFFIXES)}"
+            )
+        ]
+    if any(
+        real_path(draw) == real_path(path) or (draw.exists() and path.exists() and draw.samefile(path))
+        for path in inputs
+    ):
         return [
             Finding(
                 "--draw", 0, f"{quoted(shown(draw))} is one of your own files, which it would overwrite; name another"
             )
         ]
-    return folders.unwritable_file(draw)
+    return folders.file_findings(draw)
 
 
 def _color(text: str, wrong: list[Finding]) -> Color | None:
@@ -170,7 +177,7 @@ def snapshot(
     camera: Annotated[str, typer.Option(metavar="NAME", help="The cell's camera: rear or wrist.")] = "rear",
     frames: Annotated[int, typer.Option(min=1, max=100, help="How many.")] = 1,
     seed: Annotated[
-        int | None, typer.Option(min=0, max=MOST_SEED, help="Draws every error and noise; default the scenario's.")
+        int | None, typer.Option(min=0, max=MAX_SEED, help="Draws every error and noise; default the scenario's.")
     ] = None,
     sets: Sets = None,
 ) -> None:
@@ -184,8 +191,8 @@ def snapshot(
       regrasp snapshot no_obstacle --seed 3 --frames 4 --out four
       regrasp snapshot no_obstacle --set cell=thesis_tags --out tags
     """
-    wrong = folders.unwritable(out)
-    if there := [name for name in SNAPSHOT if (out / name).exists()]:
+    wrong = folders.folder_findings(out)
+    if there := [name for name in SNAPSHOT_FILES if (out / name).exists()]:
         wrong.append(Finding(shown(out), 0, f"already holds {', '.join(there)}; name another folder"))
     loaded = load_scenario(scenario, [*(sets or []), *([] if seed is None else [f"seed={seed}"])], None)
     names = [c.name for c in loaded.cell.known.cameras]

@@ -8,10 +8,10 @@ from typing import Any
 from rich.console import Console
 
 from regrasp.app.cli.options import LogLevel
-from regrasp.app.files.findings import printable
 from regrasp.app.interrupts import interruptible
 from regrasp.app.records.summary import in_words
 from regrasp.app.run.observers import Observers
+from regrasp.interfaces.quote import printable
 
 QUIET_SECONDS = 5.0  # simulated, between two lines of a leaf that goes on
 LEVELS = ("debug", "info", "warning", "error")

@@ -5,18 +5,18 @@ from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from regrasp.app.files.findings import Finding, Findings, nearest, shown
+from regrasp.app.files.findings import Finding, Findings, shown
 from regrasp.app.files.resources import read_text, resolve
 from regrasp.app.files.whole_file import write_whole
-from regrasp.app.records.folders import FILES, unwritable_file
+from regrasp.app.records.folders import FILES, file_findings
 from regrasp.app.records.reader import RunRecord, read_record
 from regrasp.app.scenario.load import check_tree_file
 from regrasp.app.scenario.references import tree_text
-from regrasp.interfaces.quote import quoted
+from regrasp.interfaces.quote import nearest, quoted
 from regrasp.trees import Node, TreeSyntaxError, collapsed, read_graph, recorded, run_stats
 from regrasp.trees.export import FORMATS, SUFFIXES, THEMES, export_tree
 
-MOST_MISSING = 3  # nodes that are named
+MAX_MISSING_NAMED = 3  # nodes that are named
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ def _wrong_out(out: Path, form: str) -> Iterator[Finding]:
         wrong = f"there is no folder {quoted(shown(out.absolute().parent))}; name a file in a folder that exists"
         yield Finding(shown(out), 0, wrong)
     else:
-        yield from unwritable_file(out)
+        yield from file_findings(out)
 
 
 def _tree_file(request: Request, record: RunRecord | None) -> Path:
@@ -134,7 +134,7 @@ def _check_paths(path: Path, record: RunRecord, known: Collection[str]) -> None:
         if tick.path not in known:
             missing.setdefault(tick.path, number)
     if missing:
-        first, more = [*missing][:MOST_MISSING], len(missing) - MOST_MISSING
+        first, more = [*missing][:MAX_MISSING_NAMED], len(missing) - MAX_MISSING_NAMED
         names = ", ".join(map(quoted, first)) + (f" and {more} more nodes" if more > 0 else "")
         wrong = f"{shown(path)} is not the tree that ran: it has no {names}; name that tree, or leave TREE out"
         raise Findings([Finding(shown(record.folder / "ticks.jsonl"), missing[first[0]], wrong)])

@@ -1,17 +1,15 @@
 """What is wrong with an input: one line a finding, all findings at once."""
 
-import difflib
 import os
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import ParamSpec, TypeVar
 
-from regrasp.interfaces.quote import MOST, cut, quoted
+from regrasp.interfaces.quote import printable
 
 P = ParamSpec("P")
 T = TypeVar("T")
-MOST_LISTED = 12  # known names after an unknown one
 
 
 @dataclass(frozen=True, order=True)
@@ -39,7 +37,7 @@ class Findings(Exception):  # noqa: N818 - it is the list of findings that trave
         super().__init__("\n".join(str(f) for f in self.items))
 
 
-def attempt(make: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> tuple[T | None, list[Finding]]:
+def catch_findings(make: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> tuple[T | None, list[Finding]]:
     """What `make` returns, or the findings that it raises."""
     try:
         return make(*args, **kwargs), []
@@ -47,34 +45,15 @@ def attempt(make: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> tuple[T 
         return None, error.items
 
 
-def printable(text: str) -> str:
-    """The text with all that could steer a terminal or break XML escaped: it may stem from a file."""
-    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
-
-
-def nearest(name: str, names: Iterable[str], what: str = "there are") -> str:
-    """The words that help after an unknown name: the nearest known one, else all that exist."""
-    known = sorted(names)
-    if close := closest(name, known):
-        return f"did you mean {quoted(close)}?"
-    more = f" and {len(known) - MOST_LISTED} more" if known[MOST_LISTED:] else ""
-    return f"{what} {', '.join(map(cut, known[:MOST_LISTED]))}{more}" if known else "there are none"
-
-
-def closest(name: str, names: Iterable[str]) -> str | None:
-    """The name that this one seems to mean."""
-    return next(iter(difflib.get_close_matches(name[:MOST], sorted(names), n=1)), None)
-
-
 def shown(path: Path) -> str:
     """A path as the user would write it: relative when it lies under the current folder."""
     try:
-        return str(real(path).relative_to(Path.cwd()))
+        return str(real_path(path).relative_to(Path.cwd()))
     except (ValueError, OSError):
         return str(path)
 
 
-def real(path: Path) -> Path:
+def real_path(path: Path) -> Path:
     """The path without links, from the root; of links that lead back to themselves as far as they can be followed.
 
     `Path.resolve` raises RuntimeError for such links before Python 3.13.

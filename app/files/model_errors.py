@@ -14,12 +14,12 @@ from typing import NamedTuple
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from regrasp.app.files.findings import closest
-from regrasp.app.files.schema_nodes import Schema, at, child, nodes_at
+from regrasp.app.files.schema_nodes import Schema, child, nodes_at, value_at
 from regrasp.app.files.yaml_lines import Path, Value
+from regrasp.interfaces.quote import closest
 
 TAG_ERRORS = ("union_tag_invalid", "union_tag_not_found")
-MOST_LOOKED_INTO = 100  # a value with more errors was not written by hand
+MAX_ERRORS_LOOKED_INTO = 100  # a value with more errors was not written by hand
 
 
 class ModelError(NamedTuple):
@@ -37,7 +37,7 @@ class ModelError(NamedTuple):
 def model_errors(value: Value, model: type[BaseModel], root: Schema) -> list[ModelError]:
     """All errors, none of them only for another one; `root` is the model's JSON schema."""
     first = first_errors(value, model)
-    if not first or len(first) > MOST_LOOKED_INTO:
+    if not first or len(first) > MAX_ERRORS_LOOKED_INTO:
         return first
     wrong_tags = [error.path for error in first if error.details["type"] in TAG_ERRORS]
     tags = sorted({tag for path in wrong_tags for tag in _tags(root, path, value)})
@@ -50,8 +50,8 @@ def model_errors(value: Value, model: type[BaseModel], root: Schema) -> list[Mod
 def misspelt(value: Value, model: type[BaseModel], root: Schema) -> Iterator[tuple[Path, str]]:
     """Keys that no model has, each with the one that it seems to mean and that is not there."""
     errors = model_errors(value, model, root)
-    for path, details in errors if len(errors) <= MOST_LOOKED_INTO else []:
-        parent = at(value, path[:-1])
+    for path, details in errors if len(errors) <= MAX_ERRORS_LOOKED_INTO else []:
+        parent = value_at(value, path[:-1])
         if not isinstance(parent, dict):
             continue
         known = {name for node in nodes_at(root, path[:-1], value) for name in node.get("properties", {})}
@@ -107,7 +107,7 @@ def _exemplify(value: Value, path: Path, root: Schema) -> None:
 
 def _put(value: Value, path: Path, new: Value) -> None:
     """Store `new` at `path`, if there is a mapping that can hold it."""
-    parent = at(value, path[:-1])
+    parent = value_at(value, path[:-1])
     if isinstance(parent, dict):
         parent[str(path[-1])] = deepcopy(new)
 

@@ -40,7 +40,7 @@ def _is_index(step: str) -> bool:
     return step.isdecimal() and len(step) < 10
 
 
-def read(overrides: Sequence[str]) -> tuple[list[Assignment], list[Finding]]:
+def parse_overrides(overrides: Sequence[str]) -> tuple[list[Assignment], list[Finding]]:
     """The assignments of "key.path=value" texts, values in YAML, and the findings of those that are none."""
     assignments, findings = [], []
     for text in overrides:
@@ -61,7 +61,7 @@ def read(overrides: Sequence[str]) -> tuple[list[Assignment], list[Finding]]:
     return assignments, findings
 
 
-def apply(document: Document, assignments: Sequence[Assignment]) -> None:
+def apply_assignments(document: Document, assignments: Sequence[Assignment]) -> None:
     """Lay values over `document` in place; a key that it does not know yet is added, for the check of the whole.
 
     Raises `Findings` for all that cannot be placed.
@@ -86,7 +86,7 @@ def lay_over(document: Document, top: Document) -> None:
         places = {p[len(path) :]: place for p, place in top.places.items() if p[: len(path)] == path}
         key = _dotted(path)
         parts.append(Assignment(key, Document(value, places), top.place(path), f"{key}: "))
-    apply(document, parts)
+    apply_assignments(document, parts)
     document.findings += top.findings
     document.unread |= top.unread
 

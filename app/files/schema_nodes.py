@@ -16,7 +16,7 @@ def child(value: Value, step: str | int) -> tuple[bool, Value]:
     return False, value
 
 
-def at(value: Value, path: Path) -> Value:
+def value_at(value: Value, path: Path) -> Value:
     """What stands at `path`; None where nothing does."""
     for step in path:
         held, value = child(value, step)

@@ -7,15 +7,15 @@ from typing import NamedTuple, TypeVar
 from pydantic import BaseModel, TypeAdapter, ValidationError
 from pydantic_core import ErrorDetails
 
-from regrasp.app.files.findings import Finding, Findings, nearest
+from regrasp.app.files.findings import Finding, Findings
 from regrasp.app.files.model_errors import TAG_ERRORS, misspelt, model_errors
 from regrasp.app.files.schema_nodes import Schema, child, nodes_at
 from regrasp.app.files.yaml_lines import Document, Path
-from regrasp.interfaces.quote import cut, quoted
+from regrasp.interfaces.quote import cut, nearest, quoted
 
 M = TypeVar("M", bound=BaseModel)
 T = TypeVar("T")
-MOST_ROUNDS = 6  # one brings out what is misspelt inside a misspelt key, and files of ours nest no deeper
+MAX_RESPELL_ROUNDS = 6  # one brings out what is misspelt inside a misspelt key, and files of ours nest no deeper
 
 _METRES = "metres, such as 0.3"
 _LENGTHS = "size position zero earth jitter center seat base offset anchor length radius depth capture_distance"
@@ -82,7 +82,7 @@ def _respell(document: Document, model: type[M], root: Schema) -> tuple[list[Err
     """Give misspelt keys their right names: an error each, and their new paths."""
     errors: list[Error] = []
     respelt: set[Path] = set()
-    for _ in range(MOST_ROUNDS):
+    for _ in range(MAX_RESPELL_ROUNDS):
         for path, right in list(misspelt(document.value, model, root)):
             new = (*path[:-1], right)
             if new not in respelt:
@@ -101,7 +101,7 @@ def validated(document: Document, model: type[M]) -> M:
     return made
 
 
-def part(document: Document, path: Path, kind: TypeAdapter[T], default: T | None = None) -> T | None:
+def validated_part(document: Document, path: Path, kind: TypeAdapter[T], default: T | None = None) -> T | None:
     """What stands at `path`; `default` where nothing does, None where it is not of this kind."""
     value = document.value
     for step in path:

@@ -4,7 +4,7 @@ import errno
 import os
 from pathlib import Path
 
-from regrasp.app.files.findings import real
+from regrasp.app.files.findings import real_path
 
 
 def write_whole(path: Path, content: str | bytes) -> None:
@@ -19,7 +19,7 @@ def write_whole(path: Path, content: str | bytes) -> None:
     if path.exists() and not path.is_file():
         path.write_bytes(data)
         return
-    path = real(path)
+    path = real_path(path)
     if path.is_symlink():  # it leads back to itself
         raise OSError(errno.ELOOP, os.strerror(errno.ELOOP), str(path))
     part = path.with_name(path.name + ".part")

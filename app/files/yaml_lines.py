@@ -14,7 +14,7 @@ Value = None | bool | int | float | str | list["Value"] | dict[str, "Value"]
 Path = tuple[str | int, ...]
 Place = tuple[str, int]  # source and line
 
-MAX_DEPTH = 20
+MAX_NESTING = 20
 MAX_VALUES = 20_000  # after aliases are expanded
 # What YAML 1.1 and 1.2 both read as a number, so not 010, 1_000, 1:30 or 1e3.
 _NUMBER = re.compile(r"[-+]?(0|[1-9]\d{0,18}|(0|[1-9]\d{0,18})?\.\d{0,30}([eE][-+]\d{1,3})?)")
@@ -114,9 +114,9 @@ def _limit_nesting(text: str, source: str, line: int | None) -> None:
     depth = 0
     for event in yaml.parse(text, Loader=yaml.SafeLoader):
         depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
-        if depth > MAX_DEPTH:
+        if depth > MAX_NESTING:
             at = event.start_mark.line + 1 if event.start_mark else 1
-            message = f"nests deeper than {MAX_DEPTH} levels; a file of ours needs fewer than 10"
+            message = f"nests deeper than {MAX_NESTING} levels; a file of ours needs fewer than 10"
             raise Findings([Finding(source, at if line is None else line, message)])
 
 
@@ -143,10 +143,10 @@ class _Builder:
     def charge(self, node: yaml.Node, values: int, depth: int) -> None:
         """Count what is built. Aliases, of themselves or of one another, could go on for ever."""
         self.count += values
-        if depth > MAX_DEPTH or self.count > MAX_VALUES:
+        if depth > MAX_NESTING or self.count > MAX_VALUES:
             if self.aliases:
                 message = (
-                    f"aliases expand to more than {MAX_VALUES} values or {MAX_DEPTH} levels; write out what is meant"
+                    f"aliases expand to more than {MAX_VALUES} values or {MAX_NESTING} levels; write out what is meant"
                 )
             else:
                 message = f"more than {MAX_VALUES} values; shorten the file, or split it"

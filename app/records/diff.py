@@ -5,11 +5,11 @@ from dataclasses import asdict
 from itertools import zip_longest
 from typing import Any
 
-from regrasp.app.files.findings import printable
 from regrasp.app.records.reader import Event, RunRecord, Tick
 from regrasp.app.records.result import plain
+from regrasp.interfaces.quote import printable
 
-RUN = (
+BEGIN_FIELDS = (
     "scenario",
     "case",
     "seed",
@@ -21,14 +21,14 @@ RUN = (
     "overrides",
     "renderer",
 )  # of the `begin` event
-RESULT = ("outcome", "succeeded", "cause")
-LONGEST = 200  # characters of a value
+RESULT_FIELDS = ("outcome", "succeeded", "cause")
+MAX_VALUE_LENGTH = 200  # characters of a value
 
 
 def beginnings(a: RunRecord, b: RunRecord) -> list[str]:
     """Lines that say what was run differently: scenario, seed, versions."""
     versions = [run.result.versions if run.result else {} for run in (a, b)]
-    found = [line for name in RUN for line in _differ(name, a.begin.get(name), b.begin.get(name))]
+    found = [line for name in BEGIN_FIELDS for line in _differ(name, a.begin.get(name), b.begin.get(name))]
     if _tree(a) != _tree(b):
         found.append("tree.xml: not the same tree")
     return [printable(line) for line in (*found, *_differ("versions", *versions))]
@@ -42,7 +42,7 @@ def _tree(run: RunRecord) -> bytes | None:
 def differences(a: RunRecord, b: RunRecord) -> list[str]:
     """Lines that say where the runs part, [] where they went the same way; what the wall clock says does not count."""
     values = [plain(asdict(run.result)) if run.result else {} for run in (a, b)]
-    ends = [line for name in RESULT for line in _differ(name, *(value.get(name) for value in values))]
+    ends = [line for name in RESULT_FIELDS for line in _differ(name, *(value.get(name) for value in values))]
     return [printable(line) for line in (*ends, *_first_tick(a.ticks, b.ticks), *_first_event(_course(a), _course(b)))]
 
 
@@ -57,7 +57,7 @@ def _differ(name: str, a: Any, b: Any) -> Iterator[str]:
 
 def _short(value: Any) -> str:
     text = "-" if value is None else str(value)
-    return text if len(text) <= LONGEST else text[: LONGEST - 3] + "..."
+    return text if len(text) <= MAX_VALUE_LENGTH else text[: MAX_VALUE_LENGTH - 3] + "..."
 
 
 def _first_tick(a: Sequence[Tick], b: Sequence[Tick]) -> Iterator[str]:

@@ -2,12 +2,12 @@
 
 from collections.abc import Iterator
 
-from regrasp.app.files.findings import printable
-from regrasp.app.records.history import attempts, course
+from regrasp.app.records.history import attempts, node_history
 from regrasp.app.records.reader import RunRecord
 from regrasp.app.records.result import DEFAULT_CASE, BeliefState, Link, Pose, Result
 from regrasp.app.records.summary import expectation_lines, headline, slip_lines, what_ran
 from regrasp.app.records.timeline import event_text, timeline, wrapped
+from regrasp.interfaces.quote import printable
 
 REPORT_WIDTH = 100  # columns of a page in a test report
 LAST_EVENTS = 8  # shown of a run without a result
@@ -57,7 +57,7 @@ def _page(record: RunRecord, width: int) -> Iterator[str]:
 
 
 def _tried(record: RunRecord, width: int) -> Iterator[str]:
-    told = timeline(attempts(record), record.events, course(record), width - 2)
+    told = timeline(attempts(record), record.events, node_history(record), width - 2)
     yield from _section("What was tried (simulated seconds, from and to)", told)
 
 

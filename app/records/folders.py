@@ -8,7 +8,7 @@ import tempfile
 from itertools import count
 from pathlib import Path
 
-from regrasp.app.files.findings import Finding, real, shown
+from regrasp.app.files.findings import Finding, real_path, shown
 from regrasp.interfaces.quote import quoted
 
 RUNS = Path("runs")  # where records go by default
@@ -47,14 +47,14 @@ def folder_name(case: str) -> str:
     return plain if plain == case else f"{plain}-{hashlib.sha256(case.encode()).hexdigest()[:8]}"
 
 
-def taken(out: Path) -> list[str]:
+def taken_names(out: Path) -> list[str]:
     """The files in `out` that a run would overwrite."""
     return [name for name in FILES if os.path.lexists(out / name)]
 
 
-def holds_a_run(out: Path) -> list[Finding]:
+def existing_run_findings(out: Path) -> list[Finding]:
     """The finding of a folder that another run has taken, [] of one that is free."""
-    there = taken(out)
+    there = taken_names(out)
     if set(there) & set(RUN_FILES):
         return [Finding(shown(out), 0, f"holds a run already ({', '.join(there)}); name another folder")]
     if there:
@@ -62,27 +62,27 @@ def holds_a_run(out: Path) -> list[Finding]:
     return []
 
 
-def findings(out: Path) -> list[Finding]:
+def run_folder_findings(out: Path) -> list[Finding]:
     """Why no run can be written to `out`; nothing is left behind by the look."""
-    if there := holds_a_run(out):
+    if there := existing_run_findings(out):
         return there
     if out == Path():
         return [Finding("--out", 0, "names this very folder; name one of its own for the run")]
-    return unwritable(out)
+    return folder_findings(out)
 
 
-def unwritable_file(file: Path, *, new: bool = False) -> list[Finding]:
+def file_findings(file: Path, *, new: bool = False) -> list[Finding]:
     """Why no file can be written there; nothing is left behind by the look. `new`: one that exists is not replaced."""
     if os.path.isdir(file):
         return [Finding(shown(file), 0, "is a folder; name a file")]
-    if real(file).is_symlink():
+    if real_path(file).is_symlink():
         return [Finding(shown(file), 0, "is a link that leads back to itself; name another file")]
     if new and os.path.exists(file):
         return [Finding(shown(file), 0, "exists already; name another file, or remove it")]
-    return unwritable(file.parent)
+    return folder_findings(file.parent)
 
 
-def unwritable(out: Path) -> list[Finding]:
+def folder_findings(out: Path) -> list[Finding]:
     """Why no folder `out` can be made or written in; nothing is left behind by the look."""
     spot = out.absolute()
     while not os.path.lexists(spot) and spot != spot.parent:

@@ -10,7 +10,7 @@ from regrasp.interfaces.cause import Cause, CauseCode
 from regrasp.trees import Execution, executions
 
 
-class Course:
+class NodeHistory:
     """When a record's nodes were executed, and what stands below what."""
 
     def __init__(self, made: Sequence[Execution]) -> None:
@@ -49,22 +49,22 @@ class Course:
         return bisect_right(self._starts.get(path, []), seconds)
 
 
-def course(record: RunRecord) -> Course:
+def node_history(record: RunRecord) -> NodeHistory:
     """The record's."""
-    return Course(_executions(record))
+    return NodeHistory(_executions(record))
 
 
 def attempts(record: RunRecord) -> Sequence[Attempt]:
     """The attempts of the record's leaves in the order of beginning; RUNNING: at work when the record ends."""
     if record.result:
         return record.result.attempts
-    told = told_by_ticks(_executions(record), record.events)
+    told = attempts_from_ticks(_executions(record), record.events)
     return [replace(one, ended=record.end) if one.status == "RUNNING" else one for one in told]
 
 
-def told_by_ticks(made: Sequence[Execution], events: Iterable[Event]) -> list[Attempt]:
+def attempts_from_ticks(made: Sequence[Execution], events: Iterable[Event]) -> list[Attempt]:
     """The attempts that a run with these executions and events would name in its result (`Attempts`)."""
-    known = Course(made)
+    known = NodeHistory(made)
     ticks = {t: number for number, t in enumerate(sorted({t for one in made for t in (one.started, one.ended)}))}
     causes = {(event.node, event.t): cause for event in events if (cause := _cause(event))}
     told: list[Attempt] = []

@@ -17,11 +17,11 @@ from regrasp.app.records.record import leaf_at_work
 from regrasp.app.records.result import SCHEMA, NodeStatus, Result
 from regrasp.trees.wiring import MAX_TREE_DEPTH
 
-MAX_RESULT, MAX_LINES = 16 << 20, 64 << 20  # bytes of result.json, of each of the others: hours of a run
-MOST_FINDINGS = 10  # of one file
+MAX_RESULT_BYTES, MAX_LINES_BYTES = 16 << 20, 64 << 20  # bytes of result.json, of each of the others: hours of a run
+MAX_FINDINGS = 10  # of one file
 TOO_DEEP = f"a path with more than {MAX_TREE_DEPTH} steps, which no tree has"
 T = TypeVar("T")
-Seconds = Annotated[float, Field(ge=0, le=1e6, allow_inf_nan=False)]
+SimSeconds = Annotated[float, Field(ge=0, le=1e6, allow_inf_nan=False)]
 
 
 def _path(path: str) -> str:
@@ -38,7 +38,7 @@ NodePath = Annotated[str, AfterValidator(_path)]
 class Tick:
     """A node's status changed: when (simulated s), which node, to what."""
 
-    t: Seconds
+    t: SimSeconds
     path: NodePath
     status: NodeStatus
 
@@ -47,7 +47,7 @@ class Tick:
 class Event:
     """Something that was noticed or done: when (simulated s), by which node ('' for none), and its own values."""
 
-    t: Seconds
+    t: SimSeconds
     event: str
     node: str
     values: dict[str, Any]
@@ -111,7 +111,7 @@ def _adapter(kind: type[T]) -> TypeAdapter[T]:
 
 @dataclass(frozen=True)
 class _EventHead:
-    t: Seconds
+    t: SimSeconds
     event: str
     node: NodePath = ""
 
@@ -124,7 +124,7 @@ def _event(value: dict[str, Any]) -> Event:
 
 def _lines(path: Path, make: Callable[[dict[str, Any]], T], found: list[Finding], remarks: list[str]) -> list[T]:
     """The value of each line; what is wrong goes to `found`, half a last line to `remarks`."""
-    data = _bytes(path, MAX_LINES, found)
+    data = _bytes(path, MAX_LINES_BYTES, found)
     if data is None:
         return []
     *whole, last = data.split(b"\n")
@@ -144,13 +144,13 @@ def _lines(path: Path, make: Callable[[dict[str, Any]], T], found: list[Finding]
                 break
             wrong += 1
             found.append(Finding(shown(path), number, _sentence(error)))
-            if wrong == MOST_FINDINGS:
+            if wrong == MAX_FINDINGS:
                 break
     return values
 
 
 def _result(path: Path, found: list[Finding]) -> Result | None:
-    data = _bytes(path, MAX_RESULT, found)
+    data = _bytes(path, MAX_RESULT_BYTES, found)
     if data is None:
         return None
     try:

@@ -16,12 +16,12 @@ import structlog
 
 from regrasp.app.files.findings import Findings
 from regrasp.app.files.whole_file import write_whole
-from regrasp.app.interrupts import WallLimit, held_back
+from regrasp.app.interrupts import WallLimit, signals_deferred
 from regrasp.app.records import folders
 from regrasp.app.records.result import DEFAULT_CASE, Outcome, Result, plain
 from regrasp.interfaces.cause import Cause, CauseCode
 
-MOST_AT_WORK = 1 << 16  # bytes of it
+MAX_AT_WORK_BYTES = 1 << 16  # bytes of it
 AT_WORK = "at_work.json"  # while a run goes on: which leaf is in the middle of a tick
 
 
@@ -61,12 +61,12 @@ class Record:
         self._longest = 0
         if folder is not None:
             folder.mkdir(parents=True, exist_ok=True)
-            if found := folders.findings(folder):
+            if found := folders.run_folder_findings(folder):
                 raise Findings(found)
             try:
                 self.events = (folder / "events.jsonl").open("x", encoding="utf-8", newline="\n")
             except FileExistsError:  # another run took the folder this very moment
-                raise Findings(folders.holds_a_run(folder)) from None
+                raise Findings(folders.existing_run_findings(folder)) from None
             self._at_work = (folder / AT_WORK).open("wb", buffering=0)
             self.at_work(0.0, "")
             self.ticks = (folder / "ticks.jsonl").open("x", encoding="utf-8", newline="\n")
@@ -111,7 +111,7 @@ class Record:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        with held_back():
+        with signals_deferred():
             if self.result is None:
                 self.result = self._cut_short(error)
             if self.folder is not None:
@@ -149,7 +149,7 @@ def finish_killed(folder: Path, run: Result) -> Result:
     if run.cause is not None and (leaf := leaf_at_work(folder)):
         run = dataclasses.replace(run, cause=dataclasses.replace(run.cause, node=leaf[1]), sim_seconds=leaf[0])
     if (folder / "events.jsonl").is_file() and not os.path.lexists(folder / "result.json"):
-        with held_back():
+        with signals_deferred():
             write_whole(folder / "result.json", run.to_json())
             (folder / AT_WORK).unlink(missing_ok=True)
     return run
@@ -158,7 +158,7 @@ def finish_killed(folder: Path, run: Result) -> Result:
 def leaf_at_work(folder: Path) -> tuple[float, str] | None:
     """The second (simulated) and the path of the leaf in whose tick a run was killed, or hangs; None: in none."""
     try:
-        noted = json.loads((folder / AT_WORK).read_bytes()[:MOST_AT_WORK])
+        noted = json.loads((folder / AT_WORK).read_bytes()[:MAX_AT_WORK_BYTES])
         t, node = float(noted["t"]), noted["node"]
     except (OSError, ValueError, KeyError, TypeError):
         return None

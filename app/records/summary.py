@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from regrasp.app.records.result import Expectation, Result
 
 
-def summary(result: "Result", folder: Path) -> str:
+def run_summary(result: "Result", folder: Path) -> str:
     """What `regrasp run` says in the end."""
     lines = [headline(result)]
     if result.cause:

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 from itertools import groupby
 from typing import Any
 
-from regrasp.app.records.history import Course
+from regrasp.app.records.history import NodeHistory
 from regrasp.app.records.reader import Event
 from regrasp.app.records.result import Attempt
 from regrasp.app.records.summary import in_words
 
-Names = tuple[str, ...]  # a path's parts
-STATUS = {"INVALID": "stopped", "RUNNING": "still running"}
-MARGIN = 19  # columns of the two times
+PathParts = tuple[str, ...]  # a path's parts
+STATUS_WORDS = {"INVALID": "stopped", "RUNNING": "still running"}
+TIME_COLUMNS = 19  # columns of the two times
 MOST_EVENTS = 6  # shown of one attempt
 MOST_ATTEMPTS = 500  # shown of a run
 LONGEST = 1000  # characters of a text from the record
@@ -25,7 +25,7 @@ TOLD_ELSEWHERE = ("failed", "begin", "end")
 class _Round:
     """Attempts up to the next round of a loop; `again` is what the loop began anew, for the `number`th time."""
 
-    again: Names
+    again: PathParts
     number: int
     attempts: tuple[Attempt, ...]
 
@@ -34,16 +34,16 @@ class _Round:
         return self.again, [(a.path, a.status, a.cause and a.cause.code) for a in self.attempts]
 
 
-def timeline(attempts: Sequence[Attempt], events: Sequence[Event], course: Course, width: int) -> Iterator[str]:
+def timeline(attempts: Sequence[Attempt], events: Sequence[Event], history: NodeHistory, width: int) -> Iterator[str]:
     """Lines of at most `width` columns: begin and end of each attempt, and below it its cause and its events."""
     if len(attempts) > MOST_ATTEMPTS:
-        yield f"{'':{MARGIN}}{len(attempts) - MOST_ATTEMPTS} earlier attempts are left out; --json has them all"
+        yield f"{'':{TIME_COLUMNS}}{len(attempts) - MOST_ATTEMPTS} earlier attempts are left out; --json has them all"
         attempts = attempts[-MOST_ATTEMPTS:]
     headings = _Headings(attempts)
     by_node: dict[str, list[Event]] = {}
     for event in events:
         by_node.setdefault(event.node, []).append(event)
-    for _, same in groupby(_rounds(attempts, course), key=_Round.signature):
+    for _, same in groupby(_rounds(attempts, history), key=_Round.signature):
         first, *more = same
         shown, again = headings.reopened(first)
         for attempt in first.attempts:
@@ -51,7 +51,7 @@ def timeline(attempts: Sequence[Attempt], events: Sequence[Event], course: Cours
             for depth, heading in enumerate(open_now):
                 if shown[: len(heading)] != heading:
                     note = f"  again, round {first.number}" if heading == again else ""
-                    yield f"{'':{MARGIN}}{'  ' * depth}{'/'.join(heading[above:])}{note}"
+                    yield f"{'':{TIME_COLUMNS}}{'  ' * depth}{'/'.join(heading[above:])}{note}"
                 above = len(heading)
             shown = open_now[-1] if open_now else ()
             yield from _lines(attempt, above, len(open_now), by_node.get(attempt.path, []), width)
@@ -60,12 +60,12 @@ def timeline(attempts: Sequence[Attempt], events: Sequence[Event], course: Cours
             yield f"{begin:8.2f} {end:8.2f}  and the same again, {len(more)} more time{'s' * (len(more) > 1)}"
 
 
-def _rounds(attempts: Sequence[Attempt], course: Course) -> Iterator[_Round]:
+def _rounds(attempts: Sequence[Attempt], history: NodeHistory) -> Iterator[_Round]:
     """The attempts, parted where a loop begins what is below it anew."""
-    again: tuple[Names, int] = ((), 1)
+    again: tuple[PathParts, int] = ((), 1)
     members: list[Attempt] = []
     for attempt in attempts:
-        if members and (new := course.new_round(attempt.path, members[-1].started, attempt.started)):
+        if members and (new := history.new_round(attempt.path, members[-1].started, attempt.started)):
             yield _Round(*again, tuple(members))
             again, members = (tuple(new[0].split("/")), new[1]), []
         members.append(attempt)
@@ -77,17 +77,17 @@ class _Headings:
     """The ancestors at which the attempts' paths part; a chain of only children is one."""
 
     def __init__(self, attempts: Sequence[Attempt]) -> None:
-        self._below: dict[Names, set[str]] = {}
+        self._below: dict[PathParts, set[str]] = {}
         for names in map(_names, attempts):
             for depth in range(len(names)):
                 self._below.setdefault(names[:depth], set()).add(names[depth])
 
-    def of(self, attempt: Attempt) -> list[Names]:
+    def of(self, attempt: Attempt) -> list[PathParts]:
         """From the top."""
         names = _names(attempt)
         return [names[:depth] for depth in range(1, len(names)) if len(self._below[names[:depth]]) > 1]
 
-    def reopened(self, group: _Round) -> tuple[Names, Names]:
+    def reopened(self, group: _Round) -> tuple[PathParts, PathParts]:
         """What stays open of the headings above when a round begins, and the heading that it begins with."""
         if not group.again:
             return (), ()
@@ -95,17 +95,17 @@ class _Headings:
         return heading[:-1], heading
 
 
-def _names(attempt: Attempt) -> Names:
+def _names(attempt: Attempt) -> PathParts:
     return tuple(attempt.path.split("/"))
 
 
 def _lines(attempt: Attempt, above: int, depth: int, events: Sequence[Event], width: int) -> Iterator[str]:
     """The attempt's own line, its events and its cause."""
     name = "  " * depth + "/".join(_names(attempt)[above:])
-    status = STATUS.get(attempt.status, attempt.status)
+    status = STATUS_WORDS.get(attempt.status, attempt.status)
     times = f", {attempt.times} times" if attempt.times > 1 else ""
     yield f"{attempt.started:8.2f} {attempt.ended:8.2f}  {name:<36} {status}{times}"
-    indent = " " * (MARGIN + 2 * depth + 4)
+    indent = " " * (TIME_COLUMNS + 2 * depth + 4)
     first = bisect_left(events, attempt.started, key=_time)
     mine = [e for e in events[first : bisect_right(events, attempt.ended, key=_time)] if e.event not in TOLD_ELSEWHERE]
     for event in mine[:MOST_EVENTS]:

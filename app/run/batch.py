@@ -19,7 +19,7 @@ from regrasp.interfaces.cause import Cause, CauseCode
 if TYPE_CHECKING:
     from regrasp.sim.render.renderer import RendererName
 
-Episode = Callable[..., Result]
+RunEpisode = Callable[..., Result]
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ def run_all(
     jobs: int,
     keep: Callable[[list[Row]], None] = lambda rows: None,
     settings: Settings = Settings(),
-    episode: Episode | None = None,
+    episode: RunEpisode | None = None,
 ) -> tuple[dict[int, Row], bool]:
     """Do all, `jobs` at a time; the rows by the runs' numbers, and whether Ctrl-C cut it short.
 

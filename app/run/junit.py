@@ -4,9 +4,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
-from regrasp.app.files.findings import Findings, printable
+from regrasp.app.files.findings import Findings
 from regrasp.app.files.whole_file import write_whole
 from regrasp.app.run.batch import Row, Run
+from regrasp.interfaces.quote import printable
 
 ERRORS = ("internal_error", "wall_limit")  # outcomes that say nothing of the robot
 

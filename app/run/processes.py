@@ -55,26 +55,26 @@ def run_each(tasks: Sequence[Callable[[], T]], jobs: int, wall_limit: float = ma
                 number, task = waiting.pop(0)
                 reader, writer = context.Pipe(duplex=False)
                 process = context.Process(target=_child, args=(writer, task), daemon=True)
-                with _deaf():
+                with _signals_blocked():
                     process.start()
                 writer.close()  # the child has the only one now: its death shows as an end of file
                 running[reader] = _Child(number, process, time.monotonic() + wall_limit)
-            for ready in wait(list(running), _until_a_deadline(running.values())):
+            for ready in wait(list(running), _seconds_to_deadline(running.values())):
                 child = running[ready]
                 yield _received(child, ready, wall_limit)
                 del running[ready]
-            _press(running.values())
+            _enforce_deadlines(running.values())
     finally:
         _stop([child.process for child in running.values()])
 
 
-def _until_a_deadline(children: Iterable[_Child]) -> float | None:
+def _seconds_to_deadline(children: Iterable[_Child]) -> float | None:
     """Seconds; None where there is none."""
     first = min(child.deadline for child in children)
     return None if first == math.inf else max(0.0, first - time.monotonic())
 
 
-def _press(children: Iterable[_Child]) -> None:
+def _enforce_deadlines(children: Iterable[_Child]) -> None:
     """Tell those whose time is over, and kill those that were told and did not end."""
     now = time.monotonic()
     for child in children:
@@ -87,7 +87,7 @@ def _press(children: Iterable[_Child]) -> None:
 
 
 @contextlib.contextmanager
-def _deaf() -> Iterator[None]:
+def _signals_blocked() -> Iterator[None]:
     """What is started meanwhile never hears of a terminal's Ctrl-C or end, which reach all of us; we do afterwards.
 
     Ignored by the child itself they would come while it still imports.

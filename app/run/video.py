@@ -12,7 +12,7 @@ import numpy as np
 from imageio_ffmpeg import get_ffmpeg_exe
 from numpy.typing import NDArray
 
-Frame = NDArray[np.uint8]
+RgbImage = NDArray[np.uint8]
 # In pieces of a second that play without the end, should ffmpeg be killed; one whole film when it is closed.
 _KEPT = ["-movflags", "+hybrid_fragmented", "-frag_duration", "1000000"]
 
@@ -23,13 +23,13 @@ _CAMERA_SIZE = (424, 240)
 _INK, PAPER = (235, 235, 235), 24
 
 
-def compose(overview: Frame | None, rear: Frame | None, wrist: Frame | None, lines: Sequence[str]) -> Frame:
+def compose(overview: RgbImage | None, rear: RgbImage | None, wrist: RgbImage | None, lines: Sequence[str]) -> RgbImage:
     """One frame (544, 1280, 3) uint8 RGB: overview at the left, rear and wrist stacked at the right, text below.
 
     Images are (H, W, 3) uint8 RGB of any size, scaled to fit; None leaves the place dark. Up to four lines, in two
     columns; they stand on a dark band of their own.
     """
-    frame: Frame = np.full((SIZE[1], SIZE[0], 3), PAPER, np.uint8)
+    frame: RgbImage = np.full((SIZE[1], SIZE[0], 3), PAPER, np.uint8)
     _place(frame, overview, (0, 0), OVERVIEW_SIZE)
     for row, (label, image) in enumerate({"rear camera": rear, "wrist camera": wrist}.items()):
         left, top = OVERVIEW_SIZE[0], row * _CAMERA_SIZE[1]
@@ -41,7 +41,7 @@ def compose(overview: Frame | None, rear: Frame | None, wrist: Frame | None, lin
     return frame
 
 
-def _place(frame: Frame, image: Frame | None, corner: tuple[int, int], size: tuple[int, int]) -> None:
+def _place(frame: RgbImage, image: RgbImage | None, corner: tuple[int, int], size: tuple[int, int]) -> None:
     """Copy the image, scaled to fit and centred, into the box at `corner` (left, top) of `size` (width, height)."""
     if image is None:
         return
@@ -53,7 +53,7 @@ def _place(frame: Frame, image: Frame | None, corner: tuple[int, int], size: tup
     frame[top : top + height, left : left + width] = image
 
 
-def write_text(frame: Frame, text: str, origin: tuple[int, int], scale: float) -> None:
+def write_text(frame: RgbImage, text: str, origin: tuple[int, int], scale: float) -> None:
     """Light letters on a dark plate, readable on anything; `origin` is the left end of the base line. ASCII only."""
     text = text.encode("ascii", "replace").decode()
     (width, height), below = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, scale, 1)
@@ -85,7 +85,7 @@ class VideoWriter:
             start_new_session=True,
         )
 
-    def write(self, frame: Frame) -> None:
+    def write(self, frame: RgbImage) -> None:
         """Append a frame, (height, width, 3) uint8 RGB.
 
         Raises:

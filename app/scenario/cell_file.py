@@ -4,14 +4,14 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from regrasp.app.files.findings import Finding, Findings, attempt, nearest, shown
-from regrasp.app.files.overrides import Assignment, apply, lay_over
+from regrasp.app.files.findings import Finding, Findings, catch_findings, shown
+from regrasp.app.files.overrides import Assignment, apply_assignments, lay_over
 from regrasp.app.files.resources import read_text, resolve
 from regrasp.app.files.validation import validated
 from regrasp.app.files.yaml_lines import Document, Place, parse
-from regrasp.app.scenario.cell_layout import impossible
+from regrasp.app.scenario.cell_layout import layout_findings
 from regrasp.interfaces.cell import Cell
-from regrasp.interfaces.quote import MOST, cut, quoted
+from regrasp.interfaces.quote import MOST, cut, nearest, quoted
 
 
 def load_cell(path: Path, assignments: Sequence[Assignment] = (), where: Place | None = None) -> Cell:
@@ -24,11 +24,11 @@ def load_cell(path: Path, assignments: Sequence[Assignment] = (), where: Place |
     if isinstance(document.value, dict) and "base" in document.value:
         document = _on_base(document, path.parent)
     fits = isinstance(document.value, dict)  # else that alone is wrong, and not what is laid over it
-    _, found = attempt(apply, document, assignments if fits else ())
-    cell, wrong = attempt(validated, document, Cell)
+    _, found = catch_findings(apply_assignments, document, assignments if fits else ())
+    cell, wrong = catch_findings(validated, document, Cell)
     found += wrong
     if cell:
-        found += [*_misnamed(document, cell)] or impossible(document, cell)
+        found += [*_misnamed(document, cell)] or layout_findings(document, cell)
     if found or not cell:
         raise Findings(found)
     return cell

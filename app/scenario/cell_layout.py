@@ -13,14 +13,14 @@ from regrasp.app.files.yaml_lines import Document, Path
 from regrasp.app.scenario.placement import (
     FloatArray,
     arm_base,
-    asleep,
-    box_halves,
     cable_at_start,
     cable_error,
     cube_depths,
     fixed_cameras,
+    half_edges,
     line_depth,
-    penetration,
+    penetration_depth,
+    sleeping_arm_cubes,
     socket_block,
 )
 from regrasp.interfaces.cell import PLUGGED_INTO, Cell, FixedMount, KnownCell
@@ -41,7 +41,7 @@ class Part(NamedTuple):
     halves: FloatArray
 
 
-def impossible(document: Document, cell: Cell) -> list[Finding]:
+def layout_findings(document: Document, cell: Cell) -> list[Finding]:
     """What is wrong with a cell although each of its values is right."""
     known = cell.known
     found = [
@@ -79,7 +79,7 @@ def _overlaps(document: Document, known: KnownCell) -> Iterator[Finding]:
         yield Finding(*document.place(("known", "arms")), message)
     for name, place in fixed_cameras(known):
         for part in [*parts, *bases]:
-            if penetration(part.halves, place - part.center) > 0:
+            if penetration_depth(part.halves, place - part.center) > 0:
                 yield Finding(
                     *document.place(part.path), f"the {name} camera is inside {cut(part.name)}; move one of them"
                 )
@@ -91,7 +91,7 @@ def _between_the_arms(known: KnownCell) -> float:
 
     moving = LINKS > 0
     radii = SPHERES[moving, 3]
-    bodies = [asleep(arm)[0][moving] for arm in known.arms]
+    bodies = [sleeping_arm_cubes(arm)[0][moving] for arm in known.arms]
     deepest = [
         float((radii[:, None] + radii[None] - np.linalg.norm(a[:, None] - b[None], axis=2)).max())
         for a, b in combinations(bodies, 2)
@@ -105,8 +105,8 @@ def _inside(known: KnownCell, part: Part, bases: list[Part]) -> Iterator[tuple[s
         if part.path == base.path:
             continue
         if part.path[1] != "arms" or part.path > base.path:  # a pair of bases once
-            yield base.name, penetration(np.vstack([part.halves, base.halves]), part.center - base.center)
-        centers, halves = asleep(arm)
+            yield base.name, penetration_depth(np.vstack([part.halves, base.halves]), part.center - base.center)
+        centers, halves = sleeping_arm_cubes(arm)
         yield f"the {arm.name} arm asleep", float(cube_depths(part.halves, part.center - centers, halves).max())
     length, radius = known.connector.length, known.connector.radius
     size = (length, radius * np.sqrt(2), radius * np.sqrt(2))  # the box inside the cylinder
@@ -121,16 +121,16 @@ def _inside(known: KnownCell, part: Part, bases: list[Part]) -> Iterator[tuple[s
     }
     for name, pose in poses.items():
         if part.path[: len(own[name])] != own[name]:
-            halves = box_halves(pose.rotation.as_matrix(), size)
-            yield name, penetration(np.vstack([part.halves, halves]), part.center - pose.translation)
+            halves = half_edges(pose.rotation.as_matrix(), size)
+            yield name, penetration_depth(np.vstack([part.halves, halves]), part.center - pose.translation)
 
 
 def _parts(known: KnownCell) -> Iterator[Part]:
     """Boxes, sockets and the clip's bracket."""
     for i, box in enumerate(known.boxes):
-        yield Part(("known", "boxes", i), box.name, np.array(box.center), box_halves(np.eye(3), box.size))
+        yield Part(("known", "boxes", i), box.name, np.array(box.center), half_edges(np.eye(3), box.size))
     for i, box in enumerate(known.clip.bracket):
-        yield Part(("known", "clip", "bracket", i), box.name, np.array(box.center), box_halves(np.eye(3), box.size))
+        yield Part(("known", "clip", "bracket", i), box.name, np.array(box.center), half_edges(np.eye(3), box.size))
     for i, socket in enumerate(known.sockets):
         yield Part(("known", "sockets", i), *socket_block(socket))
 

@@ -6,21 +6,21 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal, ParamSpec, TypeVar
 
-from regrasp.app.files.findings import Finding, Findings, attempt, nearest, shown
-from regrasp.app.files.overrides import Assignment, apply, path_of, read, was_typed
+from regrasp.app.files.findings import Finding, Findings, catch_findings, shown
+from regrasp.app.files.overrides import Assignment, apply_assignments, parse_overrides, path_of, was_typed
 from regrasp.app.files.resources import read_text, resolve
-from regrasp.app.files.schema_nodes import at
+from regrasp.app.files.schema_nodes import value_at
 from regrasp.app.files.validation import Error, read_as
 from regrasp.app.files.yaml_lines import Document, Place, parse
 from regrasp.app.files.yaml_lines import Path as KeyPath
 from regrasp.app.records.result import DEFAULT_CASE
 from regrasp.app.scenario import vary
 from regrasp.app.scenario.cell_file import load_cell
-from regrasp.app.scenario.placement import misplaced
-from regrasp.app.scenario.references import check_inputs, check_names, names_of, tree_text
+from regrasp.app.scenario.placement import check_obstacles
+from regrasp.app.scenario.references import check_names, check_tree_inputs, names_of, tree_text
 from regrasp.app.scenario.schema import ScenarioFile
 from regrasp.interfaces.cell import Cell
-from regrasp.interfaces.quote import MOST, cut, quoted
+from regrasp.interfaces.quote import MOST, cut, nearest, quoted
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -109,7 +109,7 @@ class _Source:
         self._wrong: list[KeyPath] = []  # where the file itself is wrong
         self._done: dict[Hashable, tuple[Any, list[Finding]]] = {}
         self.overrides = tuple(overrides)
-        assignments, wrong = read(overrides)
+        assignments, wrong = parse_overrides(overrides)
         self.note(wrong)
         try:
             self.path = resolve("scenario", name_or_path, Path())
@@ -121,7 +121,7 @@ class _Source:
         self.note(error.finding for error in errors if error.is_misspelt)
         of_vary = [a for a in assignments if f"{a.key}.".startswith("vary.")]
         self._fixed = [a for a in assignments if a not in of_vary]
-        self.note(attempt(apply, self._document, of_vary)[1])
+        self.note(catch_findings(apply_assignments, self._document, of_vary)[1])
         axes, wrong = vary.axes(self._document, self._fixed)
         self.note(wrong)
         self.cases = list(vary.expand(axes))
@@ -148,7 +148,7 @@ class _Source:
     def _once(self, case: str, make: Callable[..., T], key: Hashable, *args: Any) -> T | None:
         """What `make` returns, and for the case its findings; called for the first case with this key only."""
         if (make, key) not in self._done:
-            self._done[make, key] = attempt(make, *args)
+            self._done[make, key] = catch_findings(make, *args)
         done: T | None
         done, findings = self._done[make, key]
         self.note(findings, case)
@@ -159,14 +159,19 @@ class _Source:
         given = self._document
         document = Document(deepcopy(given.value), dict(given.places), unread=set(given.unread))
         of_cell = [replace(a, key=a.key[5:]) for a in assignments if a.key.startswith("cell.")]
-        self.note(attempt(apply, document, [a for a in assignments if not a.key.startswith("cell.")])[1], case)
+        self.note(
+            catch_findings(apply_assignments, document, [a for a in assignments if not a.key.startswith("cell.")])[1],
+            case,
+        )
         file = self._read(case, document, {a.path[0] for a in assignments})
         cell, tree = self._cell_and_tree(case, document, of_cell)
-        inputs, obstacles, faults = (repr(at(document.value, (key,))) for key in ("inputs", "obstacles", "faults"))
-        self._once(case, check_inputs, (tree, inputs, id(cell)), document, tree, cell)
+        inputs, obstacles, faults = (
+            repr(value_at(document.value, (key,))) for key in ("inputs", "obstacles", "faults")
+        )
+        self._once(case, check_tree_inputs, (tree, inputs, id(cell)), document, tree, cell)
         self._once(case, check_names, (tree, obstacles, faults), document, tree)
-        gravity = repr(at(document.value, ("gravity",)))
-        self._once(case, misplaced, (obstacles, gravity, id(cell)), document, cell)
+        gravity = repr(value_at(document.value, ("gravity",)))
+        self._once(case, check_obstacles, (obstacles, gravity, id(cell)), document, cell)
         if not (file and cell and tree):
             return None
         name = self.path.name.removesuffix(".yaml").removesuffix(".scenario")
@@ -191,8 +196,10 @@ class _Source:
         folder = self.path.parent
         cell_at, tree_at = (document.place((key,)) for key in ("cell", "tree"))
         laid = repr([(a.key, a.new.value, a.place) for a in of_cell])
-        cell = self._once(case, _cell, (repr(at(document.value, ("cell",))), cell_at, laid), document, folder, of_cell)
-        name = repr(at(document.value, ("tree",)))
+        cell = self._once(
+            case, _cell, (repr(value_at(document.value, ("cell",))), cell_at, laid), document, folder, of_cell
+        )
+        name = repr(value_at(document.value, ("tree",)))
         tree = self._once(case, _named, (name, tree_at), document, "tree", folder)
         if tree:
             self._once(case, check_tree_file, (tree, tree_at, id(cell)), tree, tree_at, names_of(cell))
@@ -228,7 +235,7 @@ def _named(document: Document, key: Literal["cell", "tree"], folder: Path) -> Pa
 
     A path is taken from `folder`, the scenario's, but one of the command line from the current folder.
     """
-    name, place = at(document.value, (key,)), document.place((key,))
+    name, place = value_at(document.value, (key,)), document.place((key,))
     if not isinstance(name, str):
         return None
     return resolve(key, name, Path() if was_typed(place) else folder, place)

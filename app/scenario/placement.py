@@ -11,8 +11,8 @@ from pydantic import TypeAdapter
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from regrasp.app.files.findings import Finding, Findings
-from regrasp.app.files.schema_nodes import at
-from regrasp.app.files.validation import part
+from regrasp.app.files.schema_nodes import value_at
+from regrasp.app.files.validation import validated_part
 from regrasp.app.files.yaml_lines import Document, Path
 from regrasp.app.scenario.cable_rest import rest_shape
 from regrasp.app.scenario.sampling import LEAST_STAND, STAND
@@ -33,7 +33,7 @@ _LIST, _TEXT, _YAW = TypeAdapter(list[Any]), TypeAdapter(str), TypeAdapter[float
 _SIZE, _JITTER, _POINT = TypeAdapter[Size](ObstacleSize), TypeAdapter[Vector](Jitter), TypeAdapter[Vector](Vector)
 
 
-def misplaced(document: Document, cell: Cell | None) -> None:
+def check_obstacles(document: Document, cell: Cell | None) -> None:
     """Raises `Findings`: obstacles that share a name, reach below the floor, or stand in the cell or in its cable.
 
     Of an obstacle of which some value is wrong, which is a finding elsewhere, only what the others show.
@@ -43,18 +43,18 @@ def misplaced(document: Document, cell: Cell | None) -> None:
 
 
 def _misplaced(document: Document, cell: Cell | None) -> Iterator[Finding]:
-    obstacles = part(document, ("obstacles",), _LIST)
+    obstacles = validated_part(document, ("obstacles",), _LIST)
     seen = set()
     for i in range(len(obstacles or [])):
         here: Path = ("obstacles", i)
-        name = part(document, (*here, "name"), _TEXT)
+        name = validated_part(document, (*here, "name"), _TEXT)
         if name is not None and name in seen:
             yield Finding(*document.place((*here, "name")), f"two obstacles {quoted(name)}; rename one")
         seen.add(name)
         who = "obstacle" + (f" {quoted(name)}" if name is not None else "")
-        jitter = part(document, (*here, "jitter"), _JITTER) or (0.0, 0.0, 0.0)  # of a wrong one nobody knows
-        size = part(document, (*here, "size"), _SIZE)
-        yaw_deg = part(document, (*here, "yaw_deg"), _YAW, 0.0)
+        jitter = validated_part(document, (*here, "jitter"), _JITTER) or (0.0, 0.0, 0.0)  # of a wrong one nobody knows
+        size = validated_part(document, (*here, "size"), _SIZE)
+        yaw_deg = validated_part(document, (*here, "yaw_deg"), _YAW, 0.0)
         for path, spot, gravity in _spots(document, here):
             place = document.place(path)
             if (deep := jitter[2] - spot[2]) > TOUCHING:
@@ -68,11 +68,11 @@ def _misplaced(document: Document, cell: Cell | None) -> Iterator[Finding]:
 def _spots(document: Document, obstacle: Path) -> Iterator[tuple[Path, Vector, Gravity | None]]:
     """Where an obstacle may stand, with the path of the value, and in which gravity; None: nobody knows in which."""
     either = (*obstacle, "position")
-    if (spot := part(document, either, _POINT)) is not None:
-        gravity = at(document.value, ("gravity",))
+    if (spot := validated_part(document, either, _POINT)) is not None:
+        gravity = value_at(document.value, ("gravity",))
         yield either, spot, gravity if gravity in ("zero", "earth") else None  # type: ignore[misc]
     for gravity in GRAVITIES:
-        if (spot := part(document, (*either, gravity), _POINT)) is not None:
+        if (spot := validated_part(document, (*either, gravity), _POINT)) is not None:
             yield (*either, gravity), spot, gravity
 
 
@@ -100,9 +100,9 @@ def _in_the_cable(
 ) -> list[tuple[str, float]]:
     """As `overlaps`, of the cable as it hangs at the start, and of the connector in its socket and in the clip."""
     turn = Rotation.from_euler("z", yaw_deg, degrees=True).as_matrix()
-    moving = np.vstack([box_halves(turn, size), np.diag(jitter)])
+    moving = np.vstack([half_edges(turn, size), np.diag(jitter)])
     found = []
-    for name, radius, points in lines(cell, gravity):
+    for name, radius, points in cable_and_connector_lines(cell, gravity):
         depth = line_depth(moving, center, points, radius)
         if depth > (cable_error(cell, gravity) if name.startswith("the cable") else TOUCHING):
             found.append((name, depth))
@@ -122,10 +122,10 @@ def line_depth(generators: FloatArray, center: FloatArray, points: FloatArray, r
     `generators` (m, 3) are the box's half edges, and those of the places of its `center` (3,), metres.
     """
     links = ((0.5 * (b - a), center - 0.5 * (a + b)) for a, b in pairwise(points))
-    return radius + max(penetration(np.vstack([generators, half]), offset) for half, offset in links)
+    return radius + max(penetration_depth(np.vstack([generators, half]), offset) for half, offset in links)
 
 
-def lines(cell: Cell, gravity: Gravity) -> list[tuple[str, float, FloatArray]]:
+def cable_and_connector_lines(cell: Cell, gravity: Gravity) -> list[tuple[str, float, FloatArray]]:
     """Name, radius and middle line (n, 3), m, of the cable at the start, the plugged and the stowed connector."""
     known = cell.known
     ends = [[-0.5 * known.connector.length, 0.0, 0.0], [0.5 * known.connector.length, 0.0, 0.0]]
@@ -157,37 +157,37 @@ def overlaps(
     The box's `center` (3,) m moves by up to `jitter` on each axis; the depth is that of the worst place.
     """
     turn = Rotation.from_euler("z", yaw_deg, degrees=True).as_matrix()
-    moving = np.vstack([box_halves(turn, size), np.diag(jitter)])
+    moving = np.vstack([half_edges(turn, size), np.diag(jitter)])
     found: dict[str, float] = {}
     for name, place, halves in [*_pieces(cell), *_camera_points(cell)]:
-        found[name] = penetration(np.vstack([moving, halves]), center - place)
+        found[name] = penetration_depth(np.vstack([moving, halves]), center - place)
     for arm in cell.arms:
-        places, halves = asleep(arm)
+        places, halves = sleeping_arm_cubes(arm)
         depths = cube_depths(moving, center - places, halves)
         found[f"the {arm.name} arm asleep"] = float(depths.max())
     return [(name, depth) for name, depth in found.items() if depth > TOUCHING]
 
 
-def penetration(generators: FloatArray, offset: FloatArray) -> float:
+def penetration_depth(generators: FloatArray, offset: FloatArray) -> float:
     """How far (m) two boxes overlap; at most 0 when apart.
 
     The boxes' Minkowski difference is the zonotope of all their half edges `generators` (n, 3), and the boxes overlap
     if `offset` (3,) between their centres lies inside.
     """
-    normals = _facets(generators)
+    normals = _facet_normals(generators)
     reach = np.abs(generators @ normals.T).sum(axis=0)
     return float(np.min(reach - np.abs(normals @ offset)))
 
 
 def cube_depths(generators: FloatArray, offsets: FloatArray, halves: FloatArray) -> FloatArray:
-    """As `penetration`, of a box with each of many upright cubes: `offsets` (n, 3), half edges `halves` (n,), m."""
-    normals = _facets(np.vstack([generators, np.eye(3)]))
+    """As `penetration_depth`, for a box and each of n upright cubes: `offsets` (n, 3), half edges `halves` (n,), m."""
+    normals = _facet_normals(np.vstack([generators, np.eye(3)]))
     reach = np.abs(generators @ normals.T).sum(axis=0) + np.outer(halves, np.abs(normals).sum(axis=1))
     depths: FloatArray = np.min(reach - np.abs(offsets @ normals.T), axis=1)
     return depths
 
 
-def _facets(generators: FloatArray) -> FloatArray:
+def _facet_normals(generators: FloatArray) -> FloatArray:
     """Unit normals (m, 3) of a zonotope's facets: the cross products of pairs of its generators (n, 3)."""
     first, second = np.triu_indices(len(generators), 1)
     normals = np.cross(generators[first], generators[second])
@@ -196,7 +196,7 @@ def _facets(generators: FloatArray) -> FloatArray:
     return units
 
 
-def box_halves(turn: FloatArray, size: Size) -> FloatArray:
+def half_edges(turn: FloatArray, size: Size) -> FloatArray:
     """Half edges (3, 3) m, a row each, of a box whose axes are the columns of `turn` (3, 3)."""
     return (turn * (0.5 * np.asarray(size))).T
 
@@ -204,7 +204,7 @@ def box_halves(turn: FloatArray, size: Size) -> FloatArray:
 def _pieces(cell: KnownCell) -> list[tuple[str, FloatArray, FloatArray]]:
     """Name, centre (3,) and half edges (3, 3) of all in the cell that rises above z = 0, so not the floor."""
     boxes = [b for b in (*cell.boxes, *cell.clip.bracket) if b.center[2] + 0.5 * b.size[2] > 0]
-    pieces = [(b.name, np.array(b.center), box_halves(np.eye(3), b.size)) for b in boxes]
+    pieces = [(b.name, np.array(b.center), half_edges(np.eye(3), b.size)) for b in boxes]
     return [*pieces, *map(socket_block, cell.sockets), *map(arm_base, cell.arms)]
 
 
@@ -212,12 +212,12 @@ def socket_block(socket: Socket) -> tuple[str, FloatArray, FloatArray]:
     """Name, centre (3,) and half edges (3, 3), m, of a socket's block, which is turned towards its axis."""
     across, along, high = socket.size
     turn = pose_along(socket.center, socket.axis).rotation.as_matrix()
-    return f"socket {socket.name}", np.array(socket.center), box_halves(turn, (along, across, high))
+    return f"socket {socket.name}", np.array(socket.center), half_edges(turn, (along, across, high))
 
 
 def arm_base(arm: ArmSpec) -> tuple[str, FloatArray, FloatArray]:
     """As `socket_block`, of an arm's base."""
-    return f"the {arm.name} arm's base", np.array(arm.base) + _BASE_CENTER, box_halves(np.eye(3), _BASE_SIZE)
+    return f"the {arm.name} arm's base", np.array(arm.base) + _BASE_CENTER, half_edges(np.eye(3), _BASE_SIZE)
 
 
 def fixed_cameras(cell: KnownCell) -> list[tuple[str, FloatArray]]:
@@ -231,7 +231,7 @@ def _camera_points(cell: KnownCell) -> list[tuple[str, FloatArray, FloatArray]]:
     return [(f"the {name} camera", place, np.zeros((3, 3))) for name, place in fixed_cameras(cell)]
 
 
-def asleep(arm: ArmSpec) -> tuple[FloatArray, FloatArray]:
+def sleeping_arm_cubes(arm: ArmSpec) -> tuple[FloatArray, FloatArray]:
     """Centres (n, 3) and half edges (n,), m, of the cubes inside the spheres that fill an arm in its sleep pose."""
     from regrasp.motion.robots.kinematics import ArmKinematics  # late: it brings the compiler
     from regrasp.motion.robots.spheres import LINKS, SPHERES

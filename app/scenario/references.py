@@ -6,13 +6,13 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
-from regrasp.app.files.findings import Finding, Findings, nearest
-from regrasp.app.files.schema_nodes import at
-from regrasp.app.files.validation import part
+from regrasp.app.files.findings import Finding, Findings
+from regrasp.app.files.schema_nodes import value_at
+from regrasp.app.files.validation import validated_part
 from regrasp.app.files.yaml_lines import Document
 from regrasp.app.scenario.schema import TreeInput
 from regrasp.interfaces.cell import PLUGGED_INTO, Cell
-from regrasp.interfaces.quote import cut, quoted
+from regrasp.interfaces.quote import cut, nearest, quoted
 
 _INPUT = TypeAdapter[TreeInput](TreeInput)
 
@@ -40,20 +40,18 @@ def names_of(cell: Cell | None) -> dict[str, dict[str, str]]:
     return {"socket": {PLUGGED_INTO: ""} | sockets, "technique": techniques}
 
 
-def check_inputs(document: Document, tree: Path | None, cell: Cell | None) -> None:
+def check_tree_inputs(document: Document, tree: Path | None, cell: Cell | None) -> None:
     """Raises `Findings` for inputs that the tree does not take, or not with these values."""
-    from regrasp.trees import (
-        check_inputs as of_tree,  # the leaves bring the planner and the compiler with them: seconds
-    )
+    from regrasp.trees import check_inputs  # late: the leaves bring the planner and the compiler with them: seconds
 
-    written = at(document.value, ("inputs",))
+    written = value_at(document.value, ("inputs",))
     if tree is None or not isinstance(written, dict):
         return
-    values = {key: part(document, ("inputs", key), _INPUT) for key in written}
+    values = {key: validated_part(document, ("inputs", key), _INPUT) for key in written}
     given = {key: tree_text(value) for key, value in values.items() if value is not None}
     if found := [
         Finding(*document.place(("inputs", key)), f"inputs.{cut(key)}: {message}")
-        for key, message in of_tree(tree, given, names=names_of(cell))
+        for key, message in check_inputs(tree, given, names=names_of(cell))
     ]:
         raise Findings(found)
 
@@ -66,16 +64,16 @@ def check_names(document: Document, tree: Path | None) -> None:
 
 def _faults(document: Document) -> Iterator[tuple[int, Mapping[str, Any]]]:
     """Number and keys of each fault that has any."""
-    written = at(document.value, ("faults",))
+    written = value_at(document.value, ("faults",))
     for i, fault in enumerate(written if isinstance(written, list) else []):
         if isinstance(fault, dict):
             yield i, fault
 
 
 def _obstacles(document: Document) -> Iterator[Finding]:
-    written = at(document.value, ("obstacles",))
+    written = value_at(document.value, ("obstacles",))
     obstacles = written if isinstance(written, list) else []
-    names = [name for i in range(len(obstacles)) if isinstance(name := at(obstacles, (i, "name")), str)]
+    names = [name for i in range(len(obstacles)) if isinstance(name := value_at(obstacles, (i, "name")), str)]
     if len(names) < len(obstacles) or (written is not None and not isinstance(written, list)):
         return  # nobody knows what the others are called
     for i, fault in _faults(document):
@@ -87,7 +85,7 @@ def _obstacles(document: Document) -> Iterator[Finding]:
 
 def _nodes(document: Document, tree: Path | None) -> Iterator[Finding]:
     for i, _ in _faults(document):
-        name = at(document.value, ("faults", i, "when", "node"))
+        name = value_at(document.value, ("faults", i, "when", "node"))
         if tree and isinstance(name, str) and (names := _node_names(tree)) and name not in names:
             alike = [other for other in names if ("/" in other) == ("/" in name)]
             message = f"no node {quoted(name)} in {tree.name}; {nearest(name, alike)}"

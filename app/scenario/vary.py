@@ -17,7 +17,7 @@ from regrasp.app.records.result import DEFAULT_CASE
 from regrasp.app.scenario.schema import Steps, Vary
 from regrasp.interfaces.quote import cut
 
-MOST_CASES = 10_000
+MAX_CASES = 10_000
 
 
 class _Varied(BaseModel):
@@ -72,7 +72,7 @@ def count(axes: Sequence[Axis]) -> int:
 
 def expand(axes: Sequence[Axis]) -> Iterator[tuple[str, list[Assignment]]]:
     """Name and assignments of every case, the last key varying fastest; of too many only those with one key changed."""
-    chosen = product(*(axis.values for axis in axes)) if count(axes) <= MOST_CASES else _one_by_one(axes)
+    chosen = product(*(axis.values for axis in axes)) if count(axes) <= MAX_CASES else _one_by_one(axes)
     for values in chosen:
         given = list(zip(axes, values, strict=True))
         name = ",".join(f"{axis.key}={_text(value.value)}" for axis, value in given)
@@ -90,7 +90,7 @@ def _numbers(spec: str | Steps) -> Sequence[int] | Sequence[float]:
     """The numbers of a range; of one that is too long as many as make too many cases, the last among them."""
     if isinstance(spec, str):
         whole = range(*map(int, spec.split(":")))
-        return whole if len(whole) <= MOST_CASES else [*whole[:MOST_CASES], whole[-1]]
+        return whole if len(whole) <= MAX_CASES else [*whole[:MAX_CASES], whole[-1]]
     numbers = [float(f"{v:.12g}") for v in np.linspace(spec.first, spec.last, spec.steps)]
     return [int(v) for v in numbers] if all(v.is_integer() for v in numbers) else numbers
 
@@ -106,8 +106,8 @@ def _one_by_one(axes: Sequence[Axis]) -> Iterator[Sequence[Document]]:
 
 def _problems(axes: Sequence[Axis], place: Place) -> Iterator[Finding]:
     """Too many cases, or a value twice."""
-    if count(axes) > MOST_CASES:
-        yield Finding(*place, f"vary makes more than {MOST_CASES} cases; shorten a list or a range")
+    if count(axes) > MAX_CASES:
+        yield Finding(*place, f"vary makes more than {MAX_CASES} cases; shorten a list or a range")
     for axis in axes:
         seen: set[str] = set()
         for value in axis.values:

@@ -97,6 +97,6 @@ def test_a_technique_that_no_cell_has_is_a_finding_without_a_cell(tmp_path: Path
     leaf = '<UseTechnique name="look" technique="fuzed"/>'
     tree = f'<root main_tree_to_execute="m"><BehaviorTree ID="m">{leaf}</BehaviorTree></root>'
     (tmp_path / "tree.xml").write_text(tree)
-    assert "technique='fuzed' is unknown; did you mean fused?" in shell("regrasp trees check tree.xml").stderr
+    assert "technique='fuzed' is unknown; did you mean 'fused'?" in shell("regrasp trees check tree.xml").stderr
     (tmp_path / "tree.xml").write_text(tree.replace("fuzed", "fiducial"))
     assert shell("regrasp trees check tree.xml").returncode == 0

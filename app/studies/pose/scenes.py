@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from regrasp.app.files.findings import Findings
-from regrasp.app.files.overrides import read
+from regrasp.app.files.overrides import parse_overrides
 from regrasp.app.files.resources import resolve
 from regrasp.app.scenario.cell_file import load_cell
 from regrasp.interfaces.cell import Box, Cell, FixedMount
@@ -74,7 +74,7 @@ HEADLINE = tuple(c.name for c in _ALL if not c.shadow)
 
 def study_cell(name: str = "thesis", overrides: Sequence[str] = ()) -> Cell:
     """The cell of that name, or file, with the cable slack and "key.path=value" texts laid over. Raises `Findings`."""
-    assignments, wrong = read([f"hidden.cable.stiffness.zero={STIFFNESS}", *overrides])
+    assignments, wrong = parse_overrides([f"hidden.cable.stiffness.zero={STIFFNESS}", *overrides])
     if wrong:
         raise Findings(wrong)
     return load_cell(resolve("cell", name, Path()), assignments)

@@ -23,17 +23,17 @@ class GripWatch:
 
     def __init__(self) -> None:
         self._offsets: deque[tuple[float, NDArray[np.float64]]] = deque()
-        self.slid_at: float | None = None  # since when it slides; None while it sits fast
+        self.sliding_since: float | None = None  # since when it slides; None while it sits fast
 
-    def feed(self, now: float, offset: NDArray[np.float64]) -> None:
+    def update(self, now: float, offset: NDArray[np.float64]) -> None:
         """Take the end's place (3,) m in the hand at second `now`."""
         self._offsets.append((now, offset))
         while self._offsets[0][0] < now - SLIDE_SECONDS:
             self._offsets.popleft()
         if float(np.linalg.norm(offset - self._offsets[0][1])) < SLIDE:
-            self.slid_at = None
-        elif self.slid_at is None:
-            self.slid_at = now
+            self.sliding_since = None
+        elif self.sliding_since is None:
+            self.sliding_since = now
 
 
 class Judge:
@@ -48,7 +48,7 @@ class Judge:
         self._unheld_at: float | None = None  # since when not both pads touch it, or it slid before that
         self._untouched_at: float | None = None  # since when none does
         self._still_since: float | None = None
-        self.takes = 0  # times that the hand took hold of it
+        self.grasps = 0  # times that the hand took hold of it
         self.losses: list[float] = []
         self.settled_pixels: int | None = None  # of the connector in the rear image once it had settled after a loss
         self.found_by: str | None = None  # the camera that found the connector first after its loss
@@ -63,7 +63,7 @@ class Judge:
         self._held_since = None
         if self._was_held and not self._truth.stowed():
             if self._unheld_at is None:
-                self._unheld_at = now if self._grip.slid_at is None else self._grip.slid_at
+                self._unheld_at = now if self._grip.sliding_since is None else self._grip.sliding_since
             if self._truth.touched():
                 self._untouched_at = None
             else:
@@ -76,10 +76,10 @@ class Judge:
 
     def _watch_hold(self, now: float) -> None:
         self._held_since = now if self._held_since is None else self._held_since
-        self._grip.feed(now, self._truth.connector_in_hand())
+        self._grip.update(now, self._truth.connector_in_hand())
         self._unheld_at = self._untouched_at = self._still_since = None
         if not self._was_held and now - self._held_since >= HOLD_SECONDS:
-            self.takes += 1
+            self.grasps += 1
             self._was_held = True
 
     def slips(self, belief: Belief) -> tuple[Slip, ...]:
@@ -113,7 +113,7 @@ class Judge:
         """What must not be more than the scenario says."""
         wanted = self._expect
         yield from _at_most("sim_seconds", self._now, wanted.sim_seconds)
-        yield from _at_most("tries", self.takes, wanted.tries)
+        yield from _at_most("tries", self.grasps, wanted.tries)
         yield from _at_most("detection_delay", self._longest_delay(belief), wanted.detection_delay)
         peak = max(self._truth.contact_peaks().values(), default=0.0)
         yield from _at_most("unintended_force", peak, wanted.unintended_force)

@@ -7,7 +7,7 @@ from typer.testing import CliRunner
 
 from regrasp.app.cli.commands import app
 from regrasp.app.records.explain import explanation
-from regrasp.app.records.history import Course
+from regrasp.app.records.history import NodeHistory
 from regrasp.app.records.reader import Event, read_record
 from regrasp.app.records.result import Attempt, Link
 from regrasp.app.records.timeline import timeline
@@ -139,8 +139,8 @@ def attempts(*lines: tuple[str, float, float, str]) -> list[Attempt]:
     return [Attempt(path, start, end, status) for path, start, end, status in lines]  # type: ignore[arg-type]
 
 
-def ticks(*lines: tuple[float, str, str]) -> Course:
-    return Course(executions(lines))
+def ticks(*lines: tuple[float, str, str]) -> NodeHistory:
+    return NodeHistory(executions(lines))
 
 
 def test_rounds_that_went_alike_are_folded() -> None:
