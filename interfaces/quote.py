@@ -1,20 +1,20 @@
-"""How messages quote what somebody wrote, and what they suggest in place of an unknown name."""
+"""How messages quote a user's input, and what they suggest in place of an unknown name."""
 
 from collections.abc import Iterable
 from difflib import get_close_matches
 from itertools import chain
 
-MOST = 60  # letters
+MAX_QUOTE = 60  # characters; choice: a quotation then fits into one line of a terminal with words around it
 MAX_LISTED = 12  # known names that are listed after an unknown one
 
 
-def cut(text: str, most: int = MOST) -> str:
-    """The text, its middle left out where it is longer than `most` letters."""
-    return text if len(text) <= most else f"{text[: most - 23]}...{text[-20:]}"
+def cut(text: str, longest: int = MAX_QUOTE) -> str:
+    """The text; if it has more than `longest` characters (at least 23), dots replace its middle. 20 stay at its end."""
+    return text if len(text) <= longest else f"{text[: longest - 23]}...{text[-20:]}"
 
 
 def quoted(value: object) -> str:
-    """The value as Python writes it, cut."""
+    """The value's `repr`, cut to `MAX_QUOTE` characters."""
     return cut(repr(value))
 
 
@@ -30,7 +30,7 @@ def closest(name: str, names: Iterable[str], compared: int | None = None) -> str
     """
     known = sorted(names)
     same = (other for other in known if other.casefold() == name.casefold())
-    return next(chain(same, get_close_matches(name[:MOST], known[:compared], n=1)), None)
+    return next(chain(same, get_close_matches(name[:MAX_QUOTE], known[:compared], n=1)), None)
 
 
 def nearest(name: str, names: Iterable[str], what: str = "there are", compared: int | None = None) -> str:

@@ -11,7 +11,7 @@ from regrasp.app.cli import calibrate, detector, perceive, records, run, scenari
 from regrasp.app.cli.options import EXIT_BAD_INPUT, EXIT_UNMET
 from regrasp.app.files.findings import Findings
 from regrasp.app.interrupts import EXIT_INTERRUPTED
-from regrasp.interfaces.quote import MOST, cut, printable
+from regrasp.interfaces.quote import MAX_QUOTE, cut, printable
 
 COMMANDS = (  # in the order of their use
     "run",
@@ -44,7 +44,7 @@ class _Group(TyperGroup):
                 typer.echo(str(finding), err=True)
             raise typer.Exit(EXIT_BAD_INPUT) from None
         except typer.BadParameter as error:  # quotes all that was typed
-            error.message = cut(error.message.removeprefix("Value error, "), 3 * MOST)
+            error.message = cut(error.message.removeprefix("Value error, "), 3 * MAX_QUOTE)
             raise
         except OSError as error:  # a disk that is full, a name that is too long
             if error.errno == errno.EPIPE:

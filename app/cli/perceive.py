@@ -23,7 +23,6 @@ T = TypeVar("T")
 DRAWING_SUFFIXES = (".png", ".jpg", ".jpeg")  # of a drawing
 # Of these a snapshot writes some; a camera pose that an earlier one left would not be that of its pictures.
 SNAPSHOT_FILES = ("rgb.png", "rgb_001.png", "depth.png", "depth_001.png", "intrinsics.yaml", "camera_pose.yaml")
-LEAST_SATURATION = 0.2  # choice: with less a colour is grey, and all that is grey would be the connector's
 
 
 def add_to(app: typer.Typer) -> None:
@@ -153,15 +152,18 @@ def _bad_drawing(draw: Path, inputs: Sequence[Path]) -> list[Finding]:
     return folders.file_findings(draw)
 
 
-def _color(text: str, wrong: list[Finding]) -> Color | None:
-    """A colour of "R,G,B", each then 0 to 1. What is wrong is added to `wrong`."""
+def _color(text: str, wrong: list[Finding], min_saturation: float = 0.2) -> Color | None:
+    """The colour of "R,G,B", each then 0 to 1. What is wrong is added to `wrong`.
+
+    Below `min_saturation` (of HSV; choice) a colour is refused as grey: every grey thing would look like the connector.
+    """
     parts = text.split(",")
     right = "write three numbers of 0 to 255, such as 191,13,15"
     if len(parts) != 3 or not all(re.fullmatch(r"\s*\d{1,3}\s*", part) and int(part) <= 255 for part in parts):
         wrong.append(Finding("--color", 0, f"{quoted(text)} is no colour; {right}"))
         return None
     red, green, blue = (int(part) / 255 for part in parts)
-    if max(red, green, blue) - min(red, green, blue) < LEAST_SATURATION * max(red, green, blue, 1e-9):
+    if max(red, green, blue) - min(red, green, blue) < min_saturation * max(red, green, blue, 1e-9):
         wrong.append(
             Finding(
                 "--color", 0, f"{quoted(text)} is grey, and nothing else tells it from its surroundings; name a hue"

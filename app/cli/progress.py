@@ -9,11 +9,10 @@ from rich.console import Console
 
 from regrasp.app.cli.options import LogLevel
 from regrasp.app.interrupts import interruptible
-from regrasp.app.records.summary import in_words
+from regrasp.app.records.summary import event_words
 from regrasp.app.run.observers import Observers
 from regrasp.interfaces.quote import printable
 
-QUIET_SECONDS = 5.0  # simulated, between two lines of a leaf that goes on
 LEVELS = ("debug", "info", "warning", "error")
 
 
@@ -30,7 +29,7 @@ def shown_progress(quiet: bool, level: LogLevel = None) -> Iterator[Observers]:
     def event(values: Mapping[str, Any]) -> None:
         if values["level"] in shown_levels:
             rest = {name: value for name, value in values.items() if name not in ("t", "level", "event", "node")}
-            what = in_words(str(values["event"]), rest)
+            what = event_words(str(values["event"]), rest)
             told = printable(f"{values['t']:7.2f} s  {values['level']:<7}  {values.get('node') or '-'}  {what}")
             if console.is_terminal:
                 console.print(told, soft_wrap=True)
@@ -59,14 +58,15 @@ def shown_progress(quiet: bool, level: LogLevel = None) -> Iterator[Observers]:
 
 
 class _Lines:
-    """A line when the leaf changes, at most one a simulated second, and one now and then while it goes on."""
+    """Prints a line when the leaf changes, and again while it goes on; `seconds` are simulated, between two lines."""
 
-    def __init__(self) -> None:
+    def __init__(self, seconds_of_new: float = 1.0, seconds_of_same: float = 5.0) -> None:
+        self.seconds_of_new, self.seconds_of_same = seconds_of_new, seconds_of_same
         self.time = float("-inf")
         self.leaf = ""
 
     def show(self, time: float, leaf: str) -> None:
-        if time - self.time >= (QUIET_SECONDS if leaf == self.leaf else 1.0):
+        if time - self.time >= (self.seconds_of_same if leaf == self.leaf else self.seconds_of_new):
             self.time, self.leaf = time, leaf
             _print(f"{time:7.1f} s  {leaf}")
 
@@ -74,5 +74,5 @@ class _Lines:
 def _print(line: str) -> None:
     try:
         print(line, file=sys.stderr, flush=True)
-    except BrokenPipeError:  # who watched has gone: as Ctrl-C, with the record kept
+    except BrokenPipeError:  # the reader of stderr has gone: end as by Ctrl-C, with the record kept
         raise KeyboardInterrupt from None

@@ -10,16 +10,18 @@ from regrasp.app.records.timeline import event_text, timeline, wrapped
 from regrasp.interfaces.quote import printable
 
 REPORT_WIDTH = 100  # columns of a page in a test report
-LAST_EVENTS = 8  # shown of a run without a result
 
 
-def explanation(record: RunRecord, width: int) -> str:
-    """The page, in lines of about `width` columns; nothing in it steers a terminal."""
-    page = _page(record, width) if record.result is None else _whole(record, record.result, width)
+def explanation(record: RunRecord, width: int, last_events: int = 8) -> str:
+    """The page, in lines of about `width` columns, without control characters.
+
+    Of a run without a result the `last_events` last events are shown.
+    """
+    page = _unfinished(record, width, last_events) if record.result is None else _finished(record, record.result, width)
     return "\n".join(printable(line).rstrip() for line in page) + "\n"
 
 
-def _whole(record: RunRecord, result: Result, width: int) -> Iterator[str]:
+def _finished(record: RunRecord, result: Result, width: int) -> Iterator[str]:
     yield f"{headline(result)}, {result.sim_seconds:.1f} simulated seconds"
     yield from _what_was_run(record, result.versions)
     yield from _section("Why it ended so", _why(result, width))
@@ -31,7 +33,7 @@ def _whole(record: RunRecord, result: Result, width: int) -> Iterator[str]:
     yield from _section("Traceback", (result.traceback or "").splitlines())
 
 
-def _page(record: RunRecord, width: int) -> Iterator[str]:
+def _unfinished(record: RunRecord, width: int, last_events: int) -> Iterator[str]:
     """Of a run without a result."""
     begin = record.begin
     ran = what_ran(
@@ -52,7 +54,7 @@ def _page(record: RunRecord, width: int) -> Iterator[str]:
         leaves = [f"{leaf}: its tick at {at:.2f} s has not ended", *(other for other in leaves if other != leaf)]
     yield from _section(f"What was running at {record.end:.2f} s, when the record ends", leaves)
     events = [event for event in record.events if event.event != "begin"]
-    last = (f"{e.t:8.2f}  {e.node or '-'}  {event_text(e)}" for e in events[-LAST_EVENTS:])
+    last = (f"{e.t:8.2f}  {e.node or '-'}  {event_text(e)}" for e in events[-last_events:])
     yield from _section("The last events", (line for text in last for line in wrapped(text, width - 2)))
 
 

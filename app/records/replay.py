@@ -13,7 +13,7 @@ from regrasp.interfaces.quote import nearest, printable, quoted
 from regrasp.trees.element import TreeSyntaxError
 from regrasp.trees.graph import Node, read_graph
 
-SLACK = 1e-9  # s, for a second that was typed
+TIME_TOLERANCE = 1e-9  # s: a typed second differs from a recorded one by rounding
 
 
 @dataclass
@@ -56,7 +56,7 @@ class Replay:
             raise Findings(
                 [Finding(shown(record.folder), 0, "nothing happened in this run; there is nothing to replay")]
             )
-        last_shown = max(end, min(changed)) + SLACK
+        last_shown = max(end, min(changed)) + TIME_TOLERANCE
         self.changes = [changes[t] for t in sorted(changed) if t <= last_shown]
         self.rows = _rows(record)
         self._times = [change.t for change in self.changes]
@@ -75,7 +75,7 @@ class Replay:
 
     def at(self, seconds: float) -> int:
         """Index of the last change at or before that second, the first one if there is none."""
-        return max(0, bisect_right(self._times, seconds + SLACK) - 1)
+        return max(0, bisect_right(self._times, seconds + TIME_TOLERANCE) - 1)
 
     def known(self, part: str) -> bool:
         """Whether a node of the tree, or of an event, has `part` in its path."""
@@ -84,7 +84,7 @@ class Replay:
     def check(self, begin: float, part: str) -> None:
         """Raises `Findings` where nothing is left to show from second `begin` or of paths with `part`."""
         found = []
-        if begin > self._times[-1] + SLACK:
+        if begin > self._times[-1] + TIME_TOLERANCE:
             wrong = f"{begin:g} s is after the last change, at {self._times[-1]:.2f} s; name an earlier second"
             found.append(Finding("--from", 0, wrong))
         if not self.known(part):
@@ -106,7 +106,7 @@ class Replay:
 
     def lines(self, begin: float, part: str) -> Iterator[str]:
         """Changes and events from second `begin` of the nodes whose path has `part` in it, a line each."""
-        for change in self.changes[bisect_left(self._times, begin - SLACK) :]:
+        for change in self.changes[bisect_left(self._times, begin - TIME_TOLERANCE) :]:
             yield from (
                 printable(f"{change.t:8.2f}  {tick.path}  {tick.status}") for tick in change.nodes if part in tick.path
             )

@@ -43,7 +43,7 @@ def versions() -> dict[str, str]:
 
 @dataclasses.dataclass(frozen=True)
 class Expectation:
-    """One expectation of the scenario: what came out and what was asked."""
+    """One expectation of the scenario: what came out (`value`) and what was expected (`limit`)."""
 
     name: str
     met: bool

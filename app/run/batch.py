@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from regrasp.app.records.record import finish_killed
 from regrasp.app.records.result import Outcome, Result
-from regrasp.app.records.summary import asked
+from regrasp.app.records.summary import limit_words
 from regrasp.app.run.processes import Done, run_each
 from regrasp.app.scenario.load import Scenario
 from regrasp.interfaces.cause import Cause, CauseCode
@@ -145,7 +145,7 @@ def row_of(run: Run, done: Done[Result]) -> Row:
         detected_by=[s.detected_by for s in result.slips if s.detected_by],
         unintended_force=values.get("unintended_force"),
         unmet=[e.name for e in result.expectations if not e.met],
-        why="" if result.succeeded else failure(result),
+        why="" if result.succeeded else failure_words(result),
         sim_seconds=result.sim_seconds,
         wall_seconds=result.wall_seconds,
         real_time_factor=result.real_time_factor,
@@ -153,7 +153,9 @@ def row_of(run: Run, done: Done[Result]) -> Row:
     )
 
 
-def failure(result: Result) -> str:
+def failure_words(result: Result) -> str:
     """Why a run did not come out as expected, in words: its cause and every unmet expectation."""
     cause = [f"{result.cause.code}: {result.cause.message}"] if result.cause else []
-    return "; ".join([*cause, *(f"{e.name} is {e.value}, asked {asked(e)}" for e in result.expectations if not e.met)])
+    return "; ".join(
+        [*cause, *(f"{e.name} is {e.value}, expected {limit_words(e)}" for e in result.expectations if not e.met)]
+    )

@@ -1,4 +1,4 @@
-"""A run as a film: overview, both cameras, and a few lines of text."""
+"""Video frames (overview, both cameras, a few lines of text), and their encoding as a film."""
 
 import contextlib
 import subprocess
@@ -13,14 +13,14 @@ from imageio_ffmpeg import get_ffmpeg_exe
 from numpy.typing import NDArray
 
 RgbImage = NDArray[np.uint8]
-# In pieces of a second that play without the end, should ffmpeg be killed; one whole film when it is closed.
+# One file, in fragments of 1 s: if ffmpeg is killed, those that are written can still be played.
 _KEPT = ["-movflags", "+hybrid_fragmented", "-frag_duration", "1000000"]
 
 # Width and height are multiples of 16, as h264 has it. The cameras' 848x480 halved give the right column.
 SIZE = (1280, 544)
 OVERVIEW_SIZE = (856, 480)  # what an overview camera should render, to be shown without scaling
 _CAMERA_SIZE = (424, 240)
-_INK, PAPER = (235, 235, 235), 24
+_INK, PAPER = (235, 235, 235), 24  # of 255: light letters on a dark ground
 
 
 def compose(overview: RgbImage | None, rear: RgbImage | None, wrist: RgbImage | None, lines: Sequence[str]) -> RgbImage:

@@ -1,6 +1,7 @@
-"""What in a cell cannot be: parts that stand in one another, joints past their limits, a cable that is too short."""
+"""Checks of a cell's layout: parts that overlap, joints past their limits, a cable that is too short."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import lru_cache
 from itertools import combinations
 from typing import NamedTuple
@@ -11,7 +12,6 @@ from scipy.spatial.transform import RigidTransform
 from regrasp.app.files.findings import Finding
 from regrasp.app.files.yaml_lines import Document, Path
 from regrasp.app.scenario.placement import (
-    FloatArray,
     arm_base,
     cable_at_start,
     cable_error,
@@ -23,13 +23,19 @@ from regrasp.app.scenario.placement import (
     sleeping_arm_cubes,
     socket_block,
 )
+from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cell import PLUGGED_INTO, Cell, FixedMount, KnownCell
 from regrasp.interfaces.fault import JOINT_NAMES
 from regrasp.interfaces.quote import cut, quoted
 from regrasp.interfaces.scene import GRAVITIES
 
-MOST_OVERLAP = 0.005  # metres: the spheres that fill an arm stand out of it by less
-ENDS = 0.05  # metres of the cable at its sockets, which are built in
+
+@dataclass(frozen=True)
+class CellLayoutParameters:
+    """How deep the parts of a cell may reach into one another, metres."""
+
+    overlap: float = 0.005  # the spheres that fill an arm stand out of it by less
+    cable_ends: float = 0.05  # of the cable at both ends: they lie in their sockets
 
 
 class Part(NamedTuple):
@@ -41,17 +47,19 @@ class Part(NamedTuple):
     halves: FloatArray
 
 
-def layout_findings(document: Document, cell: Cell) -> list[Finding]:
-    """What is wrong with a cell although each of its values is right."""
+def layout_findings(
+    document: Document, cell: Cell, parameters: CellLayoutParameters = CellLayoutParameters()
+) -> list[Finding]:
+    """What is wrong with a cell although each of its values is right by itself."""
     known = cell.known
     found = [
         *_joints(document, known),
-        *_overlaps(document, known),
+        *_overlaps(document, known, parameters.overlap),
         *_cable(document, cell),
         *_clip(document, known),
         *_sight(document, known),
     ]
-    return found or [*_in_the_way(document, cell), *_plug(document, known)]  # which take a moment
+    return found or [*_in_the_way(document, cell, parameters), *_plug(document, known)]  # these take a moment
 
 
 def _joints(document: Document, known: KnownCell) -> Iterator[Finding]:
@@ -65,16 +73,16 @@ def _joints(document: Document, known: KnownCell) -> Iterator[Finding]:
                 yield Finding(*document.place(("known", "arms", i, "sleep", j)), told + inside)
 
 
-def _overlaps(document: Document, known: KnownCell) -> Iterator[Finding]:
+def _overlaps(document: Document, known: KnownCell, most: float) -> Iterator[Finding]:
     """Arms, cameras, the plugged and the stowed connector in other parts of the cell."""
     parts = [*_parts(known)]
     bases = [Part(("known", "arms", i), *arm_base(arm)) for i, arm in enumerate(known.arms)]
     for part in [*parts, *bases]:
         for name, depth in _inside(known, part, bases):
-            if depth > MOST_OVERLAP:
+            if depth > most:
                 message = f"{cut(part.name)} reaches {depth:.3f} m into {name}; move one of them"
                 yield Finding(*document.place(part.path), message)
-    if (depth := _between_the_arms(known)) > MOST_OVERLAP:
+    if (depth := _between_the_arms(known)) > most:
         message = f"the arms asleep reach {depth:.3f} m into each other; change their sleep or their bases"
         yield Finding(*document.place(("known", "arms")), message)
     for name, place in fixed_cameras(known):
@@ -135,17 +143,18 @@ def _parts(known: KnownCell) -> Iterator[Part]:
         yield Part(("known", "sockets", i), *socket_block(socket))
 
 
-def _in_the_way(document: Document, cell: Cell) -> Iterator[Finding]:
-    """Boxes through which the cable hangs at the start, in one gravity or the other, but at its ends."""
+def _in_the_way(document: Document, cell: Cell, parameters: CellLayoutParameters) -> Iterator[Finding]:
+    """Boxes through which the cable hangs at the start, in either gravity; its ends are left out."""
+    ends = parameters.cable_ends
     for part in _parts(cell.known):
         if part.path[1] == "sockets":
             continue
         for gravity in GRAVITIES:
             points = np.array(cable_at_start(cell, gravity))
-            points = points[(along := np.linspace(0.0, cell.hidden.cable.length, len(points))) > ENDS]
-            points = points[: -np.count_nonzero(along > cell.hidden.cable.length - ENDS)]
+            points = points[(along := np.linspace(0.0, cell.hidden.cable.length, len(points))) > ends]
+            points = points[: -np.count_nonzero(along > cell.hidden.cable.length - ends)]
             depth = line_depth(part.halves, part.center, points, cell.hidden.cable.radius) if len(points) > 1 else 0.0
-            if depth > max(MOST_OVERLAP, cable_error(cell, gravity)):
+            if depth > max(parameters.overlap, cable_error(cell, gravity)):
                 told = (
                     f"{cut(part.name)} reaches {depth:.3f} m into the cable at the start ({gravity} gravity); move it"
                 )
@@ -154,7 +163,7 @@ def _in_the_way(document: Document, cell: Cell) -> Iterator[Finding]:
 
 
 def _sight(document: Document, known: KnownCell) -> Iterator[Finding]:
-    """The rear camera, which watches the carrying, must see where it begins or ends."""
+    """The rear camera watches the carrying: it must see where this begins or where it ends."""
     camera = known.camera("rear")
     if not isinstance(camera.mount, FixedMount):
         return

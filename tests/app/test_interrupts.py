@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from regrasp.app.interrupts import BURST
+from regrasp.app.interrupts import StopRequests
 from regrasp.app.records.explain import explanation
 from regrasp.app.records.reader import read_record
 from regrasp.app.records.record import AT_WORK, Record, leaf_at_work
@@ -96,7 +96,7 @@ def test_a_second_ctrl_c_ends_a_leaf_that_hangs_in_its_first_tick_and_names_it(s
     process = start("Hangs")
     until(at_work, process)
     process.send_signal(signal.SIGINT)
-    time.sleep(BURST + 0.2)
+    time.sleep(StopRequests().burst + 0.2)
     process.send_signal(signal.SIGINT)
     out, _ = process.communicate(timeout=PATIENCE)
     assert process.returncode == 130
@@ -175,9 +175,8 @@ def answer() -> int:
     return 7
 
 
-def test_a_task_that_takes_too_long_is_stopped_and_the_others_go_on(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("regrasp.app.run.processes.GRACE", 0.5)
-    with closing(run_each([hang, answer, hang_deaf], 3, wall_limit=20.0)) as ended:
+def test_a_task_that_takes_too_long_is_stopped_and_the_others_go_on() -> None:
+    with closing(run_each([hang, answer, hang_deaf], 3, wall_limit=20.0, grace=0.5)) as ended:
         done = sorted(ended)
     assert [(one.value, one.timed_out) for one in done] == [(None, True), (7, False), (None, True)]
     assert {one.error for one in done} == {"stopped after 20 s of wall time", ""}

@@ -15,9 +15,7 @@ def belief_state(services: Services) -> BeliefState:
         connector=_pose(belief.connector),
         sure=belief.sure,
         found_by=belief.found_by,
-        last_seen=None
-        if last is None
-        else Sighting(round(last.stamp, 3), last.camera, tuple(last.position.round(4).tolist())),
+        last_seen=None if last is None else _sighting(last),
         arms={name: _arm(services, name) for name in services.motion.arms},
         occupied_voxels=len(services.perception.occupancy.occupied_points()),
         vain_searches=belief.vain_searches,

@@ -74,8 +74,8 @@ def test_run_ends_with_a_summary_on_stdout_and_progress_on_stderr(calls: list[Si
     assert ran.exit_code == 0
     assert ran.stdout.splitlines() == [
         "mine, seed 7: stowed, 2 of 2 expectations met",
-        "  ✓ slips: 1 (asked: at least 1 noticed, none unseen)",
-        "  ✓ unintended_force: 1.23 (asked: at most 5)",
+        "  ✓ slips: 1 (expected: at least 1, all noticed)",
+        "  ✓ unintended_force: 1.23 (expected: at most 5)",
         "  slip    lost at 12.00 s, noticed at 12.25 s by gap",
         "  record  runs/mine-7-1",
         "  time    80.0 s simulated in 100.0 s, real-time factor 0.80, renderer moderngl",
@@ -100,7 +100,7 @@ def test_what_was_not_met_exits_1_with_the_cause(monkeypatch: pytest.MonkeyPatch
     ran = invoke("run", "mine.yaml")
     assert ran.exit_code == 1
     assert "  cause   search_exhausted: 18 stops, nothing seen (root/search)" in ran.stdout
-    assert "  ✗ slips: 0 (asked: at least 1 noticed, none unseen)" in ran.stdout
+    assert "  ✗ slips: 0 (expected: at least 1, all noticed)" in ran.stdout
 
 
 def test_ctrl_c_reaches_the_episode_between_two_ticks(monkeypatch: pytest.MonkeyPatch) -> None:

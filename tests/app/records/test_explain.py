@@ -63,8 +63,8 @@ def test_the_page_of_a_run_that_stopped_safely(tmp_path: Path) -> None:
         "  noticed a loss at 1.50 s by gap",
         "",
         "What was expected",
-        "  ✗ outcome: safe_stop (asked: stowed)",
-        "  ✓ slips: 1 (asked: at least 1 noticed, none unseen)",
+        "  ✗ outcome: safe_stop (expected: stowed)",
+        "  ✓ slips: 1 (expected: at least 1, all noticed)",
     ]
 
 
