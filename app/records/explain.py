@@ -1,4 +1,4 @@
-"""A page about a run for a person: what it was, what was tried, why it ended so, and what the robot knew."""
+"""A page of text about a run: what was run and tried, why it ended so, and what the robot knew."""
 
 from collections.abc import Iterator
 
@@ -34,7 +34,7 @@ def _finished(record: RunRecord, result: Result, width: int) -> Iterator[str]:
 
 
 def _unfinished(record: RunRecord, width: int, last_events: int) -> Iterator[str]:
-    """Of a run without a result."""
+    """The page of a run without a result."""
     begin = record.begin
     ran = what_ran(
         str(begin.get("scenario", "a run")), str(begin.get("case", DEFAULT_CASE)), begin.get("seed", "unknown")
@@ -45,7 +45,7 @@ def _unfinished(record: RunRecord, width: int, last_events: int) -> Iterator[str
     yield from _tried(record, width)
     statuses = {tick.path: tick.status for tick in record.ticks}
     running = sorted((p for p, status in statuses.items() if status == "RUNNING"), key=lambda path: path.split("/"))
-    # Whatever stands below a path comes right after it.
+    # Paths below another path come right after it.
     leaves = [
         path for path, after in zip(running, [*running[1:], ""], strict=False) if not after.startswith(path + "/")
     ]
@@ -76,7 +76,7 @@ def _what_was_run(record: RunRecord, versions: dict[str, str]) -> Iterator[str]:
 
 
 def _section(title: str, lines: Iterator[str] | list[str]) -> Iterator[str]:
-    """A heading and its indented lines, nothing where there are none."""
+    """A heading and its indented lines; nothing if there are none."""
     found = [*lines]
     if found:
         yield from ("", title)
@@ -100,7 +100,7 @@ def _why(result: Result, width: int) -> Iterator[str]:
 
 
 def _relative(chain: tuple[Link, ...]) -> Iterator[str]:
-    """Each link's path without the path of the link above it, indented."""
+    """Each link's path, relative to the link above it, and indented."""
     above = ""
     for depth, link in enumerate(chain):
         yield "  " * min(depth, 12) + link.path.removeprefix(above)

@@ -1,4 +1,4 @@
-"""Where a run's record goes, and whether it can."""
+"""Folders of records: new ones, and checks that a folder or file can be written."""
 
 import contextlib
 import hashlib
@@ -17,9 +17,9 @@ FILES = (*RUN_FILES, "scenario.yaml", "cell.yaml", "tree.xml")  # of a run's fol
 
 
 def new_folder(name: str, within: Path = RUNS) -> Path:
-    """Make the first folder NAME-1, NAME-2, ... that does not exist, in the folder `within`.
+    """Create the first of NAME-1, NAME-2, ... that does not exist in the folder `within`.
 
-    The folder is made at once: of two runs that begin together each gets its own.
+    It is created at once, so that two runs that start together get different folders.
 
     Raises:
         OSError: none can be made.
@@ -34,7 +34,7 @@ def new_folder(name: str, within: Path = RUNS) -> Path:
 
 
 def leave_if_empty(folder: Path) -> None:
-    """Take a folder away in which nothing was written."""
+    """Remove a folder if it is empty."""
     with contextlib.suppress(OSError):
         folder.rmdir()
         if folder.parent == RUNS:
@@ -42,7 +42,7 @@ def leave_if_empty(folder: Path) -> None:
 
 
 def folder_name(case: str) -> str:
-    """A case's name as that of a folder: what is no plain letter gives way to _ and a digest that keeps names apart."""
+    """A case's name as a folder name: special characters become _, and a digest keeps such names distinct."""
     plain = re.sub(r"[^A-Za-z0-9_.,=+-]+", "_", case)[:100].strip(".") or "_"
     return plain if plain == case else f"{plain}-{hashlib.sha256(case.encode()).hexdigest()[:8]}"
 
@@ -53,7 +53,7 @@ def taken_names(out: Path) -> list[str]:
 
 
 def existing_run_findings(out: Path) -> list[Finding]:
-    """The finding of a folder that another run has taken, [] of one that is free."""
+    """The finding that another run's files are in the folder; [] if there are none."""
     there = taken_names(out)
     if set(there) & set(RUN_FILES):
         return [Finding(shown(out), 0, f"holds a run already ({', '.join(there)}); name another folder")]
@@ -63,7 +63,7 @@ def existing_run_findings(out: Path) -> list[Finding]:
 
 
 def run_folder_findings(out: Path) -> list[Finding]:
-    """Why no run can be written to `out`; nothing is left behind by the look."""
+    """Why no run can be written to `out`; [] if one can. The check leaves nothing behind."""
     if there := existing_run_findings(out):
         return there
     if out == Path():
@@ -72,7 +72,7 @@ def run_folder_findings(out: Path) -> list[Finding]:
 
 
 def file_findings(file: Path, *, new: bool = False) -> list[Finding]:
-    """Why no file can be written there; nothing is left behind by the look. `new`: one that exists is not replaced."""
+    """Why this file cannot be written; [] if it can. The check leaves nothing behind. `new`: it must not exist yet."""
     if os.path.isdir(file):
         return [Finding(shown(file), 0, "is a folder; name a file")]
     if real_path(file).is_symlink():
@@ -83,7 +83,7 @@ def file_findings(file: Path, *, new: bool = False) -> list[Finding]:
 
 
 def folder_findings(out: Path) -> list[Finding]:
-    """Why no folder `out` can be made or written in; nothing is left behind by the look."""
+    """Why the folder `out` cannot be made or written in; [] if it can. The check leaves nothing behind."""
     spot = out.absolute()
     while not os.path.lexists(spot) and spot != spot.parent:
         spot = spot.parent

@@ -1,4 +1,4 @@
-"""A record change by change: what every node was after each, as lines or for a screen."""
+"""Replays a record change by change: the status of every node after each, as lines or for a screen."""
 
 import math
 from bisect import bisect_left, bisect_right
@@ -18,7 +18,7 @@ TIME_TOLERANCE = 1e-9  # s: a typed second differs from a recorded one by roundi
 
 @dataclass
 class Change:
-    """One tick in which something changed: the nodes' changes and ends, and the events, in their order."""
+    """A tick in which something changed: the lines of ticks.jsonl and the events of its second `t`, in their order."""
 
     t: float
     nodes: list[Tick] = field(default_factory=list)
@@ -27,7 +27,7 @@ class Change:
 
 @dataclass(frozen=True)
 class TreeRow:
-    """A node by its path, its type as the file writes it, and how deep it stands (the root at 0)."""
+    """A node: its path, its element name in the tree file, and its depth (0 for the root)."""
 
     path: str
     type: str
@@ -37,7 +37,7 @@ class TreeRow:
 class Replay:
     """The changes of a record up to second `end`, and the rows of its tree in tree order.
 
-    A tick in which nodes only end as they did before is left out: a guard that is asked at every tick would fill all.
+    A tick in which nodes only end as they did before is left out: a guard that is ticked every time would fill all.
     """
 
     def __init__(self, record: RunRecord, end: float = math.inf) -> None:
@@ -74,7 +74,7 @@ class Replay:
         return statuses[last - 1] if last else "INVALID"
 
     def at(self, seconds: float) -> int:
-        """Index of the last change at or before that second, the first one if there is none."""
+        """Index of the last change at or before this second, 0 if there is none."""
         return max(0, bisect_right(self._times, seconds + TIME_TOLERANCE) - 1)
 
     def known(self, part: str) -> bool:
@@ -82,7 +82,7 @@ class Replay:
         return any(part in path for path in self._paths())
 
     def check(self, begin: float, part: str) -> None:
-        """Raises `Findings` where nothing is left to show from second `begin` or of paths with `part`."""
+        """Raises `Findings` if nothing is left to show from second `begin`, or of paths that contain `part`."""
         found = []
         if begin > self._times[-1] + TIME_TOLERANCE:
             wrong = f"{begin:g} s is after the last change, at {self._times[-1]:.2f} s; name an earlier second"
@@ -98,14 +98,14 @@ class Replay:
         return [*(row.path for row in self.rows), *events]
 
     def next_failure(self, index: int, part: str = "") -> int | None:
-        """Index of the next change in which a node fails whose path has `part` in it."""
+        """Index of the next change in which a node fails whose path contains `part`; None if there is none."""
         later = range(index + 1, len(self.changes))
         return next(
             (i for i in later if any(t.status == "FAILURE" and part in t.path for t in self.changes[i].nodes)), None
         )
 
     def lines(self, begin: float, part: str) -> Iterator[str]:
-        """Changes and events from second `begin` of the nodes whose path has `part` in it, a line each."""
+        """A line for each change and event from second `begin` of the nodes whose path contains `part`."""
         for change in self.changes[bisect_left(self._times, begin - TIME_TOLERANCE) :]:
             yield from (
                 printable(f"{change.t:8.2f}  {tick.path}  {tick.status}") for tick in change.nodes if part in tick.path
@@ -118,7 +118,7 @@ class Replay:
 
 
 def check_span(begin: float | None, end: float | None) -> None:
-    """Raises `Findings` for seconds that are none, and for an end before the beginning."""
+    """Raises `Findings` for seconds that are negative or not finite, and for an end before the beginning."""
     found = [
         Finding(option, 0, f"{seconds:g} is no second of a run; write a number such as 8.5")
         for option, seconds in (("--from", begin), ("--to", end))
@@ -131,7 +131,7 @@ def check_span(begin: float | None, end: float | None) -> None:
 
 
 def _rows(record: RunRecord) -> list[TreeRow]:
-    """The tree's nodes: of its copy in the record, and what else the ticks name (all, where there is no copy)."""
+    """The nodes of the record's copy of the tree, then other nodes that the ticks name (all, if there is no copy)."""
     file = record.folder / "tree.xml"
     rows: list[TreeRow] = []
     if file.exists():

@@ -30,7 +30,7 @@ STOP_SECONDS = 0.3  # simulated: after a stop both arms must be at rest within t
 
 @dataclass
 class Ending:
-    """How a run ended, and what decided it."""
+    """How a run ended and what decided it. `chain`: the nodes from the root down to the one that decided."""
 
     outcome: Outcome
     cause: Cause | None = None
@@ -92,7 +92,7 @@ def run_episode(
 
 
 def _run(episode: Episode, scenario: Scenario, film: Film, on_tick: Progress, log: Any) -> Ending:
-    """Tick until the tree ends, the time is over or somebody interrupts; the arms are stopped in the end."""
+    """Tick until the tree ends, the time limit is reached or somebody interrupts; then stop the arms."""
     root = episode.tree.root
     try:
         ending = _loop(episode, scenario, film, on_tick)
@@ -132,7 +132,7 @@ def _loop(episode: Episode, scenario: Scenario, film: Film, on_tick: Progress) -
 
 
 def _stopped(episode: Episode, stop: KeyboardInterrupt) -> Ending:
-    """The ending by a stop from outside: between two ticks, or inside a leaf, which it then names."""
+    """The ending by a stop from outside. If it came inside a leaf, the cause names the leaf."""
     root, seconds = episode.tree.root, episode.world.now()
     inside = _raising(stop, root)
     is_limit = isinstance(stop, WallLimit)
@@ -148,12 +148,12 @@ def _stopped(episode: Episode, stop: KeyboardInterrupt) -> Ending:
 
 
 def _unfinished(episode: Episode, leaf: py_trees.behaviour.Behaviour | None = None) -> tuple[Link, ...] | None:
-    """The chain down to the leaf that the run's end cut short, by default the one that is RUNNING."""
+    """The chain down to the leaf that the end of the run cut short, by default the RUNNING one."""
     return episode.attempts.chain_to(leaf or running_leaf(episode.tree.root), "was running", "was still running")
 
 
 def _broken(episode: Episode, error: Exception, log: Any) -> Ending:
-    """The ending that an exception makes, most likely a leaf's."""
+    """The ending by an exception, most likely from a leaf."""
     node = _raising(error, episode.tree.root)
     cause = Cause(CauseCode.INTERNAL_ERROR, f"{type(error).__name__}: {error}", _path(node, episode.tree.root))
     log.error("exception in a leaf", node=cause.node, exc_info=error)
@@ -164,7 +164,7 @@ def _broken(episode: Episode, error: Exception, log: Any) -> Ending:
 
 
 def _stop(root: py_trees.behaviour.Behaviour) -> None:
-    """Stop all that runs, also beside a leaf whose terminate raises; then raises what the first of these raised."""
+    """Stop all RUNNING nodes, even if some raise in `terminate`; then raise the first of these exceptions."""
     first: Exception | None = None
     for node in in_tree_order(root):
         while node.status is Status.RUNNING:
@@ -179,7 +179,7 @@ def _stop(root: py_trees.behaviour.Behaviour) -> None:
 
 
 def _path(node: py_trees.behaviour.Behaviour | None, root: py_trees.behaviour.Behaviour) -> str:
-    """Tree path of a node, '' of None."""
+    """The tree path of a node; '' for None."""
     return "" if node is None else node_paths(root)[node.id]
 
 

@@ -24,10 +24,10 @@ _INK, PAPER = (235, 235, 235), 24  # of 255: light letters on a dark ground
 
 
 def compose(overview: RgbImage | None, rear: RgbImage | None, wrist: RgbImage | None, lines: Sequence[str]) -> RgbImage:
-    """One frame (544, 1280, 3) uint8 RGB: overview at the left, rear and wrist stacked at the right, text below.
+    """One video frame (544, 1280, 3) uint8 RGB: overview on the left, rear and wrist on the right, text below.
 
-    Images are (H, W, 3) uint8 RGB of any size, scaled to fit; None leaves the place dark. Up to four lines, in two
-    columns; they stand on a dark band of their own.
+    Images are (H, W, 3) uint8 RGB of any size and are scaled to fit; None leaves the place dark. Up to four lines are
+    shown, in two columns.
     """
     frame: RgbImage = np.full((SIZE[1], SIZE[0], 3), PAPER, np.uint8)
     _place(frame, overview, (0, 0), OVERVIEW_SIZE)
@@ -54,7 +54,7 @@ def _place(frame: RgbImage, image: RgbImage | None, corner: tuple[int, int], siz
 
 
 def write_text(frame: RgbImage, text: str, origin: tuple[int, int], scale: float) -> None:
-    """Light letters on a dark plate, readable on anything; `origin` is the left end of the base line. ASCII only."""
+    """Write light letters on a dark rectangle; `origin` (x, y) px is the left end of the base line. ASCII only."""
     text = text.encode("ascii", "replace").decode()
     (width, height), below = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, scale, 1)
     left, base = origin
@@ -63,9 +63,9 @@ def write_text(frame: RgbImage, text: str, origin: tuple[int, int], scale: float
 
 
 class VideoWriter:
-    """An h264 film that any player takes, written by imageio_ffmpeg's own ffmpeg; a context manager.
+    """An H.264 film, encoded by imageio_ffmpeg's own ffmpeg; a context manager.
 
-    ffmpeg runs in a session of its own, so that Ctrl-C reaches only us and the film can still be closed properly.
+    ffmpeg runs in a session of its own: Ctrl-C does not reach it, and the film can still be closed properly.
     """
 
     def __init__(self, path: Path, fps: float, size: tuple[int, int] = SIZE) -> None:
@@ -99,12 +99,12 @@ class VideoWriter:
             return
         try:
             self._ffmpeg.stdin.write(np.ascontiguousarray(frame).data)
-        except BaseException:  # half a frame may be through: another one behind it would be torn
+        except BaseException:  # half a frame may be written: the next one would be shifted
             self._broken = True
             raise
 
     def close(self) -> None:
-        """End the film and wait until it is whole; again does nothing.
+        """End the film and wait until it is written; a second call does nothing.
 
         Raises:
             OSError: ffmpeg could not write it.
