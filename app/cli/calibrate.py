@@ -16,7 +16,7 @@ from regrasp.interfaces.quote import nearest, quoted
 
 
 def add_to(app: typer.Typer) -> None:
-    """Make the command one of `app`."""
+    """Add the command to `app`."""
     app.command("calibrate")(calibrate)
 
 

@@ -1,4 +1,4 @@
-"""Single keys from a terminal, without waiting for Enter."""
+"""Reads single keys from a terminal, without Enter."""
 
 import os
 import re
@@ -10,7 +10,7 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-# What terminals send; a name stands for all that mean the same.
+# Names of the sequences that terminals send; those that mean the same have one name.
 KEY_NAMES = {
     **dict.fromkeys(("\x1b[C", "\x1bOC", "\x1b[B", "\x1bOB"), "forward"),
     **dict.fromkeys(("\x1b[D", "\x1bOD", "\x1b[A", "\x1bOA"), "back"),
@@ -25,15 +25,15 @@ KEY_NAMES = {
     "\b": "delete",
 }
 _KEY = re.compile(r"\x1b\[[0-9;]*[~A-Za-z]|\x1bO[A-Z]|.", re.DOTALL)
-_SPLIT = re.compile(r"\x1b(\[[0-9;]*|O)?$")  # the beginning of a key whose rest is still to come
+_SPLIT = re.compile(r"\x1b(\[[0-9;]*|O)?$")  # an incomplete key sequence
 
 
 @contextmanager
 def keyboard() -> Iterator[Callable[[], str | None]]:
-    """A function that waits for a key, at most half a second: its name or character, '' for none, None at the end.
+    """Yields a function that waits up to 0.5 s for a key: its name or character, '' for none, None at the end of stdin.
 
-    stdin must be a terminal; it is as it was before when the context ends. Ctrl-C still raises KeyboardInterrupt;
-    Ctrl-Z does nothing, for it would leave the terminal as it is.
+    stdin must be a terminal; its settings are restored when the context ends. Ctrl-C still raises KeyboardInterrupt;
+    Ctrl-Z does nothing, for it would leave the terminal without its settings restored.
     """
     stdin = sys.stdin.fileno()
     before = termios.tcgetattr(stdin)

@@ -16,7 +16,7 @@ EXIT_BAD_INPUT = 2
 
 
 def _scenarios(incomplete: str) -> Iterator[str]:
-    """Names for the shell's completion; it completes paths by itself."""
+    """Scenario names for the shell's completion; the shell completes paths by itself."""
     from regrasp.app.files.resources import shipped
 
     return (name for name in shipped("scenario") if name.startswith(incomplete))
@@ -52,7 +52,7 @@ Sets = Annotated[
 
 
 def parse_seeds(text: str) -> range:
-    """The seeds of "A:B", B left out. Raises `Findings` for anything else."""
+    """The seeds of "A:B", without B. Raises `Findings` for anything else."""
     first, after = map(int, text.split(":")) if re.fullmatch(r"\d{1,10}:\d{1,10}", text) else (0, 0)
     if not first < after <= MAX_SEED:
         right = f"write A:B with A below B and B at most {MAX_SEED}, such as 0:20"

@@ -21,12 +21,12 @@ from regrasp.interfaces.quote import nearest, quoted
 T = TypeVar("T")
 
 DRAWING_SUFFIXES = (".png", ".jpg", ".jpeg")  # of a drawing
-# Of these a snapshot writes some; a camera pose that an earlier one left would not be that of its pictures.
+# A snapshot writes some of these. A camera pose that an earlier one left would not belong to the new pictures.
 SNAPSHOT_FILES = ("rgb.png", "rgb_001.png", "depth.png", "depth_001.png", "intrinsics.yaml", "camera_pose.yaml")
 
 
 def add_to(app: typer.Typer) -> None:
-    """Make the commands some of `app`."""
+    """Add the commands to `app`."""
     app.command("perceive")(perceive)
     app.command("snapshot")(snapshot)
 
@@ -123,7 +123,7 @@ def perceive(
 
 
 def _each(option: str, given: Sequence[T], count: int, wrong: list[Finding], once: bool = True) -> list[T]:
-    """A value for each of `count` pictures, where `once` may stand for all. What is wrong is added to `wrong`."""
+    """A value for each of `count` pictures; with `once` a single one may stand for all. Errors are added to `wrong`."""
     if once and len(given) == 1:
         return [given[0]] * count
     if len(given) != count:
@@ -133,7 +133,7 @@ def _each(option: str, given: Sequence[T], count: int, wrong: list[Finding], onc
 
 
 def _bad_drawing(draw: Path, inputs: Sequence[Path]) -> list[Finding]:
-    """Why nothing can be drawn there."""
+    """Why the drawing cannot be written there; [] if it can."""
     if draw.suffix.lower() not in DRAWING_SUFFIXES:
         return [
             Finding(

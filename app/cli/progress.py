@@ -1,4 +1,4 @@
-"""What a running episode shows on stderr, and how Ctrl-C reaches it."""
+"""Shows the progress of an episode on stderr, and ends it at Ctrl-C."""
 
 import sys
 from collections.abc import Iterator, Mapping
@@ -20,8 +20,8 @@ LEVELS = ("debug", "info", "warning", "error")
 def shown_progress(quiet: bool, level: LogLevel = None) -> Iterator[Observers]:
     """Observers of an episode: one live line on a terminal, else a line a leaf; `quiet` shows nothing.
 
-    Events from `level` on are shown as lines; None shows none. While it is open, Ctrl-C raises KeyboardInterrupt from
-    the tick's callback, so between two ticks; a second one at once.
+    Events of `level` and above are shown as lines; None shows none. While the context is open, Ctrl-C raises
+    KeyboardInterrupt from the observer's `tick`, so between two ticks of the tree; a second Ctrl-C raises it at once.
     """
     console = Console(stderr=True, highlight=False, markup=False)
     shown_levels = LEVELS[LEVELS.index(level) :] if level else ()

@@ -1,4 +1,4 @@
-"""`regrasp explain`, `replay` and `diff`: look at the records that runs left."""
+"""`regrasp explain`, `replay` and `diff`: inspect the records of runs."""
 
 import json
 import os
@@ -17,12 +17,12 @@ if TYPE_CHECKING:
     from regrasp.app.records.reader import RunRecord
 
 EXIT_RUNS_DIFFER = 1
-WIDTHS = (80, 120)  # columns of a page
+WIDTHS = (80, 120)  # least and largest width of a page
 Folder = Annotated[Path, typer.Argument(metavar="DIR", help="A run's folder.")]
 
 
 def add_to(app: typer.Typer) -> None:
-    """Mount the commands."""
+    """Add the commands to `app`."""
     app.command()(explain)
     app.command()(replay)
     app.command()(diff)
@@ -114,7 +114,7 @@ def _read(folder: Path) -> "RunRecord":
 
 
 def _read_both(*folders: Path) -> "list[RunRecord]":
-    """The records, or the findings of all of them."""
+    """The records. Raises the findings of all of them."""
     found: list[Finding] = []
     records: list[RunRecord] = []
     for folder in folders:

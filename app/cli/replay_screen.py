@@ -1,4 +1,4 @@
-"""`regrasp replay` on a terminal: the tree after a change, and keys to go from change to change."""
+"""`regrasp replay` on a terminal: shows the tree after a change; keys go from change to change."""
 
 import re
 from dataclasses import dataclass, replace
@@ -92,7 +92,7 @@ def _typed(replay: Replay, view: View, key: str) -> View:
 
 
 def draw(replay: Replay, view: View, width: int, height: int) -> Group:
-    """The screen: a line of where we are, the tree, the change's events, a line of keys."""
+    """The screen: a line with the position, the tree, the change's events, and a line of keys."""
     change = replay.changes[view.index]
     events = [
         f"{_own_name(event.node) or '-'}  {event_text(event)}" for event in change.events if view.part in event.node
@@ -114,7 +114,7 @@ def _help(width: int) -> str:
 
 
 def _tree(replay: Replay, view: View, width: int, height: int) -> list[Text]:
-    """As many lines of the tree as there is place, around the first node that changed."""
+    """As many lines of the tree as fit, around the first node that changed."""
     nodes = [node for node in replay.rows if view.part in node.path]
     changed = {tick.path for tick in replay.changes[view.index].nodes}
     focus = next((i for i, node in enumerate(nodes) if node.path in changed), 0)
@@ -135,7 +135,7 @@ def _tree(replay: Replay, view: View, width: int, height: int) -> list[Text]:
 
 
 def _shortened(name: str, width: int) -> str:
-    """The indented name without the middle that is too much for `width` columns; at most half of them are indent."""
+    """The indented name, cut in its middle to `width` columns; at most half of them are indent."""
     if len(name) <= width:
         return name
     own = name.lstrip()

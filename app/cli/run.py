@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 def add_to(app: typer.Typer) -> None:
-    """Make the command one of `app`."""
+    """Add the command to `app`."""
     app.command("run")(run_scenario)
 
 
@@ -93,7 +93,7 @@ def run_scenario(
     finally:
         if out is None:
             folders.leave_if_empty(folder)
-    if wall_limit is not None and result.cause and not folder.exists():  # it was stopped before that
+    if wall_limit is not None and result.cause and not folder.exists():  # the run was stopped before it began
         typer.echo(f"{result.cause.code}: {result.cause.message}, before the run began; there is no record", err=True)
         raise typer.Exit(EXIT_UNMET)
     typer.echo(run_summary(result, folder))
@@ -101,7 +101,7 @@ def run_scenario(
 
 
 def _checked(load: Callable[[], list[Scenario]], wrong: list[Finding], out: Path | None) -> list[Scenario]:
-    """The scenarios, or the findings of all that is wrong with them and with the options."""
+    """The scenarios. Raises `Findings` of all that is wrong with them and with the options."""
     wrong += folders.folder_findings(folders.RUNS) if out is None else folders.run_folder_findings(out)
     try:
         loaded = load()
@@ -130,7 +130,7 @@ def _run(scenario: Scenario, folder: Path, settings: Settings, gui: bool, log_le
 
 
 def _watched(run: Run, task: Callable[[], "Result"], wall_limit: float) -> "Result":
-    """Do it in a process of its own, which is stopped after `wall_limit` seconds."""
+    """Do the run in a process of its own, which is stopped after `wall_limit` seconds."""
     from regrasp.app.records.reader import read_record  # late: it brings py_trees
 
     assert run.folder is not None
@@ -144,7 +144,7 @@ def _watched(run: Run, task: Callable[[], "Result"], wall_limit: float) -> "Resu
 
 
 def _tell(loaded: list[Scenario], out: Path | None) -> None:
-    """What a dry run says."""
+    """Print what a dry run found."""
     first = loaded[0]
     typer.echo(f"{shown(first.path)}: nothing wrong; tree {shown(first.tree)}, cell {first.file.cell}")
     for scenario in loaded:
@@ -153,7 +153,7 @@ def _tell(loaded: list[Scenario], out: Path | None) -> None:
 
 
 def _given(message: str, **options: object) -> list[Finding]:
-    """A finding for each of these options that is given."""
+    """A finding with this message for each of these options that was given."""
     return [Finding(f"--{name.replace('_', '-')}", 0, message) for name, value in options.items() if value]
 
 
@@ -167,7 +167,7 @@ def _display() -> bool:
 
 
 def exit_code(result: "Result") -> int:
-    """0 when all that was expected came out, 130 after Ctrl-C, else 1."""
+    """0 if all expectations were met, 130 after Ctrl-C, else 1."""
     if result.outcome == "interrupted":
         return EXIT_INTERRUPTED
     return 0 if result.succeeded else EXIT_UNMET

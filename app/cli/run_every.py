@@ -1,4 +1,4 @@
-"""Every case of a scenario, and what to tell of them."""
+"""Runs every case of a scenario and reports the results."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -26,8 +26,8 @@ def run_every(
 ) -> int:
     """Run every case, each in its own process, its record in a folder of `out` with its name.
 
-    Progress goes to stderr, a table to stdout, JUnit XML to `junit`. Returns the exit code: 0 when all came out as
-    expected, 1 when not, 130 after Ctrl-C, which keeps what was done. `episode` stands in for `run_episode` in tests.
+    Progress goes to stderr, a table to stdout, JUnit XML to `junit`. Returns the exit code: 0 if all came out as
+    expected, 1 if not, 130 after Ctrl-C, which keeps what was done. `episode` replaces `run_episode` in tests.
 
     Raises:
         Findings: bad input; `wrong` holds what the caller found.

@@ -1,4 +1,4 @@
-"""`regrasp scenarios`: look at scenarios."""
+"""`regrasp scenarios`: list, check and show scenarios."""
 
 import json
 from typing import Annotated

@@ -141,7 +141,7 @@ def _techniques(text: str | None, wrong: list[Finding]) -> list[str]:
 
 
 def _listed(option: str, text: str | None, known: Sequence[str], wrong: list[Finding]) -> list[str]:
-    """The names of "A,B", each once, all that are known without a text; those that are not go to `wrong`."""
+    """The names in "A,B", each once; without a text all known ones. Findings of unknown names are added to `wrong`."""
     names = list(known) if text is None else list(dict.fromkeys(name.strip() for name in text.split(",")))
     wrong += [Finding(option, 0, f"no {quoted(name)}; {nearest(name, known)}") for name in names if name not in known]
     return names

@@ -1,4 +1,4 @@
-"""What `regrasp trees export` asks for, checked, and written."""
+"""Checks what `regrasp trees export` is asked for, and writes it."""
 
 import sys
 from collections.abc import Collection, Iterator
@@ -16,7 +16,7 @@ from regrasp.interfaces.quote import nearest, quoted
 from regrasp.trees import Node, TreeSyntaxError, collapsed, read_graph, recorded, run_stats
 from regrasp.trees.export import FORMATS, SUFFIXES, THEMES, export_tree
 
-MAX_MISSING_NAMED = 3  # nodes that are named
+MAX_MISSING_NAMED = 3  # missing nodes that a finding names
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ def exported(request: Request) -> bytes:
 
 
 def _form(request: Request) -> str:
-    """The format's name, when all that can be seen without a tree is right."""
+    """The format's name. Raises `Findings` of all that is wrong with the request itself."""
     out = request.out
     form = request.form or (_named(out) if out else "ascii")
     found = [*_wrong_form(request.form, out)] if request.form else []
@@ -67,7 +67,7 @@ def _form(request: Request) -> str:
 
 
 def _named(out: Path) -> str:
-    """The format that a file's name ends like, '' for none."""
+    """The format of a file's suffix, '' for none."""
     return SUFFIXES.get(out.suffix.lower(), "")
 
 
@@ -91,7 +91,7 @@ def _wrong_out(out: Path, form: str) -> Iterator[Finding]:
 
 
 def _tree_file(request: Request, record: RunRecord | None) -> Path:
-    """The file of the tree that is named, else the run's own copy."""
+    """The file of the named tree, else the run's own copy."""
     if request.tree is not None:
         return resolve("tree", request.tree, Path())
     assert record is not None  # _form saw to it
@@ -112,7 +112,7 @@ def _read(path: Path, record: RunRecord | None) -> Node:
 
 
 def _with_run(path: Path, record: RunRecord) -> Node:
-    """Not checked in full: it ran, perhaps with leaves that are no more."""
+    """The tree with its run. It is not checked in full: it may have leaves that no longer exist."""
     read_text(path)  # its findings are ours
     inputs = record.begin.get("inputs")
     given = {key: tree_text(value) for key, value in inputs.items()} if isinstance(inputs, dict) else {}

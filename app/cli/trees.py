@@ -1,4 +1,4 @@
-"""`regrasp trees`: look at behaviour trees."""
+"""`regrasp trees`: list, check, show and export behaviour trees."""
 
 from pathlib import Path
 from typing import Annotated
@@ -53,7 +53,11 @@ def export_tree_file(
     ] = None,
     depth: Annotated[
         int | None,
-        typer.Option(min=0, metavar="N", help="Open SubTrees N deep; at 0 each in the main tree is a single node."),
+        typer.Option(
+            min=0,
+            metavar="N",
+            help="Expand SubTrees down to N levels; with 0 each SubTree of the main tree is a single node.",
+        ),
     ] = None,
     theme: Annotated[str, typer.Option(help="Of dot, svg and png: light or dark.")] = "light",
     run: Annotated[

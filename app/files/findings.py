@@ -1,4 +1,4 @@
-"""What is wrong with an input: one line a finding, all findings at once."""
+"""Findings: what is wrong with an input, one line each, all at once."""
 
 import os
 from collections.abc import Callable, Iterable
@@ -14,10 +14,10 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, order=True)
 class Finding:
-    """One thing that is wrong: where, what, and what would be right.
+    """One error in an input: where it is, what is wrong, and what would be right.
 
-    `source` is a file, a folder or an option. `line` counts from 1; 0 means that the source has no lines, or that all
-    of it is wrong.
+    `source` is a file, a folder or an option. `line` counts from 1; 0: the source has no lines, or the error concerns
+    all of it.
     """
 
     source: str
@@ -38,7 +38,7 @@ class Findings(Exception):  # noqa: N818 - it is the list of findings that trave
 
 
 def catch_findings(make: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> tuple[T | None, list[Finding]]:
-    """What `make` returns, or the findings that it raises."""
+    """What `make` returns (None if it raises), and the findings that it raises."""
     try:
         return make(*args, **kwargs), []
     except Findings as error:
@@ -54,7 +54,7 @@ def shown(path: Path) -> str:
 
 
 def real_path(path: Path) -> Path:
-    """The path without links, from the root; of links that lead back to themselves as far as they can be followed.
+    """The absolute path without links; links that lead back to themselves are followed as far as possible.
 
     `Path.resolve` raises RuntimeError for such links before Python 3.13.
     """
@@ -62,7 +62,7 @@ def real_path(path: Path) -> Path:
 
 
 def why_no_file(path: Path) -> str:
-    """What stands at `path` in place of a file that can be read, as the end of a sentence."""
+    """Why there is no readable file at `path`, as the end of a sentence."""
     if os.path.isdir(path):
         return "is a folder"
     if os.path.exists(path):

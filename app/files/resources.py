@@ -1,4 +1,4 @@
-"""Shipped scenarios, cells and trees by name, and files by path."""
+"""Finds scenarios, cells and trees: shipped ones by name, others by path."""
 
 import os
 from importlib.resources import files
@@ -10,12 +10,12 @@ from regrasp.interfaces.quote import closest, cut, quoted
 
 ResourceKind = Literal["scenario", "cell", "tree"]
 _SUFFIX: dict[ResourceKind, str] = {"scenario": ".yaml", "cell": ".yaml", "tree": ".xml"}
-MAX_NAMED = 5  # shipped ones, after an unknown name
+MAX_NAMED = 5  # shipped names that are listed after an unknown one
 MAX_BYTES = 256 * 1024  # of a file that a person writes
 
 
 def shipped(kind: ResourceKind) -> dict[str, Path]:
-    """Name to file of everything of this kind that comes with Regrasp, sorted by name; scenarios of faults last."""
+    """The files of this kind that come with Regrasp, by name and sorted; scenarios of faults come last."""
     folders = {"scenario": "scenarios", "cell": "scenarios/cells", "tree": "trees"}
     folder = Path(str(files("regrasp"))) / folders[kind]
     names = {path.stem: path for path in sorted(folder.glob("*" + _SUFFIX[kind]))}
@@ -25,7 +25,7 @@ def shipped(kind: ResourceKind) -> dict[str, Path]:
 
 
 def resolve(kind: ResourceKind, name: str, beside: Path, where: tuple[str, int] | None = None) -> Path:
-    """The file that `name` means: what is written like one, from `beside`, else a shipped one; nothing else is opened.
+    """The file that `name` means: a path, relative to `beside`, if it has the suffix of its kind, else a shipped one.
 
     Raises `Findings`, at the place `where` (source, line) that holds the name; without one, at the name itself.
     """
@@ -44,7 +44,7 @@ def resolve(kind: ResourceKind, name: str, beside: Path, where: tuple[str, int] 
 
 
 def _those_shipped(kind: ResourceKind, names: list[str]) -> str:
-    """The names in words; of many the first, and how to see all."""
+    """The names in words; of many only the first ones, and how to list all."""
     if len(names) <= MAX_NAMED:
         return f"the shipped ones are {', '.join(names)}"
     more = f"regrasp {kind}s list shows {len(names) - MAX_NAMED} more"
@@ -52,7 +52,7 @@ def _those_shipped(kind: ResourceKind, names: list[str]) -> str:
 
 
 def read_text(path: Path, where: tuple[str, int] | None = None) -> str:
-    """The text of a file that a person wrote. Raises `Findings` when there is no such file or it is no text."""
+    """The text of a UTF-8 file that a person wrote. Raises `Findings` if there is none, and for what is no such text."""
     source, line = where or (shown(path), 0)
     if not os.path.isfile(path):
         raise Findings([Finding(source, line, f"{quoted(shown(path))} {why_no_file(path)}; name a file")])

@@ -1,4 +1,4 @@
-"""Files written in one step."""
+"""Writes files atomically."""
 
 import errno
 import os
@@ -8,9 +8,9 @@ from regrasp.app.files.findings import real_path
 
 
 def write_whole(path: Path, content: str | bytes) -> None:
-    """Write a file in one step: readers see the old one or the new one, never a half.
+    """Write a file in one step: readers see the old content or the new one, never a part of it.
 
-    What a link names is written, not the link; a pipe or a device takes the content as it comes.
+    A link is followed, not replaced. A pipe or a device is written to directly.
 
     Raises:
         OSError: the file cannot be written.

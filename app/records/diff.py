@@ -61,7 +61,7 @@ def _short(value: Any) -> str:
 
 
 def _first_tick(a: Sequence[Tick], b: Sequence[Tick]) -> Iterator[str]:
-    """The first tick in which the runs differ, with the deepest node that differs after it and its status in each run."""
+    """The first tick in which the runs differ: the deepest node that differs after it, and its status in each run."""
     pair = next(((x, y) for x, y in zip_longest(a, b) if x != y), None)
     if pair is None:
         return
@@ -71,7 +71,7 @@ def _first_tick(a: Sequence[Tick], b: Sequence[Tick]) -> Iterator[str]:
     if paths:
         path = max(paths, key=lambda path: path.count("/"))
         yield f"first differing tick at {t:.2f} s: {path}: {first.get(path, '-')} | {second.get(path, '-')}"
-    else:  # the same after it: a node came and went in this tick, or ended again as before
+    else:  # a node came and went in this tick, or ended again as before
         told = (f"{x.path} {x.status}" if x and x.t == t else "none" for x in pair)
         yield f"first differing tick at {t:.2f} s: " + " | ".join(told)
 

@@ -1,4 +1,4 @@
-"""What a scenario file may say, as pydantic models: each field with its meaning, its unit and an example."""
+"""Scenario files as pydantic models: each field with its meaning, its unit and an example."""
 
 from typing import Annotated, Any, get_args
 

@@ -1,4 +1,4 @@
-"""The robot's belief as plain values for the record."""
+"""The robot's belief as plain values, for the record."""
 
 from scipy.spatial.transform import RigidTransform
 
@@ -8,7 +8,7 @@ from regrasp.perception.pose.estimate import Estimate
 
 
 def belief_state(services: Services) -> BeliefState:
-    """What the robot knows now, by its own eyes and joints; lengths rounded to 0.1 mm."""
+    """What the robot knows now from its cameras and joint readings; lengths are rounded to 0.1 mm."""
     belief, last = services.belief, services.perception.track.last
     return BeliefState(
         held=_pose(belief.held),
