@@ -6,8 +6,8 @@ import sys
 
 from regrasp.app.interrupts import EXIT_INTERRUPTED, stoppable
 
-# What a shell reports of cat or git when the reader of their pipe has gone. Not 0: the output is incomplete. Not 1: this
-# means an unmet expectation. SIGPIPE itself stays ignored: it would also end this program when a child process dies.
+# What a shell reports of cat or git when the reader of their pipe has gone. Not 0: output is missing. Not 1, which
+# means an unmet expectation. SIGPIPE itself stays ignored: it would also end this program when a child dies.
 EXIT_NO_READER = 141
 
 

@@ -52,7 +52,7 @@ def _those_shipped(kind: ResourceKind, names: list[str]) -> str:
 
 
 def read_text(path: Path, where: tuple[str, int] | None = None) -> str:
-    """The text of a UTF-8 file that a person wrote. Raises `Findings` if there is none, and for what is no such text."""
+    """The text of a UTF-8 file that a person wrote. Raises `Findings` if there is none, or if it is no such text."""
     source, line = where or (shown(path), 0)
     if not os.path.isfile(path):
         raise Findings([Finding(source, line, f"{quoted(shown(path))} {why_no_file(path)}; name a file")])
