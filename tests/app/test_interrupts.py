@@ -41,7 +41,7 @@ def start(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Started]:
 
     def started(leaf: str, *options: str) -> "subprocess.Popen[str]":
         write(tmp_path, leaf)
-        command = [sys.executable, str(ROOT / "tests/app/hanging.py"), "run", "mine.yaml", "--out", "run", *options]
+        command = [sys.executable, str(ROOT / "tests/support/hanging.py"), "run", "mine.yaml", "--out", "run", *options]
         environment = {**os.environ, "PYTHONPATH": str(ROOT)}
         pipe = subprocess.PIPE
         process = subprocess.Popen(
@@ -153,7 +153,7 @@ def test_a_run_whose_parent_is_killed_ends_with_its_record(start: Started, optio
 
 def test_a_run_stopped_before_it_began_has_no_record_and_says_so(start: Started, tmp_path: Path) -> None:
     write(tmp_path, "Goes")
-    command = [sys.executable, str(ROOT / "tests/app/hanging.py"), "run", "mine.yaml", "--wall-limit", "1"]
+    command = [sys.executable, str(ROOT / "tests/support/hanging.py"), "run", "mine.yaml", "--wall-limit", "1"]
     ran = subprocess.run(command, capture_output=True, text=True, env={**os.environ, "PYTHONPATH": str(ROOT)})
     assert ran.returncode == 1
     if "before the run began" in ran.stderr:  # a very quick machine may come further in a second

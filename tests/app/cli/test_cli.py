@@ -332,9 +332,9 @@ def test_a_dry_run_says_what_would_run_and_runs_nothing(calls: list[SimpleNamesp
 
 
 def test_events_are_shown_from_a_level_on(monkeypatch: pytest.MonkeyPatch) -> None:
-    def episode(*_: Any, on_event: Callable[[dict[str, Any]], None], **__: Any) -> Result:
-        on_event({"t": 1.0, "level": "info", "event": "grasped", "node": "root/unplug", "gap": 0.02})
-        on_event({"t": 2.0, "level": "warning", "event": "slipped"})
+    def episode(*_: Any, observers: Observers, **__: Any) -> Result:
+        observers.event({"t": 1.0, "level": "info", "event": "grasped", "node": "root/unplug", "gap": 0.02})
+        observers.event({"t": 2.0, "level": "warning", "event": "slipped"})
         return result()
 
     use_episode(monkeypatch, episode)

@@ -192,7 +192,7 @@ def test_many_events_of_an_attempt_are_counted() -> None:
     events = [Event(1.0, "look", "a/b", {"n": i}) for i in range(20)]
     told = [*timeline(attempts(("a/b", 0.0, 2.0, "SUCCESS")), events, ticks(), 100)]
     assert len(told) == 8
-    assert told[-1].strip() == "and 14 events more"
+    assert told[-1].strip() == "and 14 more events"
 
 
 def test_explain_prints_the_page_or_json(tmp_path: Path) -> None:

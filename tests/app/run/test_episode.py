@@ -101,7 +101,7 @@ def ends(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[tuple[bool, float]]]:
 
     monkeypatch.setattr(World, "close", watched)
     monkeypatch.setattr("regrasp.behaviors.LEAVES", LEAVES)
-    monkeypatch.setattr("regrasp.app.run.episode.LEAVES", LEAVES)
+    monkeypatch.setattr("regrasp.app.run.compose.LEAVES", LEAVES)
     yield found
     py_trees.blackboard.Blackboard.clear()
 
