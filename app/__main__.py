@@ -4,10 +4,10 @@ import io
 import os
 import sys
 
-from regrasp.app.interrupts import stoppable
+from regrasp.app.interrupts import EXIT_INTERRUPTED, stoppable
 
-# What a shell reports of cat or git when the reader of their pipe has gone. Not 0, for not all was told; not 1, which
-# says that a run did not come out. SIGPIPE itself stays ignored: it would kill us, too, when a child process dies.
+# What a shell reports of cat or git when the reader of their pipe has gone. Not 0: output is missing. Not 1, which
+# means an unmet expectation. SIGPIPE itself stays ignored: it would also end this program when a child dies.
 EXIT_NO_READER = 141
 
 
@@ -28,27 +28,26 @@ def _run() -> None:
             sys.stdout.flush()  # what `print` left; the interpreter's own flush could not be caught
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
-        sys.exit(130)
+        sys.exit(EXIT_INTERRUPTED)
     except (BrokenPipeError, SystemExit) as end:
         # Typer makes exit code 1 of a broken pipe.
         if isinstance(end, SystemExit) and not isinstance(end.__context__, BrokenPipeError):
             raise
-        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # for what is still to be written
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # for what is flushed at exit
         sys.exit(EXIT_NO_READER)
 
 
 def _open_streams() -> None:
-    """Fill in for standard streams that were closed from the start, as by `<&-`; nothing can be done without stdout.
+    """Replace standard streams that were closed from the start, as by `<&-`; without stdout the program ends.
 
-    Python has None for such a stream, and the next file that is opened would get its number, and with it what some
-    library prints.
+    Python sets such a stream to None. The next file that is opened would get its descriptor, and what libraries print.
     """
     closed = sys.stdout is None
     for name, mode in {"stdin": "r", "stdout": "w", "stderr": "w"}.items():
         if getattr(sys, name) is None:
             setattr(sys, name, open(os.devnull, mode, errors="ignore"))  # noqa: SIM115 - to the end
     if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors="replace")  # a question mark for what an old terminal's encoding does not have
+        sys.stdout.reconfigure(errors="replace")  # a question mark for characters that the encoding does not have
     if closed:
         print("standard output is closed; open it, or write > /dev/null", file=sys.stderr)
         sys.exit(2)

@@ -11,45 +11,49 @@ from multiprocessing.connection import wait
 from types import FrameType
 from typing import NoReturn
 
+EXIT_INTERRUPTED = 130  # what a shell reports of a program that Ctrl-C ended
 STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 WALL_LIMIT_SIGNAL = signal.SIGALRM  # what a parent sends to a run that has taken too long
-BURST = 0.5  # seconds: signals that come so soon after one that counted are the same request
 
 
 class WallLimit(KeyboardInterrupt):
     """The run has taken longer than its parent allows."""
 
 
-class _Requests:
-    """Tells requests to stop from their repetitions: a key held down, or a shell and a parent that both pass one on."""
+class StopRequests:
+    """Counts requests to stop, and not their repetitions: a key held down, or a shell and a parent that both signal.
 
-    def __init__(self) -> None:
+    A signal within `burst` seconds after one that counted is the same request.
+    """
+
+    def __init__(self, burst: float = 0.5) -> None:
         self.count = 0
+        self.burst = burst
         self._last = float("-inf")
 
-    def new(self) -> bool:
+    def is_new(self) -> bool:
         """Whether a signal that comes now is a new request."""
         now = time.monotonic()
-        if now < self._last + BURST:
+        if now < self._last + self.burst:
             return False
         self.count, self._last = self.count + 1, now
         return True
 
 
-_program: _Requests | None = None  # those of a `stoppable` program
+_program: StopRequests | None = None  # of the `stoppable` program, if this is one
 
 
 @contextmanager
 def stoppable() -> Iterator[None]:
     """For a whole program: Ctrl-C, SIGTERM and SIGHUP (if not ignored, as by nohup) raise KeyboardInterrupt once each.
 
-    Afterwards they are ignored: what was to be kept is kept, and the exit code is to be that of the program.
+    When the context ends they are ignored: by then the record is written, and the program's exit code shall count.
     """
     global _program
-    requests = _program = _Requests()
+    requests = _program = StopRequests()
 
     def stop(_number: int, _frame: FrameType | None) -> None:
-        if requests.new():
+        if requests.is_new():
             raise KeyboardInterrupt
 
     heard = [number for number in STOPPING if signal.getsignal(number) is not signal.SIG_IGN]
@@ -63,7 +67,7 @@ def stoppable() -> Iterator[None]:
 
 
 def listen_to_parent() -> None:
-    """In a child process: SIGTERM, by which the parent passes on that it was stopped, its death, and the wall limit."""
+    """In a child process: react to SIGTERM (the parent was stopped), to the parent's death, and to the wall limit."""
 
     def stop(_number: int, _frame: FrameType | None) -> NoReturn:
         raise KeyboardInterrupt
@@ -78,16 +82,16 @@ def listen_to_parent() -> None:
 
 
 def _follow(sentinel: int) -> None:
-    """Wait for the parent's death, of which it could not tell, and end as if it had."""
+    """Wait for the parent's death, then end as if the parent had sent SIGTERM."""
     wait([sentinel])
     os.kill(os.getpid(), signal.SIGTERM)
 
 
 @contextmanager
-def held_back() -> Iterator[None]:
-    """Signals that stop a run come at the end of it: in the middle a record would be torn.
+def signals_deferred() -> Iterator[None]:
+    """Defer the signals that stop a run to the end of this context: in its middle a record would be left half written.
 
-    They are noted by handlers. To block them would not do: another thread, as libraries start them, would take them.
+    Handlers note them. Blocking them would not help: then another thread, which some library started, would get them.
     """
     if threading.current_thread() is not threading.main_thread():  # others are never interrupted
         yield
@@ -106,17 +110,17 @@ def held_back() -> Iterator[None]:
         signal.raise_signal(came[0])
 
 
-late_imports = held_back  # in the middle of their import libraries in C++ swallow signals, or die of them
+late_imports = signals_deferred  # C++ libraries swallow signals, or crash, when one comes during their import
 
 
 @contextmanager
 def interruptible() -> Iterator[Callable[[], None]]:
-    """A check that raises KeyboardInterrupt if Ctrl-C came since; the second Ctrl-C does so where it strikes."""
-    requests = _program or _Requests()
+    """Yields a check that raises KeyboardInterrupt if Ctrl-C came meanwhile. A second Ctrl-C raises it at once."""
+    requests = _program or StopRequests()
     before_us = requests.count
 
     def note(_number: int, _frame: FrameType | None) -> None:
-        if requests.new() and requests.count > before_us + 1:
+        if requests.is_new() and requests.count > before_us + 1:
             raise KeyboardInterrupt
 
     def check() -> None:

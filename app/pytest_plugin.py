@@ -1,4 +1,4 @@
-"""A pytest plugin, installed with Regrasp: scenario suites, trees that are tried out, and scripted leaves.
+"""A pytest plugin, installed with Regrasp: scenario suites, trials of tree files, and scripted leaves.
 
 Write a scenario suite: put scenario files named `*.scenario.yaml` beside your tests and call pytest. Each case is a
 test, `cells.scenario.yaml::gravity=zero`, that passes when all that the scenario expects comes out; otherwise its
@@ -34,7 +34,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-# Everything of Regrasp comes late: a pytest that collects nothing of ours must not wait for it.
+# All of Regrasp is imported late: a pytest run without scenarios and trees must not wait for it.
 if TYPE_CHECKING:
     from regrasp.app.records.result import Result
     from regrasp.app.scenario.load import Scenario
@@ -72,14 +72,14 @@ def pytest_configure(config: pytest.Config) -> None:
             f"--scenario-wall-limit {limit:g} is no limit; write seconds of at least 1, such as 600"
         )
     if records is not None:
-        from regrasp.app.records.folders import findings
+        from regrasp.app.records.folders import run_folder_findings
 
-        for finding in findings(records):
+        for finding in run_folder_findings(records):
             raise pytest.UsageError(f"--scenario-records: {finding}")
 
 
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Collector | None:
-    """Scenario files by their names, tree files by name, by place, or because they were asked for."""
+    """Collect scenario files by their names; tree files by name, by folder, or because they were named."""
     if file_path.name.endswith(SCENARIO):
         return ScenarioSuite.from_parent(parent, path=file_path)
     if file_path.suffix == ".xml" and _is_tree(file_path, parent.session):
@@ -88,7 +88,7 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Col
 
 
 def _is_tree(path: Path, session: pytest.Session) -> bool:
-    """Other XML is left alone unless it is named: trees lie in the root's `trees`, or right in a folder asked for."""
+    """Whether to collect an XML file: it ends in `TREE`, was named, or is a tree in `trees` or in a named folder."""
     if path.name.endswith(TREE) or session.isinitpath(path):
         return True
     likely = session.config.rootpath / "trees" in path.parents or session.isinitpath(path.parent)
@@ -96,7 +96,7 @@ def _is_tree(path: Path, session: pytest.Session) -> bool:
 
 
 def _begins_as_tree(path: Path) -> bool:
-    """Whether the outermost element is a tree file's, and not BehaviorTree.CPP's, which looks like it."""
+    """Whether the outermost element is that of a py_trees file, and not the similar one of BehaviorTree.CPP."""
     with suppress(OSError, ElementTree.ParseError, LookupError), path.open("rb") as stream:
         for _, element in ElementTree.iterparse(stream, ["start"]):
             given = element.attrib
@@ -105,7 +105,7 @@ def _begins_as_tree(path: Path) -> bool:
 
 
 class ScenarioSuite(pytest.File):
-    """A scenario file: a test a case."""
+    """A scenario file; each case is a test."""
 
     def collect(self) -> Iterator[pytest.Item]:
         """The cases. Raises `CollectError` with a line for each finding in the file."""
@@ -128,14 +128,14 @@ def _overrides(seed: str | None) -> list[str]:
     return [f"vary.seed='{seed}'" if ":" in seed else f"seed={seed}"]
 
 
-class Failed(Exception):  # noqa: N818 - the message is all of the report
-    """A test of ours failed; its message says why, and a traceback would say nothing more."""
+class ItemFailed(Exception):  # noqa: N818 - the message is all of the report
+    """A scenario or a tree failed. The message says why; a traceback would add nothing."""
 
 
 class _Item(pytest.Item):
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
         """The message alone."""
-        return str(excinfo.value) if isinstance(excinfo.value, Failed) else super().repr_failure(excinfo, style)
+        return str(excinfo.value) if isinstance(excinfo.value, ItemFailed) else super().repr_failure(excinfo, style)
 
     def reportinfo(self) -> tuple[Path, int | None, str]:
         """File and test, for headings."""
@@ -152,7 +152,7 @@ class ScenarioCase(_Item):
             self.add_marker(marker)
 
     def runtest(self) -> None:
-        """Run it in a process of its own. Raises `Failed` with the explanation when it did not come out as expected."""
+        """Run it in a process of its own. Raises `ItemFailed` with the explanation of a run that is not as expected."""
         from regrasp.app.run.batch import Run, result_of
         from regrasp.app.run.processes import run_each
 
@@ -164,9 +164,9 @@ class ScenarioCase(_Item):
         result = result_of(Run(self.scenario, self.scenario.file.seed, folder), done)
         if done.value is None:
             page = _explained(folder) if (folder / "events.jsonl").exists() else f"record  {folder}"
-            raise Failed(f"{done.error}\n{page}")
+            raise ItemFailed(f"{done.error}\n{page}")
         if not result.succeeded:
-            raise Failed(_explained(folder))
+            raise ItemFailed(_explained(folder))
 
     def _folder(self) -> Path:
         """A new folder for the record."""
@@ -181,7 +181,7 @@ class ScenarioCase(_Item):
 
 
 def _run(scenario: Scenario, folder: Path) -> Result:
-    """In the case's process, the only one that needs the physics."""
+    """Run the case, in its own process: the only one that imports the physics engine."""
     from regrasp.app.run.episode import run_episode
 
     return run_episode(scenario, folder, seed=scenario.file.seed)
@@ -195,7 +195,7 @@ def _explained(folder: Path) -> str:
 
 
 class TreeFile(pytest.File):
-    """A tree file, to be tried out on scripted leaves."""
+    """A tree file, tried out with scripted leaves."""
 
     def collect(self) -> Iterator[pytest.Item]:
         """Its two tests. Raises `CollectError` with a line for each finding in the file."""
@@ -219,12 +219,12 @@ class TreeTrial(_Item):
         self._trial = trial
 
     def runtest(self) -> None:
-        """Raises `Failed` with the first thing that went wrong."""
+        """Raises `ItemFailed` with the first thing that went wrong."""
         if wrong := next(self._trial(self.path), None):
-            raise Failed(wrong)
+            raise ItemFailed(wrong)
 
     def teardown(self) -> None:
-        """Leave nothing of the tree on the blackboard."""
+        """Clear the blackboard."""
         from py_trees.blackboard import Blackboard
 
         Blackboard.clear()

@@ -6,6 +6,8 @@ from regrasp.interfaces.frame import RgbdFrame
 from regrasp.interfaces.reading import GripperReading, JointReading
 from regrasp.interfaces.trajectory import Trajectory
 
+TICK = 0.05  # simulated s between two ticks of a behaviour tree
+
 
 class Clock(Protocol):
     """The one clock."""

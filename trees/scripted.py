@@ -20,13 +20,13 @@ from py_trees.composites import Composite
 from py_trees.decorators import Decorator
 from py_trees.ports import BehaviourWithPorts, PortInformation
 
+from regrasp.interfaces.devices import TICK
 from regrasp.trees.element import read_elements
 from regrasp.trees.load import load_tree
 from regrasp.trees.paths import find_path, in_tree_order, node_paths
 from regrasp.trees.tick_table import TickTable
 from regrasp.trees.vocabulary import ANY_STATUS, BUILT_IN
 
-TICK = 0.05  # simulated s, as in a run
 MAX_TICKS = 10_000  # a tree that has not ended by then never will
 _ACT = re.compile(r"(?:([1-9]\d{0,5})\s+)?(success|failure|running)")
 

@@ -8,7 +8,6 @@ import inspect
 import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 from typing import Any
 
 import py_trees
@@ -16,13 +15,14 @@ from py_trees.common import Status
 from py_trees.ports import PortsMixin
 from py_trees.ports_utils import convert_str_to_type, is_instance_of_type
 
-from regrasp.interfaces.quote import MOST, cut
+from regrasp.interfaces.quote import nearest
 
 Accepts = Any  # a type, or the words that may stand there as a tuple of strings
 # The names in a cell by kind of object: {"socket": ["back_1", "back_2"]}. A mapping in place of the list gives for each
 # name the reason why it cannot be used here; "" means that it can.
 CellNames = Mapping[str, Collection[str]]
 ANY_STATUS = frozenset({Status.SUCCESS, Status.FAILURE, Status.RUNNING})
+MAX_COMPARED = 200  # known words that are searched for the closest one
 _EXAMPLES = {int: "a whole number such as 3", float: "a number such as 0.5", bool: "true or false"}
 
 
@@ -132,14 +132,9 @@ COUNTERPARTS = {  # for elements of BehaviorTree.CPP, and those of py_trees that
 }
 
 
-def suggestion(word: str, known: Collection[str], max_listed: int = 12, max_compared: int = 200) -> str:
-    """What a message about an unknown word suggests: the nearest known word, else a list of the known ones."""
-    words = sorted(known)
-    same = [known for known in words if known.casefold() == word.casefold()]
-    if near := same or get_close_matches(word[:MOST], words[:max_compared], 1):
-        return f"did you mean {cut(near[0])}?"
-    more = f" and {len(words) - max_listed} more" if words[max_listed:] else ""
-    return f"there are {', '.join(map(cut, words[:max_listed]))}{more}" if words else "there are none, remove it"
+def suggestion(word: str, known: Collection[str]) -> str:
+    """What to write in place of an unknown word: the closest known one, else a list of the known ones."""
+    return nearest(word, known, compared=MAX_COMPARED) if known else "there are none, remove it"
 
 
 def element_kinds(leaves: Mapping[str, type], names: CellNames | None = None) -> dict[str, ElementKind]:

@@ -5,18 +5,18 @@ from typing import Annotated
 
 import typer
 
-from regrasp.app.files.findings import Finding, Findings, nearest, real, shown
+from regrasp.app.files.findings import Finding, Findings, real_path, shown
 from regrasp.app.files.resources import resolve
 from regrasp.app.frames.calibration_file import IMAGE_SUFFIXES
 from regrasp.app.interrupts import late_imports
 from regrasp.app.records import folders
 from regrasp.app.scenario.cell_file import load_cell
-from regrasp.app.scenario.schema import MOST_SEED
-from regrasp.interfaces.quote import quoted
+from regrasp.app.scenario.schema import MAX_SEED
+from regrasp.interfaces.quote import nearest, quoted
 
 
 def add_to(app: typer.Typer) -> None:
-    """Make the command one of `app`."""
+    """Add the command to `app`."""
     app.command("calibrate")(calibrate)
 
 
@@ -36,7 +36,7 @@ def calibrate(
     cell: Annotated[str, typer.Option(help="Rendered: the cell with the camera.")] = "thesis",
     camera: Annotated[str, typer.Option(help="Rendered: which of its cameras.")] = "rear",
     views: Annotated[int, typer.Option(min=5, max=200, help="Rendered: how many.")] = 20,
-    seed: Annotated[int, typer.Option(min=0, max=MOST_SEED, help="Rendered: draws where the board is held.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, max=MAX_SEED, help="Rendered: draws where the board is held.")] = 0,
 ) -> None:
     """Find a camera's intrinsics with a checkerboard.
 
@@ -51,10 +51,10 @@ def calibrate(
     holds width, height, fx, fy, cx, cy (pixels; 0, 0 is the middle of the first), OpenCV's distortion k1, k2, p1, p2,
     k3, and the residual.
     """
-    wrong = folders.unwritable_file(out, new=True) + (folders.unwritable(draw) if draw else [])
+    wrong = folders.file_findings(out, new=True) + (folders.folder_findings(draw) if draw else [])
     if out.suffix.lower() in IMAGE_SUFFIXES:
         wrong.append(Finding(shown(out), 0, "is a picture's name, and a calibration is YAML; end it in .yaml"))
-    if draw is not None and images is not None and real(draw) == real(images):
+    if draw is not None and images is not None and real_path(draw) == real_path(images):
         wrong.append(Finding("--draw", 0, "is the folder of your pictures, which it would overwrite; name another"))
     if wrong:
         raise Findings(wrong)

@@ -1,23 +1,19 @@
-"""The command line: `regrasp`."""
+"""The command line `regrasp`: its commands, and how errors end them."""
 
 import errno
 from importlib.metadata import version
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 from typer.core import TyperGroup
 
 from regrasp.app.cli import calibrate, detector, perceive, records, run, scenarios, studies, trees
-from regrasp.app.files.findings import Findings, printable
-from regrasp.interfaces.quote import MOST, cut
+from regrasp.app.cli.options import EXIT_BAD_INPUT, EXIT_UNMET
+from regrasp.app.files.findings import Findings
+from regrasp.app.interrupts import EXIT_INTERRUPTED
+from regrasp.interfaces.quote import MAX_QUOTE, cut, printable
 
-if TYPE_CHECKING:
-    pass
-
-EXIT_UNMET, EXIT_BAD_INPUT, EXIT_INTERRUPTED = 1, 2, 130
-
-
-COMMANDS = (  # in the order of their use
+COMMANDS = (  # in the order in which a newcomer uses them
     "run",
     "explain",
     "replay",
@@ -35,7 +31,7 @@ COMMANDS = (  # in the order of their use
 
 
 class _Group(TyperGroup):
-    """Tells findings one a line on stderr, and Ctrl-C by its exit code, whatever the command."""
+    """Prints the findings of any command on stderr, one per line, and sets the exit code, also after Ctrl-C."""
 
     def list_commands(self, ctx: Any) -> list[str]:
         return sorted(super().list_commands(ctx), key=COMMANDS.index)
@@ -47,12 +43,12 @@ class _Group(TyperGroup):
             for finding in error.items:
                 typer.echo(str(finding), err=True)
             raise typer.Exit(EXIT_BAD_INPUT) from None
-        except typer.BadParameter as error:  # quotes all that was typed
-            error.message = cut(error.message.removeprefix("Value error, "), 3 * MOST)
+        except typer.BadParameter as error:  # it quotes all that was typed
+            error.message = cut(error.message.removeprefix("Value error, "), 3 * MAX_QUOTE)
             raise
         except OSError as error:  # a disk that is full, a name that is too long
             if error.errno == errno.EPIPE:
-                raise  # typer's: the reader of a pipe has gone
+                raise  # the reader of a pipe has gone: Typer handles this
             where = str(error.filename or "output")
             typer.echo(printable(f"{where[:200]}: {error.strerror}; write somewhere else"), err=True)
             raise typer.Exit(EXIT_BAD_INPUT) from None
@@ -107,4 +103,4 @@ def doctor() -> None:
     for check in checks():
         typer.echo(f"{check.status:<6}{check.name:<24}{check.seen}")
         wrong |= check.status == "wrong"
-    raise typer.Exit(1 if wrong else 0)
+    raise typer.Exit(EXIT_UNMET if wrong else 0)

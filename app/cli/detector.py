@@ -1,4 +1,4 @@
-"""`regrasp train-detector` and `evaluate-detector`: the network of the technique `detector`."""
+"""`regrasp train-detector` and `evaluate-detector`, for the network of the technique `detector`."""
 
 import json
 from collections.abc import Callable, Iterator
@@ -12,18 +12,18 @@ from regrasp.app.files.findings import Finding, Findings, shown
 from regrasp.app.files.resources import resolve
 from regrasp.app.files.whole_file import write_whole
 from regrasp.app.records import folders
-from regrasp.app.scenario.schema import MOST_SEED
+from regrasp.app.scenario.schema import MAX_SEED
 
 if TYPE_CHECKING:
     from regrasp.interfaces.cell import Cell
 
-TRAINING_SEED, HELD_OUT_SEED = 0, 1_000_000  # choice: far apart, so that no one trains on what is held out
+TRAINING_SEED, HELD_OUT_SEED = 0, 1_000_000  # choice: far apart, so that nobody trains on held-out pictures
 _Cell = Annotated[str, typer.Option("--cell", help="A shipped cell's name, or a path to a .yaml file.")]
-_Seed = Annotated[int, typer.Option(min=0, max=MOST_SEED, help="Draws the pictures and all else.")]
+_Seed = Annotated[int, typer.Option(min=0, max=MAX_SEED, help="Draws the pictures and all else.")]
 
 
 def add_to(app: typer.Typer) -> None:
-    """Mount the commands."""
+    """Add the commands to `app`."""
     app.command()(train_detector)
     app.command()(evaluate_detector)
 
@@ -50,7 +50,7 @@ def train_detector(
       regrasp train-detector --out results/detector
       regrasp train-detector --out results/more --start perception/detector.onnx
     """
-    wrong = folders.unwritable(out)
+    wrong = folders.folder_findings(out)
     if (out / "detector.onnx").exists():
         wrong.append(Finding(shown(out), 0, "already holds detector.onnx; name another folder"))
     try:
@@ -101,7 +101,7 @@ def evaluate_detector(
     Example:
       regrasp evaluate-detector perception/detector.onnx --out evaluation.json
     """
-    wrong = folders.unwritable_file(out, new=True) if out else []
+    wrong = folders.file_findings(out, new=True) if out else []
     if out is not None and out.suffix.lower() == ".onnx":
         wrong.append(Finding(shown(out), 0, "is a network's name, and the figures are JSON; end it in .json"))
     if model is not None and not model.is_file():
@@ -128,14 +128,14 @@ def _load(cell: str) -> "Cell":
 
 
 def _detector(cell: "Cell", model: Path | None) -> Any:
-    """The detector with that network. Raises `Findings` if the file holds none."""
+    """The detector with this network, by default the shipped one. Raises `Findings` if the file holds none."""
     import cv2
     import numpy as np
 
     from regrasp.interfaces.frame import Intrinsics, RgbdFrame
     from regrasp.perception.pose.detector import HEIGHT, WIDTH, Detector
 
-    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)  # what is wrong we say ourselves
+    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)  # the finding below says what is wrong
     try:
         detector = Detector(cell.known, model.read_bytes() if model else None)
         blank = np.zeros((HEIGHT, WIDTH), np.float32)
@@ -167,7 +167,7 @@ def _print(figures: dict[str, Any]) -> None:
 
 @contextmanager
 def _progress(what: str, total: int) -> Iterator[Callable[..., None]]:
-    """A callback (done, words) that shows how far it is on stderr: a bar on a terminal, else a line every tenth."""
+    """A callback (done, words) that shows progress on stderr: a bar on a terminal, else a line for every tenth."""
     from rich.console import Console
     from rich.progress import Progress
 

@@ -1,4 +1,4 @@
-"""`regrasp doctor`: what a run needs from this machine, and whether it is there."""
+"""`regrasp doctor`: checks that this machine has what a run needs."""
 
 import os
 import platform
@@ -15,14 +15,17 @@ from regrasp.app.records import folders
 from regrasp.app.scenario.cell_file import load_cell
 
 PACKAGES = ("regrasp", "numpy", "scipy", "pybullet", "py_trees", "ompl", "eaik", "toppra", "numba", "moderngl")
-EGL = {"EGL": "libegl1", "EGL_mesa": "libegl-mesa0"}  # library to Debian package; another maker's driver needs no Mesa
+EGL = {
+    "EGL": "libegl1",
+    "EGL_mesa": "libegl-mesa0",
+}  # Debian package by library; other vendors' drivers do without Mesa
 INSTALL = "on Debian: apt-get install libegl1 libegl-mesa0 libgl1-mesa-dri"
-Status = Literal["ok", "slow", "wrong"]  # "slow": a run works, at a price
+Status = Literal["ok", "slow", "wrong"]  # "slow": a run works, but renders slowly
 
 
 @dataclass(frozen=True)
 class Check:
-    """One line of the report: what was looked at, how it stands, and what was seen."""
+    """One line of the report: what was checked, its status, and what was found."""
 
     name: str
     status: Status
@@ -30,7 +33,7 @@ class Check:
 
 
 def checks(out: Path = Path("runs")) -> Iterator[Check]:
-    """All checks, each as soon as it is done; the last builds a world and takes seconds."""
+    """All checks, each yielded as soon as it is done; the last one builds a world and takes seconds."""
     yield python(sys.version_info[:3])
     yield Check("platform", "ok", platform.platform())
     yield from (package(name) for name in (*PACKAGES, "opencv-python-headless"))
@@ -49,7 +52,7 @@ def python(found: tuple[int, int, int]) -> Check:
 
 
 def package(name: str) -> Check:
-    """Whether an installed package of that name is there."""
+    """Whether the package is installed."""
     try:
         return Check(name, "ok", version(name))
     except ImportError:  # PackageNotFoundError is one
@@ -58,25 +61,25 @@ def package(name: str) -> Check:
 
 def output_folder(out: Path) -> Check:
     """Whether runs can be written below `out`."""
-    wrong = folders.findings(out / "doctor")
+    wrong = folders.run_folder_findings(out / "doctor")
     return Check("output", "wrong", wrong[0].message) if wrong else Check("output", "ok", f"can write in {out}")
 
 
 def egl(find: Callable[[str], str | None]) -> Check:
-    """Whether `find` knows the libraries of a GL context without a window."""
+    """Whether `find` finds the libraries for an OpenGL context without a window."""
     seen = ", ".join(f"{name} {'found' if find(name) else f'not found ({package})'}" for name, package in EGL.items())
     return Check("EGL libraries", "ok" if find("EGL") else "slow", seen)
 
 
 def renderer() -> Check:
-    """Build the shipped cell's world, which takes all of the above, and say which renderer it got and why."""
+    """Build the shipped cell's world, which needs all of the above; says which renderer it got, and why."""
     try:
         from regrasp.sim.world import World
 
         world = World(load_cell(shipped("cell")["thesis"]), "zero", seed=0)
         seen = world.renderer
         world.close()
-    except Exception as error:  # whatever it is, it is what the user must read
+    except Exception as error:  # any error is what the user must read
         return Check("renderer", "wrong", f"no world can be built: {type(error).__name__}: {error}")
     if seen.name == "moderngl":
         return Check("renderer", "ok", f"moderngl, {seen.reason}")

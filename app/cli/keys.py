@@ -1,4 +1,4 @@
-"""Single keys from a terminal, without waiting for Enter."""
+"""Reads single keys from a terminal, without Enter."""
 
 import os
 import re
@@ -10,8 +10,8 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-# What terminals send; a name stands for all that mean the same.
-NAMES = {
+# Names of the sequences that terminals send; those that mean the same have one name.
+KEY_NAMES = {
     **dict.fromkeys(("\x1b[C", "\x1bOC", "\x1b[B", "\x1bOB"), "forward"),
     **dict.fromkeys(("\x1b[D", "\x1bOD", "\x1b[A", "\x1bOA"), "back"),
     **dict.fromkeys(("\x1b[H", "\x1bOH", "\x1b[1~", "\x1b[7~"), "home"),
@@ -25,15 +25,15 @@ NAMES = {
     "\b": "delete",
 }
 _KEY = re.compile(r"\x1b\[[0-9;]*[~A-Za-z]|\x1bO[A-Z]|.", re.DOTALL)
-_SPLIT = re.compile(r"\x1b(\[[0-9;]*|O)?$")  # the beginning of a key whose rest is still to come
+_SPLIT = re.compile(r"\x1b(\[[0-9;]*|O)?$")  # an incomplete key sequence
 
 
 @contextmanager
 def keyboard() -> Iterator[Callable[[], str | None]]:
-    """A function that waits for a key, at most half a second: its name or character, '' for none, None at the end.
+    """Yields a function that waits up to 0.5 s for a key: its name or character, '' for none, None at the end of stdin.
 
-    stdin must be a terminal; it is as it was before when the context ends. Ctrl-C still raises KeyboardInterrupt;
-    Ctrl-Z does nothing, for it would leave the terminal as it is.
+    stdin must be a terminal; its settings are restored when the context ends. Ctrl-C still raises KeyboardInterrupt;
+    Ctrl-Z does nothing, for it would leave the terminal without its settings restored.
     """
     stdin = sys.stdin.fileno()
     before = termios.tcgetattr(stdin)
@@ -50,7 +50,7 @@ def keyboard() -> Iterator[Callable[[], str | None]]:
                 text += os.read(stdin, 1024).decode(errors="replace")
             waiting.extend(_KEY.findall(text))
         key = waiting.popleft()
-        return NAMES.get(key, key)
+        return KEY_NAMES.get(key, key)
 
     try:
         tty.setcbreak(stdin)

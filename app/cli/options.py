@@ -1,4 +1,4 @@
-"""Options that several commands take."""
+"""Options that several commands take, and how commands exit."""
 
 import re
 from collections.abc import Iterator
@@ -7,14 +7,16 @@ from typing import Annotated, Literal
 import typer
 
 from regrasp.app.files.findings import Finding, Findings
-from regrasp.app.scenario.schema import MOST_SEED
+from regrasp.app.scenario.schema import MAX_SEED
 from regrasp.interfaces.quote import quoted
 
-MOST_SEEDS = 10_000  # of one study
+MAX_SEEDS = 10_000  # of one study
+EXIT_UNMET = 1  # something did not come out as expected, or is not as it should be
+EXIT_BAD_INPUT = 2
 
 
 def _scenarios(incomplete: str) -> Iterator[str]:
-    """Names for the shell's completion; it completes paths by itself."""
+    """Scenario names for the shell's completion; the shell completes paths by itself."""
     from regrasp.app.files.resources import shipped
 
     return (name for name in shipped("scenario") if name.startswith(incomplete))
@@ -25,7 +27,7 @@ ScenarioName = Annotated[
     typer.Argument(help="A shipped scenario's name, or a path to a .yaml file.", autocompletion=_scenarios),
 ]
 Seed = Annotated[
-    int | None, typer.Option(min=0, max=MOST_SEED, help="Draws every error, noise and jitter; default the scenario's.")
+    int | None, typer.Option(min=0, max=MAX_SEED, help="Draws every error, noise and jitter; default the scenario's.")
 ]
 Renderer = Annotated[
     Literal["auto", "moderngl", "tiny"],
@@ -33,7 +35,7 @@ Renderer = Annotated[
         help="What draws the cameras' pictures; auto takes OpenGL (moderngl) where it works, else PyBullet's."
     ),
 ]
-WallLimit = Annotated[
+WallLimitSeconds = Annotated[
     float | None,
     typer.Option(min=1.0, metavar="SECONDS", help="Stop a run that takes longer, by the clock on the wall."),
 ]
@@ -50,12 +52,12 @@ Sets = Annotated[
 
 
 def parse_seeds(text: str) -> range:
-    """The seeds of "A:B", B left out. Raises `Findings` for anything else."""
+    """The seeds of "A:B", without B. Raises `Findings` for anything else."""
     first, after = map(int, text.split(":")) if re.fullmatch(r"\d{1,10}:\d{1,10}", text) else (0, 0)
-    if not first < after <= MOST_SEED:
-        right = f"write A:B with A below B and B at most {MOST_SEED}, such as 0:20"
+    if not first < after <= MAX_SEED:
+        right = f"write A:B with A below B and B at most {MAX_SEED}, such as 0:20"
         raise Findings([Finding("--seeds", 0, f"{quoted(text)} is no range of seeds; {right}")])
     seeds = range(first, after)
-    if len(seeds) > MOST_SEEDS:
-        raise Findings([Finding("--seeds", 0, f"{len(seeds)} seeds; ask for at most {MOST_SEEDS} in one study")])
+    if len(seeds) > MAX_SEEDS:
+        raise Findings([Finding("--seeds", 0, f"{len(seeds)} seeds; ask for at most {MAX_SEEDS} in one study")])
     return seeds

@@ -8,26 +8,25 @@ from typing import Annotated, TypeVar
 import typer
 
 from regrasp.app.cli.options import Sets
-from regrasp.app.files.findings import Finding, Findings, nearest, real, shown
+from regrasp.app.files.findings import Finding, Findings, real_path, shown
 from regrasp.app.files.resources import resolve
 from regrasp.app.interrupts import late_imports
 from regrasp.app.records import folders
 from regrasp.app.scenario.cell_file import load_cell
 from regrasp.app.scenario.load import load_scenario
-from regrasp.app.scenario.schema import MOST_SEED
+from regrasp.app.scenario.schema import MAX_SEED
 from regrasp.interfaces.cell import Color
-from regrasp.interfaces.quote import quoted
+from regrasp.interfaces.quote import nearest, quoted
 
 T = TypeVar("T")
 
-SUFFIXES = (".png", ".jpg", ".jpeg")  # of a drawing
-# Of these a snapshot writes some; a camera pose that an earlier one left would not be that of its pictures.
-SNAPSHOT = ("rgb.png", "rgb_001.png", "depth.png", "depth_001.png", "intrinsics.yaml", "camera_pose.yaml")
-LEAST_SATURATION = 0.2  # choice: with less a colour is grey, and all that is grey would be the connector's
+DRAWING_SUFFIXES = (".png", ".jpg", ".jpeg")  # of a drawing
+# A snapshot writes some of these. A camera pose that an earlier one left would not belong to the new pictures.
+SNAPSHOT_FILES = ("rgb.png", "rgb_001.png", "depth.png", "depth_001.png", "intrinsics.yaml", "camera_pose.yaml")
 
 
 def add_to(app: typer.Typer) -> None:
-    """Make the commands some of `app`."""
+    """Add the commands to `app`."""
     app.command("perceive")(perceive)
     app.command("snapshot")(snapshot)
 
@@ -124,7 +123,7 @@ def perceive(
 
 
 def _each(option: str, given: Sequence[T], count: int, wrong: list[Finding], once: bool = True) -> list[T]:
-    """A value for each of `count` pictures, where `once` may stand for all. What is wrong is added to `wrong`."""
+    """A value for each of `count` pictures; with `once` a single one may stand for all. Errors are added to `wrong`."""
     if once and len(given) == 1:
         return [given[0]] * count
     if len(given) != count:
@@ -134,27 +133,37 @@ def _each(option: str, given: Sequence[T], count: int, wrong: list[Finding], onc
 
 
 def _bad_drawing(draw: Path, inputs: Sequence[Path]) -> list[Finding]:
-    """Why nothing can be drawn there."""
-    if draw.suffix.lower() not in SUFFIXES:
-        return [Finding("--draw", 0, f"{quoted(draw.name)} is no name of a picture; end it in {' or '.join(SUFFIXES)}")]
-    if any(real(draw) == real(path) or (draw.exists() and path.exists() and draw.samefile(path)) for path in inputs):
+    """Why the drawing cannot be written there; [] if it can."""
+    if draw.suffix.lower() not in DRAWING_SUFFIXES:
+        return [
+            Finding(
+                "--draw", 0, f"{quoted(draw.name)} is no name of a picture; end it in {' or '.join(DRAWING_SUFFIXES)}"
+            )
+        ]
+    if any(
+        real_path(draw) == real_path(path) or (draw.exists() and path.exists() and draw.samefile(path))
+        for path in inputs
+    ):
         return [
             Finding(
                 "--draw", 0, f"{quoted(shown(draw))} is one of your own files, which it would overwrite; name another"
             )
         ]
-    return folders.unwritable_file(draw)
+    return folders.file_findings(draw)
 
 
-def _color(text: str, wrong: list[Finding]) -> Color | None:
-    """A colour of "R,G,B", each then 0 to 1. What is wrong is added to `wrong`."""
+def _color(text: str, wrong: list[Finding], min_saturation: float = 0.2) -> Color | None:
+    """The colour of "R,G,B", each then 0 to 1. What is wrong is added to `wrong`.
+
+    Below `min_saturation` (of HSV; choice) a colour is refused as grey: every grey thing would look like the connector.
+    """
     parts = text.split(",")
     right = "write three numbers of 0 to 255, such as 191,13,15"
     if len(parts) != 3 or not all(re.fullmatch(r"\s*\d{1,3}\s*", part) and int(part) <= 255 for part in parts):
         wrong.append(Finding("--color", 0, f"{quoted(text)} is no colour; {right}"))
         return None
     red, green, blue = (int(part) / 255 for part in parts)
-    if max(red, green, blue) - min(red, green, blue) < LEAST_SATURATION * max(red, green, blue, 1e-9):
+    if max(red, green, blue) - min(red, green, blue) < min_saturation * max(red, green, blue, 1e-9):
         wrong.append(
             Finding(
                 "--color", 0, f"{quoted(text)} is grey, and nothing else tells it from its surroundings; name a hue"
@@ -170,7 +179,7 @@ def snapshot(
     camera: Annotated[str, typer.Option(metavar="NAME", help="The cell's camera: rear or wrist.")] = "rear",
     frames: Annotated[int, typer.Option(min=1, max=100, help="How many.")] = 1,
     seed: Annotated[
-        int | None, typer.Option(min=0, max=MOST_SEED, help="Draws every error and noise; default the scenario's.")
+        int | None, typer.Option(min=0, max=MAX_SEED, help="Draws every error and noise; default the scenario's.")
     ] = None,
     sets: Sets = None,
 ) -> None:
@@ -184,8 +193,8 @@ def snapshot(
       regrasp snapshot no_obstacle --seed 3 --frames 4 --out four
       regrasp snapshot no_obstacle --set cell=thesis_tags --out tags
     """
-    wrong = folders.unwritable(out)
-    if there := [name for name in SNAPSHOT if (out / name).exists()]:
+    wrong = folders.folder_findings(out)
+    if there := [name for name in SNAPSHOT_FILES if (out / name).exists()]:
         wrong.append(Finding(shown(out), 0, f"already holds {', '.join(there)}; name another folder"))
     loaded = load_scenario(scenario, [*(sets or []), *([] if seed is None else [f"seed={seed}"])], None)
     names = [c.name for c in loaded.cell.known.cameras]

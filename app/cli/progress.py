@@ -1,35 +1,27 @@
-"""What a running episode shows on stderr, and how Ctrl-C reaches it."""
+"""Shows the progress of an episode on stderr, and ends it at Ctrl-C."""
 
 import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any, NamedTuple
+from typing import Any
 
 from rich.console import Console
 
 from regrasp.app.cli.options import LogLevel
-from regrasp.app.files.findings import printable
 from regrasp.app.interrupts import interruptible
-from regrasp.app.records.record import OnEvent, Progress
-from regrasp.app.records.summary import in_words
+from regrasp.app.records.summary import event_words
+from regrasp.app.run.observers import Observers
+from regrasp.interfaces.quote import printable
 
-QUIET_SECONDS = 5.0  # simulated, between two lines of a leaf that goes on
 LEVELS = ("debug", "info", "warning", "error")
 
 
-class Shown(NamedTuple):
-    """What `run_episode` calls: at each tick, and for each event."""
-
-    tick: Progress
-    event: OnEvent
-
-
 @contextmanager
-def shown_progress(quiet: bool, level: LogLevel = None) -> Iterator[Shown]:
-    """Callbacks for `run_episode`: one live line on a terminal, else a line a leaf; `quiet` shows nothing.
+def shown_progress(quiet: bool, level: LogLevel = None) -> Iterator[Observers]:
+    """Observers of an episode: one live line on a terminal, else a line a leaf; `quiet` shows nothing.
 
-    Events from `level` on are shown as lines; None shows none. While it is open, Ctrl-C raises KeyboardInterrupt from
-    the tick's callback, so between two ticks; a second one at once.
+    Events of `level` and above are shown as lines; None shows none. While the context is open, Ctrl-C raises
+    KeyboardInterrupt from the observer's `tick`, so between two ticks of the tree; a second Ctrl-C raises it at once.
     """
     console = Console(stderr=True, highlight=False, markup=False)
     shown_levels = LEVELS[LEVELS.index(level) :] if level else ()
@@ -37,7 +29,7 @@ def shown_progress(quiet: bool, level: LogLevel = None) -> Iterator[Shown]:
     def event(values: Mapping[str, Any]) -> None:
         if values["level"] in shown_levels:
             rest = {name: value for name, value in values.items() if name not in ("t", "level", "event", "node")}
-            what = in_words(str(values["event"]), rest)
+            what = event_words(str(values["event"]), rest)
             told = printable(f"{values['t']:7.2f} s  {values['level']:<7}  {values.get('node') or '-'}  {what}")
             if console.is_terminal:
                 console.print(told, soft_wrap=True)
@@ -46,7 +38,7 @@ def shown_progress(quiet: bool, level: LogLevel = None) -> Iterator[Shown]:
 
     with interruptible() as check:
         if quiet:
-            yield Shown(lambda _time, _leaf: check(), event)
+            yield Observers(tick=lambda _time, _leaf: check(), event=event)
         elif console.is_terminal:
             with console.status("starting") as status:
 
@@ -54,7 +46,7 @@ def shown_progress(quiet: bool, level: LogLevel = None) -> Iterator[Shown]:
                     check()
                     status.update(f"{time:7.1f} s  {leaf}")
 
-                yield Shown(live, event)
+                yield Observers(tick=live, event=event)
         else:
             lines = _Lines()
 
@@ -62,18 +54,19 @@ def shown_progress(quiet: bool, level: LogLevel = None) -> Iterator[Shown]:
                 check()
                 lines.show(time, leaf)
 
-            yield Shown(plain, event)
+            yield Observers(tick=plain, event=event)
 
 
 class _Lines:
-    """A line when the leaf changes, at most one a simulated second, and one now and then while it goes on."""
+    """Prints a line when the leaf changes, and again while it goes on; `seconds` are simulated, between two lines."""
 
-    def __init__(self) -> None:
+    def __init__(self, seconds_of_new: float = 1.0, seconds_of_same: float = 5.0) -> None:
+        self.seconds_of_new, self.seconds_of_same = seconds_of_new, seconds_of_same
         self.time = float("-inf")
         self.leaf = ""
 
     def show(self, time: float, leaf: str) -> None:
-        if time - self.time >= (QUIET_SECONDS if leaf == self.leaf else 1.0):
+        if time - self.time >= (self.seconds_of_same if leaf == self.leaf else self.seconds_of_new):
             self.time, self.leaf = time, leaf
             _print(f"{time:7.1f} s  {leaf}")
 
@@ -81,5 +74,5 @@ class _Lines:
 def _print(line: str) -> None:
     try:
         print(line, file=sys.stderr, flush=True)
-    except BrokenPipeError:  # who watched has gone: as Ctrl-C, with the record kept
+    except BrokenPipeError:  # the reader of stderr has gone: end as by Ctrl-C, with the record kept
         raise KeyboardInterrupt from None

@@ -1,4 +1,4 @@
-"""`regrasp explain`, `replay` and `diff`: look at the records that runs left."""
+"""`regrasp explain`, `replay` and `diff`: inspect the records of runs."""
 
 import json
 import os
@@ -10,18 +10,19 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from regrasp.app.files.findings import Finding, Findings, printable
+from regrasp.app.files.findings import Finding, Findings
+from regrasp.interfaces.quote import printable
 
 if TYPE_CHECKING:
     from regrasp.app.records.reader import RunRecord
 
-EXIT_DIFFERENT = 1
-WIDTHS = (80, 120)  # columns of a page
+EXIT_RUNS_DIFFER = 1
+WIDTHS = (80, 120)  # least and largest width of a page
 Folder = Annotated[Path, typer.Argument(metavar="DIR", help="A run's folder.")]
 
 
 def add_to(app: typer.Typer) -> None:
-    """Mount the commands."""
+    """Add the commands to `app`."""
     app.command()(explain)
     app.command()(replay)
     app.command()(diff)
@@ -76,9 +77,9 @@ def replay(
     run = Replay(_read(folder), float("inf") if end is None else end)
     run.check(begin or 0.0, part)
     if sys.stdin.isatty() and sys.stdout.isatty() and os.environ.get("TERM") != "dumb":
-        from regrasp.app.cli.replay_screen import show
+        from regrasp.app.cli.replay_screen import replay_on_screen
 
-        show(run, part, begin or 0.0)
+        replay_on_screen(run, part, begin or 0.0)
         return
     for line in run.lines(begin or 0.0, part):
         typer.echo(line)
@@ -102,7 +103,7 @@ def diff(folder: Folder, other: Annotated[Path, typer.Argument(metavar="DIR", he
     if begun or parted:
         typer.echo("\n".join([f"{printable(str(folder))} | {printable(str(other))}", *begun, *parted]))
     if parted:
-        raise typer.Exit(EXIT_DIFFERENT)
+        raise typer.Exit(EXIT_RUNS_DIFFER)
     typer.echo(f"the same {len(first.ticks)} lines of ticks and {len(first.events)} events")
 
 
@@ -113,7 +114,7 @@ def _read(folder: Path) -> "RunRecord":
 
 
 def _read_both(*folders: Path) -> "list[RunRecord]":
-    """The records, or the findings of all of them."""
+    """The records. Raises the findings of all of them."""
     found: list[Finding] = []
     records: list[RunRecord] = []
     for folder in folders:

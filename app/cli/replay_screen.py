@@ -1,4 +1,4 @@
-"""`regrasp replay` on a terminal: the tree after a change, and keys to go from change to change."""
+"""`regrasp replay` on a terminal: shows the tree after a change; keys go from change to change."""
 
 import re
 from dataclasses import dataclass, replace
@@ -8,12 +8,11 @@ from rich.live import Live
 from rich.text import Text
 
 from regrasp.app.cli.keys import keyboard
-from regrasp.app.files.findings import printable
 from regrasp.app.records.replay import Replay
 from regrasp.app.records.timeline import event_text
-from regrasp.interfaces.quote import quoted
+from regrasp.interfaces.quote import printable, quoted
 
-PAGE = 10  # changes
+PAGE_CHANGES = 10  # changes that PgDn and PgUp go
 HELP = (  # the first that fits is shown
     "right/left step  PgDn/PgUp 10  Home/End  n next failure  g go to a time  / filter  q quit",
     "right/left step  PgDn/PgUp 10  Home/End  n failure  g time  / filter  q quit",
@@ -22,13 +21,21 @@ HELP = (  # the first that fits is shown
 )
 STATUS_WIDTH = 7  # of each of the four
 COLORS = {"RUNNING": "yellow", "SUCCESS": "green", "FAILURE": "bold red", "INVALID": "dim"}
-STEPS = {"forward": 1, " ": 1, "l": 1, "back": -1, "h": -1, "page forward": PAGE, "page back": -PAGE}
+KEY_STEPS = {
+    "forward": 1,
+    " ": 1,
+    "l": 1,
+    "back": -1,
+    "h": -1,
+    "page forward": PAGE_CHANGES,
+    "page back": -PAGE_CHANGES,
+}
 PROMPTS = {"g": "go to second: ", "/": "only paths with: "}
 
 
 @dataclass(frozen=True)
 class View:
-    """What is shown: the frame's index, the filter, the open prompt ('' for none) with what was typed, a note."""
+    """What is shown: the change's index, the filter, the open prompt ('' for none) with what was typed, a note."""
 
     index: int = 0
     part: str = ""
@@ -37,7 +44,7 @@ class View:
     note: str = ""
 
 
-def show(replay: Replay, part: str, start: float) -> None:
+def replay_on_screen(replay: Replay, part: str, start: float) -> None:
     """Step through the record until q."""
     view: View | None = View(replay.at(start), part)
     console = Console(highlight=False, markup=False)
@@ -54,10 +61,10 @@ def pressed(replay: Replay, view: View, key: str) -> View | None:
     """The view after a key; None to quit."""
     if view.prompt:
         return _typed(replay, view, key)
-    last = len(replay.frames) - 1
+    last = len(replay.changes) - 1
     view = replace(view, note="") if key else view
-    if key in STEPS:
-        return replace(view, index=min(max(view.index + STEPS[key], 0), last))
+    if key in KEY_STEPS:
+        return replace(view, index=min(max(view.index + KEY_STEPS[key], 0), last))
     if key in ("home", "end"):
         return replace(view, index=0 if key == "home" else last)
     if key == "n":
@@ -85,13 +92,13 @@ def _typed(replay: Replay, view: View, key: str) -> View:
 
 
 def draw(replay: Replay, view: View, width: int, height: int) -> Group:
-    """The screen: a line of where we are, the tree, the change's events, a line of keys."""
-    frame = replay.frames[view.index]
+    """The screen: a line with the position, the tree, the change's events, and a line of keys."""
+    change = replay.changes[view.index]
     events = [
-        f"{_own_name(event.node) or '-'}  {event_text(event)}" for event in frame.events if view.part in event.node
+        f"{_own_name(event.node) or '-'}  {event_text(event)}" for event in change.events if view.part in event.node
     ]
     events = events[: max(1, height // 4)]
-    head = f"{frame.t:8.2f} s   change {view.index + 1} of {len(replay.frames)}"
+    head = f"{change.t:8.2f} s   change {view.index + 1} of {len(replay.changes)}"
     head += f"   only paths with {view.part!r}" if view.part else ""
     foot = PROMPTS[view.prompt] + view.typed + "_" if view.prompt else view.note or _help(width)
     tree = _tree(replay, view, width, max(1, height - len(events) - 3))
@@ -107,9 +114,9 @@ def _help(width: int) -> str:
 
 
 def _tree(replay: Replay, view: View, width: int, height: int) -> list[Text]:
-    """As many lines of the tree as there is place, around the first node that changed."""
+    """As many lines of the tree as fit, around the first node that changed."""
     nodes = [node for node in replay.rows if view.part in node.path]
-    changed = {tick.path for tick in replay.frames[view.index].nodes}
+    changed = {tick.path for tick in replay.changes[view.index].nodes}
     focus = next((i for i, node in enumerate(nodes) if node.path in changed), 0)
     top = max(0, min(focus - height // 3, len(nodes) - height))
     names = [printable(node.path if view.part else "  " * node.depth + _own_name(node.path)) for node in nodes]
@@ -128,7 +135,7 @@ def _tree(replay: Replay, view: View, width: int, height: int) -> list[Text]:
 
 
 def _shortened(name: str, width: int) -> str:
-    """The indented name without the middle that is too much for `width` columns; at most half of them are indent."""
+    """The indented name, cut in its middle to `width` columns; at most half of them are indent."""
     if len(name) <= width:
         return name
     own = name.lstrip()

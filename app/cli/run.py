@@ -10,29 +10,28 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from regrasp.app.cli.options import LogLevel, Renderer, ScenarioName, Seed, Sets, WallLimit
+from regrasp.app.cli.options import EXIT_UNMET, LogLevel, Renderer, ScenarioName, Seed, Sets, WallLimitSeconds
 from regrasp.app.cli.progress import shown_progress
 from regrasp.app.cli.run_every import run_every
-from regrasp.app.files.findings import Finding, Findings, printable, shown
-from regrasp.app.interrupts import late_imports
+from regrasp.app.files.findings import Finding, Findings, shown
+from regrasp.app.interrupts import EXIT_INTERRUPTED, late_imports
 from regrasp.app.records import folders
-from regrasp.app.records.summary import summary
+from regrasp.app.records.summary import run_summary
 from regrasp.app.run.batch import Run, Settings, result_of
 from regrasp.app.run.processes import run_each
 from regrasp.app.scenario.load import Scenario, cases, load_scenario
+from regrasp.interfaces.quote import printable
 
 if TYPE_CHECKING:
     from regrasp.app.records.result import Result
 
-EXIT_UNMET, EXIT_INTERRUPTED = 1, 130
-
 
 def add_to(app: typer.Typer) -> None:
-    """Make the command one of `app`."""
-    app.command("run")(run)
+    """Add the command to `app`."""
+    app.command("run")(run_scenario)
 
 
-def run(
+def run_scenario(
     scenario: ScenarioName,
     case: Annotated[
         str | None, typer.Option(metavar="NAME", help="The case to run; default that of the first values.")
@@ -49,7 +48,7 @@ def run(
     junit: Annotated[Path | None, typer.Option(metavar="FILE", help="With --all: write JUnit XML, too.")] = None,
     video: Annotated[bool, typer.Option("--video", help="Film the run into the record.")] = False,
     renderer: Renderer = "auto",
-    wall_limit: WallLimit = None,
+    wall_limit: WallLimitSeconds = None,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Check everything, say what would run, and run nothing.")
     ] = False,
@@ -76,7 +75,7 @@ def run(
     if every:
         wrong += _given("is for a single case; leave --all out", case=case, gui=gui, log_level=log_level)
         if dry_run:
-            wrong += folders.unwritable_file(junit) if junit else []
+            wrong += folders.file_findings(junit) if junit else []
             _tell(_checked(partial(cases, scenario, overrides), wrong, out), out)
             return
         settings = Settings(video, renderer, quiet, wall_limit or math.inf)
@@ -94,16 +93,16 @@ def run(
     finally:
         if out is None:
             folders.leave_if_empty(folder)
-    if wall_limit is not None and result.cause and not folder.exists():  # it was stopped before that
+    if wall_limit is not None and result.cause and not folder.exists():  # the run was stopped before it began
         typer.echo(f"{result.cause.code}: {result.cause.message}, before the run began; there is no record", err=True)
         raise typer.Exit(EXIT_UNMET)
-    typer.echo(summary(result, folder))
+    typer.echo(run_summary(result, folder))
     raise typer.Exit(exit_code(result))
 
 
 def _checked(load: Callable[[], list[Scenario]], wrong: list[Finding], out: Path | None) -> list[Scenario]:
-    """The scenarios, or the findings of all that is wrong with them and with the options."""
-    wrong += folders.unwritable(folders.RUNS) if out is None else folders.findings(out)
+    """The scenarios. Raises `Findings` of all that is wrong with them and with the options."""
+    wrong += folders.folder_findings(folders.RUNS) if out is None else folders.run_folder_findings(out)
     try:
         loaded = load()
     except Findings as error:
@@ -118,7 +117,7 @@ def _run(scenario: Scenario, folder: Path, settings: Settings, gui: bool, log_le
     with late_imports():
         from regrasp.app.run.episode import run_episode  # brings the planner, the compiler and the physics: seconds
 
-    with shown_progress(settings.quiet, log_level) as show:
+    with shown_progress(settings.quiet, log_level) as observers:
         return run_episode(
             scenario,
             folder,
@@ -126,13 +125,12 @@ def _run(scenario: Scenario, folder: Path, settings: Settings, gui: bool, log_le
             video=settings.video,
             gui=gui,
             renderer=settings.renderer,
-            progress=show.tick,
-            on_event=show.event,
+            observers=observers,
         )
 
 
 def _watched(run: Run, task: Callable[[], "Result"], wall_limit: float) -> "Result":
-    """Do it in a process of its own, which is stopped after `wall_limit` seconds."""
+    """Do the run in a process of its own, which is stopped after `wall_limit` seconds."""
     from regrasp.app.records.reader import read_record  # late: it brings py_trees
 
     assert run.folder is not None
@@ -146,7 +144,7 @@ def _watched(run: Run, task: Callable[[], "Result"], wall_limit: float) -> "Resu
 
 
 def _tell(loaded: list[Scenario], out: Path | None) -> None:
-    """What a dry run says."""
+    """Print what a dry run found."""
     first = loaded[0]
     typer.echo(f"{shown(first.path)}: nothing wrong; tree {shown(first.tree)}, cell {first.file.cell}")
     for scenario in loaded:
@@ -155,7 +153,7 @@ def _tell(loaded: list[Scenario], out: Path | None) -> None:
 
 
 def _given(message: str, **options: object) -> list[Finding]:
-    """A finding for each of these options that is given."""
+    """A finding with this message for each of these options that was given."""
     return [Finding(f"--{name.replace('_', '-')}", 0, message) for name, value in options.items() if value]
 
 
@@ -169,7 +167,7 @@ def _display() -> bool:
 
 
 def exit_code(result: "Result") -> int:
-    """0 when all that was expected came out, 130 after Ctrl-C, else 1."""
+    """0 if all expectations were met, 130 after Ctrl-C, else 1."""
     if result.outcome == "interrupted":
         return EXIT_INTERRUPTED
     return 0 if result.succeeded else EXIT_UNMET

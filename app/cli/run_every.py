@@ -1,14 +1,17 @@
-"""Every case of a scenario, and what to tell of them."""
+"""Runs every case of a scenario and reports the results."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from regrasp.app.files.findings import Finding, Findings, printable
+from regrasp.app.cli.options import EXIT_UNMET
+from regrasp.app.files.findings import Finding, Findings
+from regrasp.app.interrupts import EXIT_INTERRUPTED
 from regrasp.app.records import folders
-from regrasp.app.run.batch import Episode, Row, Run, Settings, run_all
+from regrasp.app.run.batch import Row, Run, RunEpisode, Settings, run_all
 from regrasp.app.run.junit import write_junit
 from regrasp.app.scenario.load import cases
 from regrasp.app.studies.table import print_table
+from regrasp.interfaces.quote import printable
 
 
 def run_every(
@@ -19,24 +22,28 @@ def run_every(
     junit: Path | None = None,
     settings: Settings = Settings(),  # noqa: B008 - it does not change
     wrong: Sequence[Finding] = (),
-    episode: Episode | None = None,
+    episode: RunEpisode | None = None,
 ) -> int:
     """Run every case, each in its own process, its record in a folder of `out` with its name.
 
-    Progress goes to stderr, a table to stdout, JUnit XML to `junit`. Returns the exit code: 0 when all came out as
-    expected, 1 when not, 130 after Ctrl-C, which keeps what was done. `episode` stands in for `run_episode` in tests.
+    Progress goes to stderr, a table to stdout, JUnit XML to `junit`. Returns the exit code: 0 if all came out as
+    expected, 1 if not, 130 after Ctrl-C, which keeps what was done. `episode` replaces `run_episode` in tests.
 
     Raises:
         Findings: bad input; `wrong` holds what the caller found.
         OSError: the disk is full or the like.
     """
-    found = [*wrong, *(folders.unwritable_file(junit) if junit else [])]
+    found = [*wrong, *(folders.file_findings(junit) if junit else [])]
     try:
         loaded = cases(scenario, overrides)
     except Findings as error:
         raise Findings([*found, *error.items]) from None
     names = [folders.folder_name(case.case) for case in loaded]
-    found += [f for name in names for f in folders.findings(out / name)] if out else folders.unwritable(folders.RUNS)
+    found += (
+        [f for name in names for f in folders.run_folder_findings(out / name)]
+        if out
+        else folders.folder_findings(folders.RUNS)
+    )
     if found:
         raise Findings(found)
     into = out or folders.new_folder(f"{loaded[0].name}-all")
@@ -46,7 +53,9 @@ def run_every(
         junit.parent.mkdir(parents=True, exist_ok=True)
         write_junit(junit, loaded[0].name, runs, rows)
     _tell(loaded[0].name, runs, rows, into)
-    return 130 if interrupted else 0 if all(row.succeeded for row in rows.values()) else 1
+    if interrupted:
+        return EXIT_INTERRUPTED
+    return 0 if all(row.succeeded for row in rows.values()) else EXIT_UNMET
 
 
 def _tell(name: str, runs: Sequence[Run], rows: Mapping[int, Row], into: Path) -> None:

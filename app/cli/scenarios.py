@@ -1,4 +1,4 @@
-"""`regrasp scenarios`: look at scenarios."""
+"""`regrasp scenarios`: list, check and show scenarios."""
 
 import json
 from typing import Annotated
@@ -7,10 +7,11 @@ import typer
 import yaml
 
 from regrasp.app.cli.options import Sets
-from regrasp.app.files.findings import Finding, Findings, printable, shown
+from regrasp.app.files.findings import Finding, Findings, shown
 from regrasp.app.files.resources import shipped
 from regrasp.app.files.schema_doc import markdown
 from regrasp.app.scenario.load import case_names, cases, description, load_scenario
+from regrasp.interfaces.quote import printable
 
 app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="List, check and show scenarios.")
 Name = Annotated[str, typer.Argument(help="A shipped scenario's name, or a path to a .yaml file.")]
@@ -30,7 +31,7 @@ def _counted(cases: int) -> str:
 
 
 @app.command("check")
-def check(
+def check_scenarios(
     files: Annotated[list[str] | None, typer.Argument(help="Names or paths; default all that are shipped.")] = None,
     sets: Sets = None,
 ) -> None:
@@ -58,7 +59,7 @@ def check(
 
 
 @app.command("show")
-def show(
+def show_scenario(
     scenario: Name,
     case: Annotated[
         str | None, typer.Option(metavar="NAME", help="The case; default that of the first values.")
@@ -88,7 +89,7 @@ def show(
 
 
 @app.command("schema")
-def schema(
+def print_schema(
     as_markdown: Annotated[
         bool, typer.Option("--markdown", help="A reference to read: each field, its meaning and an example.")
     ] = False,

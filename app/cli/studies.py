@@ -8,11 +8,11 @@ from typing import Annotated
 
 import typer
 
-from regrasp.app.cli.options import Renderer, Sets, WallLimit, parse_seeds
-from regrasp.app.files.findings import Finding, Findings, nearest, shown
+from regrasp.app.cli.options import Renderer, Sets, WallLimitSeconds, parse_seeds
+from regrasp.app.files.findings import Finding, Findings, shown
 from regrasp.app.interrupts import late_imports
 from regrasp.app.records import folders
-from regrasp.interfaces.quote import quoted
+from regrasp.interfaces.quote import nearest, quoted
 
 app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Run many episodes or scenes, and count.")
 
@@ -24,7 +24,7 @@ def demo(
     out: Annotated[Path | None, typer.Option(help="Folder of demo.json and the runs' records.")] = None,
     sets: Sets = None,
     renderer: Renderer = "auto",
-    wall_limit: WallLimit = None,
+    wall_limit: WallLimitSeconds = None,
 ) -> None:
     """Run the whole demonstration over many seeds.
 
@@ -130,7 +130,7 @@ def _unfit(out: Path | None, file: str) -> list[Finding]:
     if out is None:
         return []
     taken = [Finding(shown(out), 0, "already holds a study; name another folder")] if (out / file).exists() else []
-    return folders.findings(out) + taken
+    return folders.run_folder_findings(out) + taken
 
 
 def _techniques(text: str | None, wrong: list[Finding]) -> list[str]:
@@ -141,7 +141,7 @@ def _techniques(text: str | None, wrong: list[Finding]) -> list[str]:
 
 
 def _listed(option: str, text: str | None, known: Sequence[str], wrong: list[Finding]) -> list[str]:
-    """The names of "A,B", each once, all that are known without a text; those that are not go to `wrong`."""
+    """The names in "A,B", each once; without a text all known ones. Findings of unknown names are added to `wrong`."""
     names = list(known) if text is None else list(dict.fromkeys(name.strip() for name in text.split(",")))
     wrong += [Finding(option, 0, f"no {quoted(name)}; {nearest(name, known)}") for name in names if name not in known]
     return names

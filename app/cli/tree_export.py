@@ -1,22 +1,22 @@
-"""What `regrasp trees export` asks for, checked, and written."""
+"""Checks what `regrasp trees export` is asked for, and writes it."""
 
 import sys
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from regrasp.app.files.findings import Finding, Findings, nearest, shown
+from regrasp.app.files.findings import Finding, Findings, shown
 from regrasp.app.files.resources import read_text, resolve
 from regrasp.app.files.whole_file import write_whole
-from regrasp.app.records.folders import FILES, unwritable_file
+from regrasp.app.records.folders import FILES, file_findings
 from regrasp.app.records.reader import RunRecord, read_record
 from regrasp.app.scenario.load import check_tree_file
 from regrasp.app.scenario.references import tree_text
-from regrasp.interfaces.quote import quoted
+from regrasp.interfaces.quote import nearest, quoted
 from regrasp.trees import Node, TreeSyntaxError, collapsed, read_graph, recorded, run_stats
 from regrasp.trees.export import FORMAT_OF_SUFFIX, FORMATS, THEMES, export_tree
 
-MOST_MISSING = 3  # nodes that are named
+MAX_MISSING_NAMED = 3  # missing nodes that a finding names
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ def exported(request: Request) -> bytes:
 
 
 def _form(request: Request) -> str:
-    """The format's name, when all that can be seen without a tree is right."""
+    """The format's name. Raises `Findings` of all that is wrong with the request itself."""
     out = request.out
     form = request.form or (_named(out) if out else "ascii")
     found = [*_wrong_form(request.form, out)] if request.form else []
@@ -67,7 +67,7 @@ def _form(request: Request) -> str:
 
 
 def _named(out: Path) -> str:
-    """The format that a file's name ends like, '' for none."""
+    """The format of a file's suffix, '' for none."""
     return FORMAT_OF_SUFFIX.get(out.suffix.lower(), "")
 
 
@@ -89,11 +89,11 @@ def _wrong_out(out: Path, form: str) -> Iterator[Finding]:
         wrong = f"there is no folder {quoted(shown(out.absolute().parent))}; name a file in a folder that exists"
         yield Finding(shown(out), 0, wrong)
     else:
-        yield from unwritable_file(out)
+        yield from file_findings(out)
 
 
 def _tree_file(request: Request, record: RunRecord | None) -> Path:
-    """The file of the tree that is named, else the run's own copy."""
+    """The file of the named tree, else the run's own copy."""
     if request.tree is not None:
         return resolve("tree", request.tree, Path())
     assert record is not None  # _form saw to it
@@ -114,7 +114,7 @@ def _read(path: Path, record: RunRecord | None) -> Node:
 
 
 def _with_run(path: Path, record: RunRecord) -> Node:
-    """Not checked in full: it ran, perhaps with leaves that are no more."""
+    """The tree with its run. It is not checked in full: it may have leaves that no longer exist."""
     read_text(path)  # its findings are ours
     inputs = record.begin.get("inputs")
     given = {key: tree_text(value) for key, value in inputs.items()} if isinstance(inputs, dict) else {}
@@ -136,7 +136,7 @@ def _check_paths(path: Path, record: RunRecord, known: Collection[str]) -> None:
         if tick.path not in known:
             missing.setdefault(tick.path, number)
     if missing:
-        first, more = [*missing][:MOST_MISSING], len(missing) - MOST_MISSING
+        first, more = [*missing][:MAX_MISSING_NAMED], len(missing) - MAX_MISSING_NAMED
         names = ", ".join(map(quoted, first)) + (f" and {more} more nodes" if more > 0 else "")
         wrong = f"{shown(path)} is not the tree that ran: it has no {names}; name that tree, or leave TREE out"
         raise Findings([Finding(shown(record.folder / "ticks.jsonl"), missing[first[0]], wrong)])

@@ -1,15 +1,15 @@
-"""`regrasp trees`: look at behaviour trees."""
+"""`regrasp trees`: list, check, show and export behaviour trees."""
 
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from regrasp.app.files.findings import Finding, Findings, nearest
+from regrasp.app.files.findings import Finding, Findings
 from regrasp.app.files.resources import resolve, shipped
 from regrasp.app.scenario.load import check_tree_file
 from regrasp.app.scenario.references import names_of
-from regrasp.interfaces.quote import quoted
+from regrasp.interfaces.quote import nearest, quoted
 
 app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="List, check, show and export behaviour trees.")
 
@@ -22,7 +22,9 @@ def list_trees() -> None:
 
 
 @app.command("show")
-def show(tree: Annotated[str, typer.Argument(help="A shipped tree's name, or a path to an .xml file.")]) -> None:
+def show_tree_file(
+    tree: Annotated[str, typer.Argument(help="A shipped tree's name, or a path to an .xml file.")],
+) -> None:
     """Draw a tree as text.
 
     \b
@@ -37,7 +39,7 @@ def show(tree: Annotated[str, typer.Argument(help="A shipped tree's name, or a p
 
 
 @app.command("export")
-def export(
+def export_tree_file(
     tree: Annotated[
         str | None,
         typer.Argument(help="A shipped tree's name, or a path to an .xml file; with --run, by default its own."),
@@ -51,7 +53,11 @@ def export(
     ] = None,
     depth: Annotated[
         int | None,
-        typer.Option(min=0, metavar="N", help="Open SubTrees N deep; at 0 each in the main tree is a single node."),
+        typer.Option(
+            min=0,
+            metavar="N",
+            help="Expand SubTrees down to N levels; with 0 each SubTree of the main tree is a single node.",
+        ),
     ] = None,
     theme: Annotated[str, typer.Option(help="Of dot, svg and png: light or dark.")] = "light",
     run: Annotated[
@@ -81,7 +87,7 @@ def export(
 
 
 @app.command("check")
-def check(
+def check_trees(
     trees: Annotated[
         list[str] | None, typer.Argument(help="Shipped trees' names or paths to .xml files; without any, all shipped.")
     ] = None,
@@ -111,7 +117,7 @@ def check(
 
 
 @app.command("leaves")
-def leaves(name: Annotated[str | None, typer.Argument(help="One element, in full.")] = None) -> None:
+def list_leaves(name: Annotated[str | None, typer.Argument(help="One element, in full.")] = None) -> None:
     """List the elements that a tree file may hold.
 
     Leaves and built-in ones, each with its attributes.

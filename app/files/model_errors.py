@@ -1,7 +1,7 @@
-"""Every error of a plain value against a pydantic model, in one go.
+"""All errors of a plain value against a pydantic model at once.
 
-Pydantic tells some only when others are mended: what fields must fulfil together, once each is right alone; all of a
-union's member, once its tag is right.
+Pydantic itself reports some errors only when others are corrected: conditions on several fields when each field is
+valid, and the fields of a union's member when its tag is valid.
 """
 
 import json
@@ -14,44 +14,44 @@ from typing import NamedTuple
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from regrasp.app.files.findings import closest
-from regrasp.app.files.schema_nodes import Schema, at, child, nodes_at
+from regrasp.app.files.schema_nodes import Schema, child, nodes_at, value_at
 from regrasp.app.files.yaml_lines import Path, Value
+from regrasp.interfaces.quote import closest
 
 TAG_ERRORS = ("union_tag_invalid", "union_tag_not_found")
-MOST_LOOKED_INTO = 100  # a value with more errors was not written by hand
+MAX_ERRORS_LOOKED_INTO = 100  # with more errors a value was not written by hand
 
 
 class ModelError(NamedTuple):
-    """One of pydantic's errors; `path` leads to the value, or to where a missing one should stand."""
+    """An error of pydantic; `path` leads to the value, or to the place where a missing one belongs."""
 
     path: Path
     details: ErrorDetails
 
     @property
     def is_of_several(self) -> bool:
-        """Whether it is of a mapping's values together, each of them right alone."""
+        """Whether it concerns several values of a mapping together, each of them valid by itself."""
         return self.details["type"] == "value_error" and isinstance(self.details["input"], dict)
 
 
 def model_errors(value: Value, model: type[BaseModel], root: Schema) -> list[ModelError]:
-    """All errors, none of them only for another one; `root` is the model's JSON schema."""
+    """All errors, without those that only follow from another one; `root` is the model's JSON schema."""
     first = first_errors(value, model)
-    if not first or len(first) > MOST_LOOKED_INTO:
+    if not first or len(first) > MAX_ERRORS_LOOKED_INTO:
         return first
     wrong_tags = [error.path for error in first if error.details["type"] in TAG_ERRORS]
     tags = sorted({tag for path in wrong_tags for tag in _tags(root, path, value)})
     rounds = [_looked_into(_with_tags(value, wrong_tags, tag), model, root) for tag in tags or [""]]
     seen = {_identity(error) for error in first}
-    in_all = set.intersection(*({_identity(error) for error in found} for found in rounds))  # whichever tag was meant
+    in_all = set.intersection(*({_identity(error) for error in found} for found in rounds))  # whichever tag is meant
     return first + [error for error in rounds[0] if _identity(error) in in_all - seen]
 
 
 def misspelt(value: Value, model: type[BaseModel], root: Schema) -> Iterator[tuple[Path, str]]:
-    """Keys that no model has, each with the one that it seems to mean and that is not there."""
+    """Unknown keys, each with the missing key that is probably meant."""
     errors = model_errors(value, model, root)
-    for path, details in errors if len(errors) <= MOST_LOOKED_INTO else []:
-        parent = at(value, path[:-1])
+    for path, details in errors if len(errors) <= MAX_ERRORS_LOOKED_INTO else []:
+        parent = value_at(value, path[:-1])
         if not isinstance(parent, dict):
             continue
         known = {name for node in nodes_at(root, path[:-1], value) for name in node.get("properties", {})}
@@ -62,7 +62,7 @@ def misspelt(value: Value, model: type[BaseModel], root: Schema) -> Iterator[tup
 
 
 def first_errors(value: Value, model: type[BaseModel]) -> list[ModelError]:
-    """What pydantic tells at once; strict: text is never taken for a number."""
+    """The errors that pydantic reports at once; strict: text is not taken for a number."""
     try:
         model.model_validate_json(json.dumps(value), strict=True)
     except ValidationError as error:
@@ -86,7 +86,7 @@ def _with_tags(value: Value, paths: Sequence[Path], tag: str) -> Value:
 
 
 def _looked_into(value: Value, model: type[BaseModel], root: Schema) -> list[ModelError]:
-    """The errors, and those that only show once these are mended: of several values together."""
+    """The errors, and those on several values together, which show when the others are replaced by examples."""
     found = first_errors(value, model)
     mended = deepcopy(value)
     for path, details in found:
@@ -96,7 +96,7 @@ def _looked_into(value: Value, model: type[BaseModel], root: Schema) -> list[Mod
 
 
 def _exemplify(value: Value, path: Path, root: Schema) -> None:
-    """Put an example where the innermost field around `path` has one."""
+    """Put the example of the innermost field around `path` that has one."""
     for length in range(len(path), 0, -1):
         step = path[length - 1]
         fields = [node.get("properties", {}).get(step, {}) for node in nodes_at(root, path[: length - 1], value)]
@@ -106,14 +106,14 @@ def _exemplify(value: Value, path: Path, root: Schema) -> None:
 
 
 def _put(value: Value, path: Path, new: Value) -> None:
-    """Store `new` at `path`, if there is a mapping that can hold it."""
-    parent = at(value, path[:-1])
+    """Store `new` at `path` if its parent is a mapping."""
+    parent = value_at(value, path[:-1])
     if isinstance(parent, dict):
         parent[str(path[-1])] = deepcopy(new)
 
 
 def _best_branches(value: Value, errors: Sequence[ErrorDetails]) -> list[ModelError]:
-    """The errors; of a union's branches only the one with the fewest errors, at a tie the one that reads furthest."""
+    """The errors; of a union only those of the branch with the fewest errors, at a tie of the one that got furthest."""
     unions: dict[Path, dict[str | int, list[ModelError]]] = defaultdict(lambda: defaultdict(list))
     kept = []
     for details in errors:
@@ -128,13 +128,13 @@ def _best_branches(value: Value, errors: Sequence[ErrorDetails]) -> list[ModelEr
 
 
 def _located(value: Value, details: ErrorDetails) -> tuple[ModelError, Path]:
-    """The error with its path in the file, and the steps of pydantic's location that the file has not: branches."""
+    """The error with its path in the file, and the steps of pydantic's location that are not in the file: branches."""
     path: Path = ()
     beside: Path = ()
     for step in details["loc"]:
         held, value = child(value, step)
         path, beside = ((*path, step), beside) if held else (path, (*beside, step))
-    if details["type"] == "missing":  # stands last: a key, or an item of a list that is too short
+    if details["type"] == "missing":  # the last step: a key, or an item of a list that is too short
         path, beside = (*path, *(step for step in beside[-1:] if isinstance(step, str))), beside[:-1]
     elif details["type"] in TAG_ERRORS:
         path = (*path, details["ctx"]["discriminator"].strip("'"))
@@ -142,9 +142,9 @@ def _located(value: Value, details: ErrorDetails) -> tuple[ModelError, Path]:
 
 
 def _badness(spot: tuple[str | int, ...], errors: Sequence[ModelError]) -> tuple[bool, int, int, bool]:
-    """Lower for the branch, of the union at pydantic's location `spot`, that was meant.
+    """A sort key: lowest for the branch that is probably meant, of the union at pydantic's location `spot`.
 
-    One that takes no value of this type comes last. An error of our own validators comes only after the type was right.
+    A branch that takes no value of this type comes last. Our own validators report errors only if the type is right.
     """
     kinds = {error.details["type"] for error in errors}
     wants = {error.details["type"] for error in errors if len(error.details["loc"]) == len(spot) + 1}

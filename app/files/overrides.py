@@ -1,4 +1,4 @@
-"""Values laid over a parsed file: `--set key.path=value`, what a case of `vary` changes, a cell over its base."""
+"""Assignments to keys of a parsed file: by `--set key.path=value`, by a case of `vary`, by a cell to its base."""
 
 from collections.abc import Iterator, Sequence
 from copy import deepcopy
@@ -13,7 +13,7 @@ OPTION = "--set"
 
 @dataclass(frozen=True)
 class Assignment:
-    """A value for a key of a file. `place` is where it was written; `told` is what a finding about it says first."""
+    """A value for a key of a file. `place` is where it was written; findings about it begin with `told`."""
 
     key: str  # dotted; list items go by index
     new: Document
@@ -22,12 +22,12 @@ class Assignment:
 
     @property
     def path(self) -> Path:
-        """Where in the file the value goes."""
+        """The path in the file of the value."""
         return path_of(self.key)
 
 
 def was_typed(place: Place) -> bool:
-    """Whether a value with this place stands on the command line and not in a file."""
+    """Whether a value with this place was written on the command line, not in a file."""
     return place[0].startswith(f"{OPTION} ") and place[1] == 0
 
 
@@ -40,8 +40,8 @@ def _is_index(step: str) -> bool:
     return step.isdecimal() and len(step) < 10
 
 
-def read(overrides: Sequence[str]) -> tuple[list[Assignment], list[Finding]]:
-    """The assignments of "key.path=value" texts, values in YAML, and the findings of those that are none."""
+def parse_overrides(overrides: Sequence[str]) -> tuple[list[Assignment], list[Finding]]:
+    """The assignments of "key.path=value" texts, with values in YAML, and the findings of invalid ones."""
     assignments, findings = [], []
     for text in overrides:
         source = f"{OPTION} {cut(text)}"
@@ -61,10 +61,10 @@ def read(overrides: Sequence[str]) -> tuple[list[Assignment], list[Finding]]:
     return assignments, findings
 
 
-def apply(document: Document, assignments: Sequence[Assignment]) -> None:
-    """Lay values over `document` in place; a key that it does not know yet is added, for the check of the whole.
+def apply_assignments(document: Document, assignments: Sequence[Assignment]) -> None:
+    """Apply the assignments to `document` in place; an unknown key is added, and left to the check of the document.
 
-    Raises `Findings` for all that cannot be placed.
+    Raises `Findings` for all assignments that have no place in it.
     """
     findings = []
     for assignment in assignments:
@@ -76,23 +76,23 @@ def apply(document: Document, assignments: Sequence[Assignment]) -> None:
         raise Findings(findings)
 
 
-def lay_over(document: Document, top: Document) -> None:
-    """Lay another file over `document` in place: mappings are joined, all other values replaced.
+def merge_into(document: Document, top: Document) -> None:
+    """Merge another file into `document` in place: mappings are joined, all other values replaced.
 
-    Raises `Findings` for all that cannot be placed.
+    Raises `Findings` for all values that have no place in it.
     """
     parts = []
     for path, value in _leaves(top.value):
         places = {p[len(path) :]: place for p, place in top.places.items() if p[: len(path)] == path}
         key = _dotted(path)
         parts.append(Assignment(key, Document(value, places), top.place(path), f"{key}: "))
-    apply(document, parts)
+    apply_assignments(document, parts)
     document.findings += top.findings
     document.unread |= top.unread
 
 
 def _leaves(value: Value, path: Path = ()) -> Iterator[tuple[Path, Value]]:
-    """Every value below `value` that is no mapping, with its path."""
+    """Every value in `value` that is no mapping, with its path."""
     if isinstance(value, dict):
         for key, below in value.items():
             yield from _leaves(below, (*path, key))
@@ -106,19 +106,19 @@ def _apply_one(document: Document, assignment: Assignment) -> None:
         del document.places[old]
     document.unread -= {p for p in document.unread if p[: len(path)] == path}
     for length in range(1, len(path)):
-        document.places.setdefault(path[:length], assignment.place)  # a mapping made on the way
+        document.places.setdefault(path[:length], assignment.place)  # mappings that were added
     document.places.update({path + below: place for below, place in assignment.new.places.items()})
     document.unread |= {path + below for below in assignment.new.unread}
 
 
 def _steps(key: str) -> list[str]:
-    """The names in a dotted key; what stands below `vary` is one name, itself dotted."""
+    """The names in a dotted key; after `vary` the rest is a single name, with its dots."""
     first, *rest = key.split(".")
     return [first, ".".join(rest)] if first == "vary" and rest else [first, *rest]
 
 
 def _put(document: Document, keys: list[str], value: Value) -> Path:
-    """Store `value` and return its path; mappings on the way are made where the file has none."""
+    """Store `value` and return its path; missing mappings on the way are added."""
     path: Path = ()
     spot = document.value
     for i, key in enumerate(keys):

@@ -1,21 +1,21 @@
-"""Shipped scenarios, cells and trees by name, and files by path."""
+"""Finds scenarios, cells and trees: shipped ones by name, others by path."""
 
 import os
 from importlib.resources import files
 from pathlib import Path
 from typing import Literal
 
-from regrasp.app.files.findings import Finding, Findings, closest, shown, why_no_file
-from regrasp.interfaces.quote import cut, quoted
+from regrasp.app.files.findings import Finding, Findings, shown, why_no_file
+from regrasp.interfaces.quote import closest, cut, quoted
 
-Kind = Literal["scenario", "cell", "tree"]
-_SUFFIX: dict[Kind, str] = {"scenario": ".yaml", "cell": ".yaml", "tree": ".xml"}
-MOST_NAMED = 5  # shipped ones, after an unknown name
+ResourceKind = Literal["scenario", "cell", "tree"]
+_SUFFIX: dict[ResourceKind, str] = {"scenario": ".yaml", "cell": ".yaml", "tree": ".xml"}
+MAX_NAMED = 5  # shipped names that are listed after an unknown one
 MAX_BYTES = 256 * 1024  # of a file that a person writes
 
 
-def shipped(kind: Kind) -> dict[str, Path]:
-    """Name to file of everything of this kind that comes with Regrasp, sorted by name; scenarios of faults last."""
+def shipped(kind: ResourceKind) -> dict[str, Path]:
+    """The files of this kind that come with Regrasp, by name and sorted; scenarios of faults come last."""
     folders = {"scenario": "scenarios", "cell": "scenarios/cells", "tree": "trees"}
     folder = Path(str(files("regrasp"))) / folders[kind]
     names = {path.stem: path for path in sorted(folder.glob("*" + _SUFFIX[kind]))}
@@ -24,8 +24,8 @@ def shipped(kind: Kind) -> dict[str, Path]:
     return names
 
 
-def resolve(kind: Kind, name: str, beside: Path, where: tuple[str, int] | None = None) -> Path:
-    """The file that `name` means: what is written like one, from `beside`, else a shipped one; nothing else is opened.
+def resolve(kind: ResourceKind, name: str, beside: Path, where: tuple[str, int] | None = None) -> Path:
+    """The file that `name` means: a path, relative to `beside`, if it has the suffix of its kind, else a shipped one.
 
     Raises `Findings`, at the place `where` (source, line) that holds the name; without one, at the name itself.
     """
@@ -43,16 +43,16 @@ def resolve(kind: Kind, name: str, beside: Path, where: tuple[str, int] | None =
     raise Findings([Finding(*(where or (name or kind, 0)), f"{wrong}; {hint} (a path ends in {_SUFFIX[kind]})")])
 
 
-def _those_shipped(kind: Kind, names: list[str]) -> str:
-    """The names in words; of many the first, and how to see all."""
-    if len(names) <= MOST_NAMED:
+def _those_shipped(kind: ResourceKind, names: list[str]) -> str:
+    """The names in words; of many only the first ones, and how to list all."""
+    if len(names) <= MAX_NAMED:
         return f"the shipped ones are {', '.join(names)}"
-    more = f"regrasp {kind}s list shows {len(names) - MOST_NAMED} more"
-    return f"the shipped ones are {', '.join(names[:MOST_NAMED])}; {more}"
+    more = f"regrasp {kind}s list shows {len(names) - MAX_NAMED} more"
+    return f"the shipped ones are {', '.join(names[:MAX_NAMED])}; {more}"
 
 
 def read_text(path: Path, where: tuple[str, int] | None = None) -> str:
-    """The text of a file that a person wrote. Raises `Findings` when there is no such file or it is no text."""
+    """The text of a UTF-8 file that a person wrote. Raises `Findings` if there is none, or if it is no such text."""
     source, line = where or (shown(path), 0)
     if not os.path.isfile(path):
         raise Findings([Finding(source, line, f"{quoted(shown(path))} {why_no_file(path)}; name a file")])

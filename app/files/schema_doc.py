@@ -1,4 +1,4 @@
-"""A model's JSON schema as a reference in Markdown: a table an object, a row a field."""
+"""Writes a JSON schema as a reference in Markdown: a table for each object, a row for each field."""
 
 import json
 from collections.abc import Iterator
@@ -11,15 +11,15 @@ _HEADER = "| field | type | unit | default | meaning | example |\n|---|---|---|-
 
 
 def markdown(root: Schema) -> str:
-    """The reference, objects inside one another by their dotted path; `[]` stands for an item's number.
+    """The reference. Objects within others are headed by their dotted path, in which `[]` stands for an item's number.
 
-    What a union's members share is told once.
+    Sections that a union's members share appear once.
     """
     return "\n".join(dict.fromkeys(_object(root, root, "")))
 
 
 def _object(root: Schema, node: Schema, path: str) -> Iterator[str]:
-    """The object's section, then those of the objects in it."""
+    """The section of an object, then those of the objects in it."""
     kind = node["properties"].get("type", {}).get("const")
     title = (f"`{path}`" if path else "A scenario file") + (f" of type {kind}" if kind else "")
     rows = [
@@ -32,7 +32,7 @@ def _object(root: Schema, node: Schema, path: str) -> Iterator[str]:
 
 
 def _objects(root: Schema, field: Schema) -> Iterator[tuple[Schema, str]]:
-    """The objects that a field holds, with what their path adds to the field's."""
+    """The objects in a field, each with the end of its path after the field's."""
     for node in alternatives(root, field):
         if "properties" in node:
             yield node, ""
@@ -51,7 +51,7 @@ def _row(root: Schema, name: str, field: Schema, required: bool) -> str:
 
 
 def _default(value: Any) -> str:
-    """A default in a cell; an object's has a table of its own."""
+    """A default for its table cell; '' for an object, which has a table of its own."""
     return "" if value is None or isinstance(value, dict) else _code(value)
 
 

@@ -1,4 +1,4 @@
-"""Where a path of a file leads in the JSON schema of its model."""
+"""Finds values, and their nodes in the JSON schema of a model, by path."""
 
 from typing import Any
 
@@ -8,7 +8,7 @@ Schema = dict[str, Any]  # a node of the schema
 
 
 def child(value: Value, step: str | int) -> tuple[bool, Value]:
-    """Whether `value` holds `step`, and what stands there; `value` itself where nothing does."""
+    """Whether `value` has the key or index `step`, and the value there; `value` itself if it has not."""
     if isinstance(value, dict) and isinstance(step, str) and step in value:
         return True, value[step]
     if isinstance(value, list) and isinstance(step, int) and step < len(value):
@@ -16,8 +16,8 @@ def child(value: Value, step: str | int) -> tuple[bool, Value]:
     return False, value
 
 
-def at(value: Value, path: Path) -> Value:
-    """What stands at `path`; None where nothing does."""
+def value_at(value: Value, path: Path) -> Value:
+    """The value at `path`; None if there is none."""
     for step in path:
         held, value = child(value, step)
         if not held:
@@ -26,7 +26,7 @@ def at(value: Value, path: Path) -> Value:
 
 
 def nodes_at(root: Schema, path: Path, value: Value) -> list[Schema]:
-    """The schema nodes that describe what is at `path` in `value`; several where the model has a union."""
+    """The schema nodes of what is at `path` in `value`; several if the model has a union there."""
     nodes = alternatives(root, root)
     for step in path:
         nodes = _of_type(nodes, value)
@@ -43,13 +43,13 @@ def nodes_at(root: Schema, path: Path, value: Value) -> list[Schema]:
 
 
 def _of_type(nodes: list[Schema], value: Value) -> list[Schema]:
-    """Of a union's nodes told apart by `type`, the one that the value names; all where it names none."""
+    """The node of a tagged union that the value's `type` names; all nodes if it names none."""
     kind = value.get("type") if isinstance(value, dict) else None
     return [n for n in nodes if n.get("properties", {}).get("type", {}).get("const") == kind] or nodes
 
 
 def alternatives(root: Schema, node: Schema) -> list[Schema]:
-    """Follow references and unions to the nodes that say something."""
+    """Resolve references and unions to plain nodes."""
     if "$ref" in node:
         return alternatives(root, root["$defs"][node["$ref"].rsplit("/", 1)[1]])
     if options := node.get("anyOf", node.get("oneOf")):

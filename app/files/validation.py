@@ -1,4 +1,4 @@
-"""Plain values against a pydantic model, with pydantic's errors told as findings at file and line."""
+"""Validates plain values against a pydantic model; the errors become findings at file and line."""
 
 import json
 from functools import cache
@@ -7,15 +7,15 @@ from typing import NamedTuple, TypeVar
 from pydantic import BaseModel, TypeAdapter, ValidationError
 from pydantic_core import ErrorDetails
 
-from regrasp.app.files.findings import Finding, Findings, nearest
+from regrasp.app.files.findings import Finding, Findings
 from regrasp.app.files.model_errors import TAG_ERRORS, misspelt, model_errors
 from regrasp.app.files.schema_nodes import Schema, child, nodes_at
 from regrasp.app.files.yaml_lines import Document, Path
-from regrasp.interfaces.quote import cut, quoted
+from regrasp.interfaces.quote import cut, nearest, quoted
 
 M = TypeVar("M", bound=BaseModel)
 T = TypeVar("T")
-MOST_ROUNDS = 6  # one brings out what is misspelt inside a misspelt key, and files of ours nest no deeper
+MAX_RESPELL_ROUNDS = 6  # each finds what is misspelt one level deeper; our files have fewer levels
 
 _METRES = "metres, such as 0.3"
 _LENGTHS = "size position zero earth jitter center seat base offset anchor length radius depth capture_distance"
@@ -46,13 +46,13 @@ _UNITS = dict.fromkeys(_LENGTHS.split(), _METRES) | {  # by the name of the key 
 
 
 class Error(NamedTuple):
-    """What is wrong with the value at `path`, and in which way."""
+    """An error of the value at `path`, and its kind."""
 
     path: Path
     finding: Finding
-    is_misspelt: bool = False  # a key that got its right name
+    is_misspelt: bool = False  # a key, corrected in the document
     is_missing: bool = False
-    is_of_several: bool = False  # of a mapping's values together, each right alone
+    is_of_several: bool = False  # of several values of a mapping together, each valid by itself
 
 
 @cache
@@ -61,10 +61,10 @@ def _schema(model: type[BaseModel]) -> Schema:
 
 
 def read_as(document: Document, model: type[M]) -> tuple[M | None, list[Error]]:
-    """The model's instance, or every error; strict: text is never taken for a number.
+    """The model's instance (None if there are errors) and all errors; strict: text is not taken for a number.
 
-    A misspelt key gets its right name in `document`: what is below it is looked at, too. Of what the document itself
-    could not read, which is among its own findings, nothing is said.
+    Misspelt keys are corrected in `document`, so that their values are checked, too. Values that the document could
+    not read, which are among its own findings, give no errors.
     """
     try:
         return model.model_validate_json(json.dumps(document.value), strict=True), []
@@ -79,10 +79,10 @@ def read_as(document: Document, model: type[M]) -> tuple[M | None, list[Error]]:
 
 
 def _respell(document: Document, model: type[M], root: Schema) -> tuple[list[Error], set[Path]]:
-    """Give misspelt keys their right names: an error each, and their new paths."""
+    """Correct misspelt keys in the document; returns an error for each, and the new paths."""
     errors: list[Error] = []
     respelt: set[Path] = set()
-    for _ in range(MOST_ROUNDS):
+    for _ in range(MAX_RESPELL_ROUNDS):
         for path, right in list(misspelt(document.value, model, root)):
             new = (*path[:-1], right)
             if new not in respelt:
@@ -101,8 +101,8 @@ def validated(document: Document, model: type[M]) -> M:
     return made
 
 
-def part(document: Document, path: Path, kind: TypeAdapter[T], default: T | None = None) -> T | None:
-    """What stands at `path`; `default` where nothing does, None where it is not of this kind."""
+def validated_part(document: Document, path: Path, kind: TypeAdapter[T], default: T | None = None) -> T | None:
+    """The value at `path`; `default` if there is none, None if it is not of this type."""
     value = document.value
     for step in path:
         held, value = child(value, step)
@@ -154,7 +154,7 @@ def _short(document: Document, path: Path) -> str:
 
 
 def _expected(document: Document, root: Schema, path: Path) -> str:
-    """What would be right at `path`, in words."""
+    """What is expected at `path`, in words."""
     keys = [step for step in path if isinstance(step, str)]
     key = "" if not keys else ".".join(keys[-2:]) if ".".join(keys[-2:]) in _UNITS else keys[-1]
     nodes = nodes_at(root, path, document.value)
@@ -185,7 +185,7 @@ def _words(node: Schema, key: str) -> str:
 
 
 def range_words(node: Schema) -> str:
-    """A number's bounds, as " (at least 0, at most 3)"; '' where there are none."""
+    """A number's bounds, as " (at least 0, at most 3)"; '' if it has none."""
     bounds = {
         "above": node.get("exclusiveMinimum"),
         "at least": node.get("minimum"),

@@ -1,16 +1,16 @@
-"""Files written in one step."""
+"""Writes files atomically."""
 
 import errno
 import os
 from pathlib import Path
 
-from regrasp.app.files.findings import real
+from regrasp.app.files.findings import real_path
 
 
 def write_whole(path: Path, content: str | bytes) -> None:
-    """Write a file in one step: readers see the old one or the new one, never a half.
+    """Write a file in one step: readers see the old content or the new one, never a part of it.
 
-    What a link names is written, not the link; a pipe or a device takes the content as it comes.
+    A link is followed, not replaced. A pipe or a device is written to directly.
 
     Raises:
         OSError: the file cannot be written.
@@ -19,7 +19,7 @@ def write_whole(path: Path, content: str | bytes) -> None:
     if path.exists() and not path.is_file():
         path.write_bytes(data)
         return
-    path = real(path)
+    path = real_path(path)
     if path.is_symlink():  # it leads back to itself
         raise OSError(errno.ELOOP, os.strerror(errno.ELOOP), str(path))
     part = path.with_name(path.name + ".part")

@@ -1,4 +1,4 @@
-"""YAML as plain values that remember where each came from, with findings for all that YAML lets pass in silence."""
+"""Parses YAML into plain values with their lines, and reports what YAML parsers accept silently: doubled keys, ..."""
 
 import math
 import re
@@ -8,19 +8,19 @@ from typing import Any
 import yaml
 
 from regrasp.app.files.findings import Finding, Findings
-from regrasp.interfaces.quote import MOST, cut, quoted
+from regrasp.interfaces.quote import MAX_QUOTE, cut, quoted
 
 Value = None | bool | int | float | str | list["Value"] | dict[str, "Value"]
 Path = tuple[str | int, ...]
 Place = tuple[str, int]  # source and line
 
-MAX_DEPTH = 20
+MAX_NESTING = 20
 MAX_VALUES = 20_000  # after aliases are expanded
-# What YAML 1.1 and 1.2 both read as a number, so not 010, 1_000, 1:30 or 1e3.
+# Numbers in both YAML 1.1 and 1.2: not 010, 1_000, 1:30 or 1e3.
 _NUMBER = re.compile(r"[-+]?(0|[1-9]\d{0,18}|(0|[1-9]\d{0,18})?\.\d{0,30}([eE][-+]\d{1,3})?)")
 _LOOKS_LIKE_NUMBER = re.compile(r"([-+]?)(\d+(?:\.\d*)?|\.\d+)[eE]([-+]?)(\d+)")
 _TAG = "tag:yaml.org,2002:"
-_REMEDIES = {  # by a word of PyYAML's own message
+_REMEDIES = {  # by words in PyYAML's message
     "'\\t'": "indent with spaces, not with tabs",
     "another document": "keep one document in a file",
     "undefined alias": "define it before as &name, or put text that begins with * in quotes",
@@ -36,9 +36,9 @@ _REMEDIES = {  # by a word of PyYAML's own message
 
 @dataclass
 class Document:
-    """Plain values and, for every path in them, the place where it stands.
+    """Plain values, and for every path in them its place (source and line).
 
-    `findings` tells of single values that could not be read; None stands for them, at the paths in `unread`.
+    Values that could not be read are None; their paths are in `unread`, and what is wrong is in `findings`.
     """
 
     value: Value
@@ -47,13 +47,13 @@ class Document:
     unread: set[Path] = field(default_factory=set)
 
     def place(self, path: Path) -> Place:
-        """Where `path` stands, or the nearest thing around it that stands anywhere."""
+        """The place of `path`, or of the innermost value around it that has one."""
         while path not in self.places:
             path = path[:-1]
         return self.places[path]
 
     def rename(self, path: Path, name: str) -> None:
-        """Give the key at `path`, which there must be, another name."""
+        """Rename the key at `path`, which must exist."""
         parent: Any = self.value
         for step in path[:-1]:
             parent = parent[step]
@@ -65,7 +65,7 @@ class Document:
         self.unread = {new + p[inside:] if p[:inside] == path else p for p in self.unread}
 
     def items(self, path: Path) -> list["Document"]:
-        """The items of the list at `path`, which there must be, without findings."""
+        """The items of the list at `path`, which must exist; their findings stay here."""
         value: Any = self.value
         for step in path:
             value = value[step]
@@ -81,10 +81,10 @@ class Document:
 
 
 def parse(text: str, source: str, line: int | None = None) -> Document:
-    """Read one YAML document; every line is reported as `line` when that is given (a value from the command line).
+    """Read one YAML document. If `line` is given (for a value from the command line), all findings have that line.
 
-    Keys that stand twice, tags, and numbers that are not plain and finite are `findings` of the document.
-    Raises `Findings` where there is none: malformed text, too deep, or too large once aliases are expanded.
+    Doubled keys, tags, and numbers that are not plain and finite are `findings` of the document. Raises `Findings` if
+    the text is malformed, nested too deeply, or too large when its aliases are expanded.
     """
     builder = _Builder(source, line)
     try:
@@ -106,17 +106,17 @@ def parse(text: str, source: str, line: int | None = None) -> Document:
 
 def _not_yaml(source: str, line: int, problem: str) -> Findings:
     remedy = next((r for words, r in _REMEDIES.items() if words in problem), "write it such as key: value")
-    return Findings([Finding(source, line, f"not YAML: {cut(problem, 2 * MOST)}; {remedy}")])
+    return Findings([Finding(source, line, f"not YAML: {cut(problem, 2 * MAX_QUOTE)}; {remedy}")])
 
 
 def _limit_nesting(text: str, source: str, line: int | None) -> None:
-    """Refuse deep nesting before `compose`, which recurses."""
+    """Raise `Findings` for deep nesting, before `compose`, which recurses."""
     depth = 0
     for event in yaml.parse(text, Loader=yaml.SafeLoader):
         depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
-        if depth > MAX_DEPTH:
+        if depth > MAX_NESTING:
             at = event.start_mark.line + 1 if event.start_mark else 1
-            message = f"nests deeper than {MAX_DEPTH} levels; a file of ours needs fewer than 10"
+            message = f"nests deeper than {MAX_NESTING} levels; a file of ours needs fewer than 10"
             raise Findings([Finding(source, at if line is None else line, message)])
 
 
@@ -135,18 +135,18 @@ class _Builder:
         return int(node.start_mark.line) + 1 if self.line is None else self.line
 
     def wrong(self, node: yaml.Node, message: str, path: Path | None = None) -> None:
-        """Note a finding; `path` is that of the value that cannot be read for it."""
+        """Note a finding; `path` is that of a value that cannot be read because of it."""
         self.findings.append(Finding(self.source, self._line(node), message))
         if path is not None:
             self.unread.add(path)
 
     def charge(self, node: yaml.Node, values: int, depth: int) -> None:
-        """Count what is built. Aliases, of themselves or of one another, could go on for ever."""
+        """Count the values, and raise `Findings` if there are too many: aliases may expand without end."""
         self.count += values
-        if depth > MAX_DEPTH or self.count > MAX_VALUES:
+        if depth > MAX_NESTING or self.count > MAX_VALUES:
             if self.aliases:
                 message = (
-                    f"aliases expand to more than {MAX_VALUES} values or {MAX_DEPTH} levels; write out what is meant"
+                    f"aliases expand to more than {MAX_VALUES} values or {MAX_NESTING} levels; write out what is meant"
                 )
             else:
                 message = f"more than {MAX_VALUES} values; shorten the file, or split it"
@@ -154,7 +154,7 @@ class _Builder:
             raise Findings(self.findings)
 
     def build(self, node: yaml.Node, path: Path, depth: int, at: yaml.Node | None = None) -> Value:
-        """The plain value of `node`, which stands where `at` (its key) stands."""
+        """The plain value of `node`; its line is that of `at` (its key), if given."""
         self.aliases |= id(node) in self._built
         self._built.add(id(node))
         self.charge(node, 1, depth)
@@ -170,7 +170,7 @@ class _Builder:
         return None
 
     def pairs(self, node: yaml.MappingNode, depth: int) -> dict[str, tuple[yaml.Node, yaml.Node]]:
-        """Name to key and value node; what `<<` brings in comes first and yields to the mapping's own keys."""
+        """The nodes of key and value by name; the mapping's own keys replace those that `<<` merges in."""
         self.charge(node, len(node.value), depth)
         merged: dict[str, tuple[yaml.Node, yaml.Node]] = {}
         own: dict[str, tuple[yaml.Node, yaml.Node]] = {}
@@ -215,7 +215,7 @@ class _Builder:
 
 
 def _not_a_number(text: str) -> str:
-    """Why a number that YAML's readers disagree on is refused, and how to write it."""
+    """Why a number that YAML parsers read differently is refused, and how to write it."""
     if match := _LOOKS_LIKE_NUMBER.fullmatch(text):
         sign, digits, power_sign, power = match.groups()
         right = f"{sign}{digits if '.' in digits else digits + '.0'}e{power_sign or '+'}{power}"

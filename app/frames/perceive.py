@@ -14,7 +14,7 @@ import typer
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
-from regrasp.app.files.findings import Finding, Findings, nearest, real, shown
+from regrasp.app.files.findings import Finding, Findings, real_path, shown
 from regrasp.app.files.whole_file import write_whole
 from regrasp.app.frames.calibration_file import CalibrationFile, load_calibration
 from regrasp.app.frames.camera_pose_file import load_camera_pose
@@ -22,7 +22,7 @@ from regrasp.app.frames.draw import draw_pose
 from regrasp.app.frames.image_files import read_depth, read_rgb
 from regrasp.interfaces.cell import FixedMount, KnownCell
 from regrasp.interfaces.frame import RgbdFrame
-from regrasp.interfaces.quote import quoted
+from regrasp.interfaces.quote import nearest, quoted
 from regrasp.perception.camera.calibration import undistorted
 from regrasp.perception.camera.registration import expected_errors, register
 from regrasp.perception.pose.estimate import Estimate, NoEstimate
@@ -109,7 +109,7 @@ def _technique(name: str) -> TechniqueName:
 def _in_world(files: Sequence[FrameFiles]) -> bool:
     """Whether all cameras' poses are known. Raises `Findings` where only some of several cameras' are."""
     placed = [f.camera is not None or f.pose is not None for f in files]
-    if not all(placed) and (any(placed) or len({real(f.intrinsics) for f in files}) > 1):
+    if not all(placed) and (any(placed) or len({real_path(f.intrinsics) for f in files}) > 1):
         message = "frames of several cameras meet in the world; give --camera or --camera-pose for each, too"
         raise Findings([Finding("--intrinsics", 0, message)])
     return all(placed)

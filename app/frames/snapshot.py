@@ -8,7 +8,7 @@ import numpy as np
 from regrasp.app.files.whole_file import write_whole
 from regrasp.app.frames.calibration_file import CalibrationFile, write_calibration
 from regrasp.app.frames.camera_pose_file import write_camera_pose
-from regrasp.app.run.episode import build_world
+from regrasp.app.run.compose import build_world
 from regrasp.app.scenario.load import Scenario
 from regrasp.interfaces.cell import FixedMount
 from regrasp.interfaces.frame import RgbdFrame

@@ -1,15 +1,15 @@
-"""Where two runs part."""
+"""Where two recorded runs differ."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict
 from itertools import zip_longest
 from typing import Any
 
-from regrasp.app.files.findings import printable
 from regrasp.app.records.reader import Event, RunRecord, Tick
 from regrasp.app.records.result import plain
+from regrasp.interfaces.quote import printable
 
-RUN = (
+BEGIN_FIELDS = (
     "scenario",
     "case",
     "seed",
@@ -21,14 +21,14 @@ RUN = (
     "overrides",
     "renderer",
 )  # of the `begin` event
-RESULT = ("outcome", "succeeded", "cause")
-LONGEST = 200  # characters of a value
+RESULT_FIELDS = ("outcome", "succeeded", "cause")
+MAX_VALUE_LENGTH = 200  # characters of a value
 
 
 def beginnings(a: RunRecord, b: RunRecord) -> list[str]:
-    """Lines that say what was run differently: scenario, seed, versions."""
+    """Lines that say what differs at the beginning of the runs: scenario, seed, tree, versions."""
     versions = [run.result.versions if run.result else {} for run in (a, b)]
-    found = [line for name in RUN for line in _differ(name, a.begin.get(name), b.begin.get(name))]
+    found = [line for name in BEGIN_FIELDS for line in _differ(name, a.begin.get(name), b.begin.get(name))]
     if _tree(a) != _tree(b):
         found.append("tree.xml: not the same tree")
     return [printable(line) for line in (*found, *_differ("versions", *versions))]
@@ -40,14 +40,14 @@ def _tree(run: RunRecord) -> bytes | None:
 
 
 def differences(a: RunRecord, b: RunRecord) -> list[str]:
-    """Lines that say where the runs part, [] where they went the same way; what the wall clock says does not count."""
+    """Lines that say where the runs differ, [] if they went the same way; wall-clock times do not count."""
     values = [plain(asdict(run.result)) if run.result else {} for run in (a, b)]
-    ends = [line for name in RESULT for line in _differ(name, *(value.get(name) for value in values))]
+    ends = [line for name in RESULT_FIELDS for line in _differ(name, *(value.get(name) for value in values))]
     return [printable(line) for line in (*ends, *_first_tick(a.ticks, b.ticks), *_first_event(_course(a), _course(b)))]
 
 
 def _differ(name: str, a: Any, b: Any) -> Iterator[str]:
-    """A line for each value that differs, key by key where both are mappings."""
+    """A line for each value that differs; mappings are compared key by key."""
     if (isinstance(a, dict) and isinstance(b or {}, dict)) or (isinstance(b, dict) and a is None):
         for key in dict.fromkeys([*(a or {}), *(b or {})]):
             yield from _differ(f"{name}.{key}", (a or {}).get(key), (b or {}).get(key))
@@ -57,11 +57,11 @@ def _differ(name: str, a: Any, b: Any) -> Iterator[str]:
 
 def _short(value: Any) -> str:
     text = "-" if value is None else str(value)
-    return text if len(text) <= LONGEST else text[: LONGEST - 3] + "..."
+    return text if len(text) <= MAX_VALUE_LENGTH else text[: MAX_VALUE_LENGTH - 3] + "..."
 
 
 def _first_tick(a: Sequence[Tick], b: Sequence[Tick]) -> Iterator[str]:
-    """The first tick in which the runs differ, and the deepest node that did, with its status in each after it."""
+    """The first tick in which the runs differ: the deepest node that differs after it, and its status in each run."""
     pair = next(((x, y) for x, y in zip_longest(a, b) if x != y), None)
     if pair is None:
         return
@@ -71,7 +71,7 @@ def _first_tick(a: Sequence[Tick], b: Sequence[Tick]) -> Iterator[str]:
     if paths:
         path = max(paths, key=lambda path: path.count("/"))
         yield f"first differing tick at {t:.2f} s: {path}: {first.get(path, '-')} | {second.get(path, '-')}"
-    else:  # a node that came and went in one tick of one run, or ended again as before
+    else:  # a node came and went in this tick, or ended again as before
         told = (f"{x.path} {x.status}" if x and x.t == t else "none" for x in pair)
         yield f"first differing tick at {t:.2f} s: " + " | ".join(told)
 
@@ -81,7 +81,7 @@ def _course(run: RunRecord) -> list[Event]:
 
 
 def _first_event(a: Sequence[Event], b: Sequence[Event]) -> Iterator[str]:
-    """The first event, with its readings, that is not the same in both."""
+    """The first event that differs, with the values that differ."""
     pair = next(((x, y) for x, y in zip_longest(a, b) if x != y), None)
     if pair is None:
         return

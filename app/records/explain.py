@@ -1,25 +1,27 @@
-"""A page about a run for a person: what it was, what was tried, why it ended so, and what the robot knew."""
+"""A page of text about a run: what was run and tried, why it ended so, and what the robot knew."""
 
 from collections.abc import Iterator
 
-from regrasp.app.files.findings import printable
-from regrasp.app.records.history import attempts, course
+from regrasp.app.records.history import attempts, node_history
 from regrasp.app.records.reader import RunRecord
 from regrasp.app.records.result import DEFAULT_CASE, BeliefState, Link, Pose, Result
 from regrasp.app.records.summary import expectation_lines, headline, slip_lines, what_ran
 from regrasp.app.records.timeline import event_text, timeline, wrapped
+from regrasp.interfaces.quote import printable
 
 REPORT_WIDTH = 100  # columns of a page in a test report
-LAST_EVENTS = 8  # shown of a run without a result
 
 
-def explanation(record: RunRecord, width: int) -> str:
-    """The page, in lines of about `width` columns; nothing in it steers a terminal."""
-    page = _page(record, width) if record.result is None else _whole(record, record.result, width)
+def explanation(record: RunRecord, width: int, last_events: int = 8) -> str:
+    """The page, in lines of about `width` columns, without control characters.
+
+    Of a run without a result the `last_events` last events are shown.
+    """
+    page = _unfinished(record, width, last_events) if record.result is None else _finished(record, record.result, width)
     return "\n".join(printable(line).rstrip() for line in page) + "\n"
 
 
-def _whole(record: RunRecord, result: Result, width: int) -> Iterator[str]:
+def _finished(record: RunRecord, result: Result, width: int) -> Iterator[str]:
     yield f"{headline(result)}, {result.sim_seconds:.1f} simulated seconds"
     yield from _what_was_run(record, result.versions)
     yield from _section("Why it ended so", _why(result, width))
@@ -31,8 +33,8 @@ def _whole(record: RunRecord, result: Result, width: int) -> Iterator[str]:
     yield from _section("Traceback", (result.traceback or "").splitlines())
 
 
-def _page(record: RunRecord, width: int) -> Iterator[str]:
-    """Of a run without a result."""
+def _unfinished(record: RunRecord, width: int, last_events: int) -> Iterator[str]:
+    """The page of a run without a result."""
     begin = record.begin
     ran = what_ran(
         str(begin.get("scenario", "a run")), str(begin.get("case", DEFAULT_CASE)), begin.get("seed", "unknown")
@@ -43,7 +45,7 @@ def _page(record: RunRecord, width: int) -> Iterator[str]:
     yield from _tried(record, width)
     statuses = {tick.path: tick.status for tick in record.ticks}
     running = sorted((p for p, status in statuses.items() if status == "RUNNING"), key=lambda path: path.split("/"))
-    # Whatever stands below a path comes right after it.
+    # Paths below another path come right after it.
     leaves = [
         path for path, after in zip(running, [*running[1:], ""], strict=False) if not after.startswith(path + "/")
     ]
@@ -52,12 +54,12 @@ def _page(record: RunRecord, width: int) -> Iterator[str]:
         leaves = [f"{leaf}: its tick at {at:.2f} s has not ended", *(other for other in leaves if other != leaf)]
     yield from _section(f"What was running at {record.end:.2f} s, when the record ends", leaves)
     events = [event for event in record.events if event.event != "begin"]
-    last = (f"{e.t:8.2f}  {e.node or '-'}  {event_text(e)}" for e in events[-LAST_EVENTS:])
+    last = (f"{e.t:8.2f}  {e.node or '-'}  {event_text(e)}" for e in events[-last_events:])
     yield from _section("The last events", (line for text in last for line in wrapped(text, width - 2)))
 
 
 def _tried(record: RunRecord, width: int) -> Iterator[str]:
-    told = timeline(attempts(record), record.events, course(record), width - 2)
+    told = timeline(attempts(record), record.events, node_history(record), width - 2)
     yield from _section("What was tried (simulated seconds, from and to)", told)
 
 
@@ -74,7 +76,7 @@ def _what_was_run(record: RunRecord, versions: dict[str, str]) -> Iterator[str]:
 
 
 def _section(title: str, lines: Iterator[str] | list[str]) -> Iterator[str]:
-    """A heading and its indented lines, nothing where there are none."""
+    """A heading and its indented lines; nothing if there are none."""
     found = [*lines]
     if found:
         yield from ("", title)
@@ -98,7 +100,7 @@ def _why(result: Result, width: int) -> Iterator[str]:
 
 
 def _relative(chain: tuple[Link, ...]) -> Iterator[str]:
-    """Each link's path without the path of the link above it, indented."""
+    """Each link's path, relative to the link above it, and indented."""
     above = ""
     for depth, link in enumerate(chain):
         yield "  " * min(depth, 12) + link.path.removeprefix(above)

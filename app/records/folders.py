@@ -1,4 +1,4 @@
-"""Where a run's record goes, and whether it can."""
+"""Folders of records: new ones, and checks that a folder or file can be written."""
 
 import contextlib
 import hashlib
@@ -8,7 +8,7 @@ import tempfile
 from itertools import count
 from pathlib import Path
 
-from regrasp.app.files.findings import Finding, real, shown
+from regrasp.app.files.findings import Finding, real_path, shown
 from regrasp.interfaces.quote import quoted
 
 RUNS = Path("runs")  # where records go by default
@@ -17,9 +17,9 @@ FILES = (*RUN_FILES, "scenario.yaml", "cell.yaml", "tree.xml")  # of a run's fol
 
 
 def new_folder(name: str, within: Path = RUNS) -> Path:
-    """Make the first folder NAME-1, NAME-2, ... that does not exist, in the folder `within`.
+    """Create the first of NAME-1, NAME-2, ... that does not exist in the folder `within`.
 
-    The folder is made at once: of two runs that begin together each gets its own.
+    It is created at once, so that two runs that start together get different folders.
 
     Raises:
         OSError: none can be made.
@@ -34,7 +34,7 @@ def new_folder(name: str, within: Path = RUNS) -> Path:
 
 
 def leave_if_empty(folder: Path) -> None:
-    """Take a folder away in which nothing was written."""
+    """Remove a folder if it is empty."""
     with contextlib.suppress(OSError):
         folder.rmdir()
         if folder.parent == RUNS:
@@ -42,19 +42,19 @@ def leave_if_empty(folder: Path) -> None:
 
 
 def folder_name(case: str) -> str:
-    """A case's name as that of a folder: what is no plain letter gives way to _ and a digest that keeps names apart."""
+    """A case's name as a folder name: special characters become _, and a digest keeps such names distinct."""
     plain = re.sub(r"[^A-Za-z0-9_.,=+-]+", "_", case)[:100].strip(".") or "_"
     return plain if plain == case else f"{plain}-{hashlib.sha256(case.encode()).hexdigest()[:8]}"
 
 
-def taken(out: Path) -> list[str]:
+def taken_names(out: Path) -> list[str]:
     """The files in `out` that a run would overwrite."""
     return [name for name in FILES if os.path.lexists(out / name)]
 
 
-def holds_a_run(out: Path) -> list[Finding]:
-    """The finding of a folder that another run has taken, [] of one that is free."""
-    there = taken(out)
+def existing_run_findings(out: Path) -> list[Finding]:
+    """The finding that another run's files are in the folder; [] if there are none."""
+    there = taken_names(out)
     if set(there) & set(RUN_FILES):
         return [Finding(shown(out), 0, f"holds a run already ({', '.join(there)}); name another folder")]
     if there:
@@ -62,28 +62,28 @@ def holds_a_run(out: Path) -> list[Finding]:
     return []
 
 
-def findings(out: Path) -> list[Finding]:
-    """Why no run can be written to `out`; nothing is left behind by the look."""
-    if there := holds_a_run(out):
+def run_folder_findings(out: Path) -> list[Finding]:
+    """Why no run can be written to `out`; [] if one can. The check leaves nothing behind."""
+    if there := existing_run_findings(out):
         return there
     if out == Path():
         return [Finding("--out", 0, "names this very folder; name one of its own for the run")]
-    return unwritable(out)
+    return folder_findings(out)
 
 
-def unwritable_file(file: Path, *, new: bool = False) -> list[Finding]:
-    """Why no file can be written there; nothing is left behind by the look. `new`: one that exists is not replaced."""
+def file_findings(file: Path, *, new: bool = False) -> list[Finding]:
+    """Why this file cannot be written; [] if it can. The check leaves nothing behind. `new`: it must not exist yet."""
     if os.path.isdir(file):
         return [Finding(shown(file), 0, "is a folder; name a file")]
-    if real(file).is_symlink():
+    if real_path(file).is_symlink():
         return [Finding(shown(file), 0, "is a link that leads back to itself; name another file")]
     if new and os.path.exists(file):
         return [Finding(shown(file), 0, "exists already; name another file, or remove it")]
-    return unwritable(file.parent)
+    return folder_findings(file.parent)
 
 
-def unwritable(out: Path) -> list[Finding]:
-    """Why no folder `out` can be made or written in; nothing is left behind by the look."""
+def folder_findings(out: Path) -> list[Finding]:
+    """Why the folder `out` cannot be made or written in; [] if it can. The check leaves nothing behind."""
     spot = out.absolute()
     while not os.path.lexists(spot) and spot != spot.parent:
         spot = spot.parent

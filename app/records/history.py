@@ -1,4 +1,4 @@
-"""What was tried in a recorded run: the result's attempts, or, of a run without a result, what its ticks tell."""
+"""The attempts of a recorded run: those of its result or, without a result, as its ticks and events show them."""
 
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Sequence
@@ -10,8 +10,8 @@ from regrasp.interfaces.cause import Cause, CauseCode
 from regrasp.trees import Execution, executions
 
 
-class Course:
-    """When a record's nodes were executed, and what stands below what."""
+class NodeHistory:
+    """When each node of a record was executed, and which nodes are below which."""
 
     def __init__(self, made: Sequence[Execution]) -> None:
         self._starts: dict[str, list[float]] = {}
@@ -23,13 +23,13 @@ class Course:
                 self._below.setdefault("/".join(names[:depth]), set()).add(names[depth])
 
     def is_leaf(self, path: str) -> bool:
-        """Whether nothing stands below the node."""
+        """Whether no node is below this one."""
         return path not in self._below
 
     def new_round(self, path: str, before: float, after: float) -> tuple[str, int] | None:
-        """The topmost node above `path` that a loop such as Retry began anew between two seconds, and its round.
+        """The topmost node above `path` that a loop such as Retry restarted between two seconds, and which round it is.
 
-        A loop has one child, which ends while the loop goes on. A guard that is asked at every tick is no round.
+        A loop has one child, which ends while the loop goes on. A guard that is ticked every time is no new round.
         """
         names = path.split("/")
         loop = names[0]
@@ -45,26 +45,26 @@ class Course:
         return None
 
     def _begun(self, path: str, seconds: float) -> int:
-        """How many executions of the node had begun by then."""
+        """How many executions of the node had begun by this second."""
         return bisect_right(self._starts.get(path, []), seconds)
 
 
-def course(record: RunRecord) -> Course:
-    """The record's."""
-    return Course(_executions(record))
+def node_history(record: RunRecord) -> NodeHistory:
+    """The node history of a record."""
+    return NodeHistory(_executions(record))
 
 
 def attempts(record: RunRecord) -> Sequence[Attempt]:
-    """The attempts of the record's leaves in the order of beginning; RUNNING: at work when the record ends."""
+    """The attempts of the record's leaves, in the order of their beginning; RUNNING: at work when the record ends."""
     if record.result:
         return record.result.attempts
-    told = told_by_ticks(_executions(record), record.events)
+    told = attempts_from_ticks(_executions(record), record.events)
     return [replace(one, ended=record.end) if one.status == "RUNNING" else one for one in told]
 
 
-def told_by_ticks(made: Sequence[Execution], events: Iterable[Event]) -> list[Attempt]:
-    """The attempts that a run with these executions and events would name in its result (`Attempts`)."""
-    known = Course(made)
+def attempts_from_ticks(made: Sequence[Execution], events: Iterable[Event]) -> list[Attempt]:
+    """The attempts that the result of a run with these executions and events would have (see `Attempts`)."""
+    known = NodeHistory(made)
     ticks = {t: number for number, t in enumerate(sorted({t for one in made for t in (one.started, one.ended)}))}
     causes = {(event.node, event.t): cause for event in events if (cause := _cause(event))}
     told: list[Attempt] = []
@@ -88,7 +88,7 @@ def told_by_ticks(made: Sequence[Execution], events: Iterable[Event]) -> list[At
 
 
 def _alike(last: Attempt, now: Attempt) -> bool:
-    """Whether both ended at once, in the same way."""
+    """Whether both ended in the tick in which they began, in the same way."""
     at_once = (last.times > 1 or last.started == last.ended) and now.started == now.ended
     return at_once and now.status in ("SUCCESS", "FAILURE") and (last.status, last.cause) == (now.status, now.cause)
 
@@ -98,7 +98,7 @@ def _executions(record: RunRecord) -> list[Execution]:
 
 
 def _cause(event: Event) -> Cause | None:
-    """The cause that a failing leaf's event names."""
+    """The cause in a `failed` event; None for other events."""
     code, message = event.values.get("code"), event.values.get("message")
     if event.event != "failed" or code not in list(CauseCode) or not isinstance(message, str):
         return None

@@ -1,4 +1,4 @@
-"""A run's folder as checked values, for all that look at a record afterwards. Its fields: app/records/RECORD.md."""
+"""Reads and checks a run's folder. The fields of its files: app/records/RECORD.md."""
 
 import os
 import re
@@ -17,15 +17,15 @@ from regrasp.app.records.record import leaf_at_work
 from regrasp.app.records.result import SCHEMA, NodeStatus, Result
 from regrasp.trees.wiring import MAX_TREE_DEPTH
 
-MAX_RESULT, MAX_LINES = 16 << 20, 64 << 20  # bytes of result.json, of each of the others: hours of a run
-MOST_FINDINGS = 10  # of one file
+MAX_RESULT_BYTES, MAX_LINES_BYTES = 16 << 20, 64 << 20  # bytes of result.json, of each of the others: hours of a run
+MAX_FINDINGS = 10  # of one file
 TOO_DEEP = f"a path with more than {MAX_TREE_DEPTH} steps, which no tree has"
 T = TypeVar("T")
-Seconds = Annotated[float, Field(ge=0, le=1e6, allow_inf_nan=False)]
+SimSeconds = Annotated[float, Field(ge=0, le=1e6, allow_inf_nan=False)]
 
 
 def _path(path: str) -> str:
-    """The path of a node that a tree may have."""
+    """The path, if a tree may have such a node. Raises ValueError."""
     if path.count("/") > MAX_TREE_DEPTH:
         raise ValueError(TOO_DEEP)
     return path
@@ -38,16 +38,16 @@ NodePath = Annotated[str, AfterValidator(_path)]
 class Tick:
     """A node's status changed: when (simulated s), which node, to what."""
 
-    t: Seconds
+    t: SimSeconds
     path: NodePath
     status: NodeStatus
 
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """Something that was noticed or done: when (simulated s), by which node ('' for none), and its own values."""
+    """A line of events.jsonl: when (simulated s), which event, of which node ('' for none), and its other values."""
 
-    t: Seconds
+    t: SimSeconds
     event: str
     node: str
     values: dict[str, Any]
@@ -55,32 +55,32 @@ class Event:
 
 @dataclass(frozen=True)
 class RunRecord:
-    """What a run left. `remarks` are sentences about what is not there although it might be."""
+    """A run's folder. `remarks` are sentences about what is missing in it."""
 
     folder: Path
     result: Result | None  # None: the run was killed, or goes on
     events: tuple[Event, ...]
     ticks: tuple[Tick, ...]
     remarks: tuple[str, ...] = ()
-    at_work: tuple[float, str] | None = None  # second and path of the leaf in whose tick a run was killed, or is now
+    at_work: tuple[float, str] | None = None  # second, and path of the leaf in whose tick the run was killed, or is now
 
     @property
     def end(self) -> float:
-        """The last second that the record knows of."""
+        """The last simulated second in the record."""
         lines = (self.ticks[-1:], self.events[-1:])
         return max([line.t for last in lines for line in last] + [self.at_work[0] if self.at_work else 0.0])
 
     @property
     def begin(self) -> dict[str, Any]:
-        """The values of the first event: what was run; {} where it is missing."""
+        """The values of the `begin` event: what was run; {} if it is missing."""
         return next((e.values for e in self.events if e.event == "begin"), {})
 
 
 def read_record(folder: Path) -> RunRecord:
     """Read and check a run's folder.
 
-    A run that was killed has no result and perhaps half a last line: that is a remark. Raises `Findings` for a folder
-    that holds no run, for what is broken in it, and for a result that is newer than this program.
+    A run that was killed has no result, and its last lines may be incomplete: those are remarks. Raises `Findings` for
+    a folder without a run, for invalid files, and for a result that is newer than this program.
     """
     if not os.path.isdir(folder):
         wrong = "is no folder" if os.path.lexists(folder) else "does not exist"
@@ -111,7 +111,7 @@ def _adapter(kind: type[T]) -> TypeAdapter[T]:
 
 @dataclass(frozen=True)
 class _EventHead:
-    t: Seconds
+    t: SimSeconds
     event: str
     node: NodePath = ""
 
@@ -123,8 +123,8 @@ def _event(value: dict[str, Any]) -> Event:
 
 
 def _lines(path: Path, make: Callable[[dict[str, Any]], T], found: list[Finding], remarks: list[str]) -> list[T]:
-    """The value of each line; what is wrong goes to `found`, half a last line to `remarks`."""
-    data = _bytes(path, MAX_LINES, found)
+    """The value of each line; errors are added to `found`, and to `remarks` that the last line is incomplete."""
+    data = _bytes(path, MAX_LINES_BYTES, found)
     if data is None:
         return []
     *whole, last = data.split(b"\n")
@@ -144,13 +144,13 @@ def _lines(path: Path, make: Callable[[dict[str, Any]], T], found: list[Finding]
                 break
             wrong += 1
             found.append(Finding(shown(path), number, _sentence(error)))
-            if wrong == MOST_FINDINGS:
+            if wrong == MAX_FINDINGS:
                 break
     return values
 
 
 def _result(path: Path, found: list[Finding]) -> Result | None:
-    data = _bytes(path, MAX_RESULT, found)
+    data = _bytes(path, MAX_RESULT_BYTES, found)
     if data is None:
         return None
     try:
@@ -172,7 +172,7 @@ def _result(path: Path, found: list[Finding]) -> Result | None:
 
 
 def _bytes(path: Path, most: int, found: list[Finding]) -> bytes | None:
-    """The file's bytes; None, and a finding, where it cannot be read or is no file of a run."""
+    """The file's bytes; None, with a finding added, if it cannot be read or is too long."""
     if not os.path.isfile(path):  # a pipe or a device would not end
         wrong = "is no file" if os.path.lexists(path) else "is missing"
         found.append(Finding(shown(path), 0, f"{wrong}; a run leaves one"))
@@ -190,7 +190,7 @@ def _bytes(path: Path, most: int, found: list[Finding]) -> bytes | None:
 
 
 def _object(text: bytes) -> dict[str, Any]:
-    """A JSON object. Raises ValueError for anything else: NaN, nesting beyond 200, what is no UTF-8."""
+    """Parse a JSON object. Raises ValueError for anything else: NaN, nesting beyond 200, text that is not UTF-8."""
     try:
         value = from_json(text, allow_inf_nan=False)
     except ValueError as error:
@@ -201,7 +201,7 @@ def _object(text: bytes) -> dict[str, Any]:
 
 
 def _sentence(error: ValueError) -> str:
-    """What is wrong, in short: of a model's errors the first."""
+    """What is wrong, in one sentence: the first error of a model."""
     if not isinstance(error, ValidationError):
         return str(error)
     first = error.errors(include_url=False, include_input=False)[0]

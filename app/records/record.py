@@ -16,13 +16,13 @@ import structlog
 
 from regrasp.app.files.findings import Findings
 from regrasp.app.files.whole_file import write_whole
-from regrasp.app.interrupts import WallLimit, held_back
+from regrasp.app.interrupts import WallLimit, signals_deferred
 from regrasp.app.records import folders
 from regrasp.app.records.result import DEFAULT_CASE, Outcome, Result, plain
 from regrasp.interfaces.cause import Cause, CauseCode
 
-MOST_AT_WORK = 1 << 16  # bytes of it
-AT_WORK = "at_work.json"  # while a run goes on: which leaf is in the middle of a tick
+MAX_AT_WORK_BYTES = 1 << 16  # bytes of it
+AT_WORK = "at_work.json"  # exists while a run goes on: which leaf is in the middle of a tick
 
 
 Progress = Callable[[float, str], None]  # simulated seconds, active leaf; called at each tick
@@ -30,10 +30,10 @@ OnEvent = Callable[[Mapping[str, Any]], None]  # called with each event as event
 
 
 class Record:
-    """Context manager over a run's folder; with None as the folder all stays in memory.
+    """Context manager that writes a run's folder; without a folder everything stays in memory.
 
-    `ticks` is the stream for a `TickLog`. On leaving, the streams are closed and result.json is written: the one given
-    to `finish`, or, where the run did not come so far, one that tells of the interrupt or the error.
+    `ticks` is the stream for a `TickLog`. At the end the streams are closed and result.json is written: the result
+    given to `finish` or, if the run did not get so far, one that names the interrupt or the error.
     """
 
     def __init__(
@@ -61,12 +61,12 @@ class Record:
         self._longest = 0
         if folder is not None:
             folder.mkdir(parents=True, exist_ok=True)
-            if found := folders.findings(folder):
+            if found := folders.run_folder_findings(folder):
                 raise Findings(found)
             try:
                 self.events = (folder / "events.jsonl").open("x", encoding="utf-8", newline="\n")
-            except FileExistsError:  # another run took the folder this very moment
-                raise Findings(folders.holds_a_run(folder)) from None
+            except FileExistsError:  # another run has just taken the folder
+                raise Findings(folders.existing_run_findings(folder)) from None
             self._at_work = (folder / AT_WORK).open("wb", buffering=0)
             self.at_work(0.0, "")
             self.ticks = (folder / "ticks.jsonl").open("x", encoding="utf-8", newline="\n")
@@ -76,7 +76,7 @@ class Record:
     def logger(self, now: Callable[[], float], on_event: OnEvent | None = None) -> Any:
         """A structlog logger into events.jsonl; each line begins with `t`, the simulated second by `now`.
 
-        `on_event` is called with each event's values, too.
+        `on_event`, too, gets each event's values.
         """
 
         def stamp(_logger: Any, level: str, event: MutableMapping[str, Any]) -> dict[str, Any]:
@@ -92,17 +92,17 @@ class Record:
         )
 
     def at_work(self, t: float, node: str) -> None:
-        """Note that a leaf begins its tick at second `t`, or, with "" for its path, that the tick has ended.
+        """Note that the leaf at path `node` begins its tick at second `t`; "" for its path: the tick has ended.
 
-        Should the process die or hang in the middle of it, this is all that names the leaf.
+        If the process dies or hangs within the tick, only this note names the leaf.
         """
         line = json.dumps({"t": round(t, 6), "node": node}).ljust(self._longest)
-        self._longest = len(line)  # a shorter line leaves nothing of a longer one, in a single write
+        self._longest = len(line)  # padded: a single write replaces a longer line completely
         self._at_work.seek(0)
         self._at_work.write(line.encode() + b"\n")
 
     def finish(self, result: Result) -> None:
-        """The run's result, written when the record closes; a later one replaces it."""
+        """Set the run's result, which is written when the record closes; a later call replaces it."""
         self.result = result
 
     def __enter__(self) -> Self:
@@ -111,7 +111,7 @@ class Record:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        with held_back():
+        with signals_deferred():
             if self.result is None:
                 self.result = self._cut_short(error)
             if self.folder is not None:
@@ -142,23 +142,23 @@ class Record:
 
 
 def finish_killed(folder: Path, run: Result) -> Result:
-    """The result `run` of a run whose process is gone, with the leaf that was at work; written where there is none.
+    """Finish the record of a run whose process is gone: add the leaf that was at work to the result `run`.
 
-    Nothing is written where the folder holds no run.
+    Returns the result. It is written if the folder holds a run that has none.
     """
     if run.cause is not None and (leaf := leaf_at_work(folder)):
         run = dataclasses.replace(run, cause=dataclasses.replace(run.cause, node=leaf[1]), sim_seconds=leaf[0])
     if (folder / "events.jsonl").is_file() and not os.path.lexists(folder / "result.json"):
-        with held_back():
+        with signals_deferred():
             write_whole(folder / "result.json", run.to_json())
             (folder / AT_WORK).unlink(missing_ok=True)
     return run
 
 
 def leaf_at_work(folder: Path) -> tuple[float, str] | None:
-    """The second (simulated) and the path of the leaf in whose tick a run was killed, or hangs; None: in none."""
+    """The simulated second and the path of the leaf in whose tick a run was killed or hangs; None if in none."""
     try:
-        noted = json.loads((folder / AT_WORK).read_bytes()[:MOST_AT_WORK])
+        noted = json.loads((folder / AT_WORK).read_bytes()[:MAX_AT_WORK_BYTES])
         t, node = float(noted["t"]), noted["node"]
     except (OSError, ValueError, KeyError, TypeError):
         return None

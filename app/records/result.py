@@ -1,4 +1,4 @@
-"""What came out of a run: the fields of result.json (see RECORD.md beside this file)."""
+"""The result of a run: the fields of result.json (see RECORD.md beside this file)."""
 
 import dataclasses
 import json
@@ -11,8 +11,8 @@ from regrasp.interfaces.cause import Cause
 
 Outcome = Literal["stowed", "safe_stop", "time_limit", "wall_limit", "interrupted", "internal_error"]
 NodeStatus = Literal["RUNNING", "SUCCESS", "FAILURE", "INVALID"]
-DEFAULT_CASE = "default"  # of a scenario that varies nothing
-SCHEMA = 1  # of result.json; fields may be added to it, none changes its meaning
+DEFAULT_CASE = "default"  # name of the only case of a scenario that varies nothing
+SCHEMA = 1  # version of result.json; fields may be added without a new version, but none changes its meaning
 
 _PACKAGES = (
     "regrasp",
@@ -27,11 +27,11 @@ _PACKAGES = (
     "scipy",
     "toppra",
 )
-_DISTRIBUTIONS = {"opencv": "opencv-python-headless"}  # where the package index has another name
+_DISTRIBUTIONS = {"opencv": "opencv-python-headless"}  # name in the package index, if it differs
 
 
 def versions() -> dict[str, str]:
-    """Version of Python and of the packages that bear on a run's course; those that are not installed are left out."""
+    """Versions of Python and of the packages that can change a run; a package that is not installed is left out."""
     found = {"python": platform.python_version()}
     for name in _PACKAGES:
         try:
@@ -43,7 +43,7 @@ def versions() -> dict[str, str]:
 
 @dataclasses.dataclass(frozen=True)
 class Expectation:
-    """One expectation of the scenario: what came out and what was asked."""
+    """One expectation of the scenario: what came out (`value`) and what was expected (`limit`)."""
 
     name: str
     met: bool
@@ -53,7 +53,7 @@ class Expectation:
 
 @dataclasses.dataclass(frozen=True)
 class Slip:
-    """One loss of the connector, in simulated seconds; None where it was not noticed."""
+    """One loss of the connector, in simulated seconds; None: it was not noticed."""
 
     released_at: float
     detected_at: float | None
@@ -62,7 +62,10 @@ class Slip:
 
 @dataclasses.dataclass(frozen=True)
 class Attempt:
-    """One execution of a leaf, in simulated seconds; INVALID: it was stopped. What ended alike tick by tick is one."""
+    """An execution of a leaf, in simulated seconds; INVALID: it was stopped.
+
+    Executions in consecutive ticks that each ended at once and alike are one attempt with `times` > 1.
+    """
 
     path: str
     started: float
@@ -74,7 +77,7 @@ class Attempt:
 
 @dataclasses.dataclass(frozen=True)
 class Link:
-    """One node of the chain from the root down to the leaf that decided the outcome: what became of it, and when."""
+    """A node of the chain from the root down to the leaf that decided the outcome: when and why it ended so."""
 
     path: str
     type: str
@@ -84,7 +87,7 @@ class Link:
 
 @dataclasses.dataclass(frozen=True)
 class Pose:
-    """Metres, and x, y, z, w."""
+    """A position in metres and a quaternion x, y, z, w."""
 
     position: tuple[float, float, float]
     quaternion: tuple[float, float, float, float]
@@ -113,27 +116,27 @@ class BeliefState:
 
     held: Pose | None  # tool_from_connector of the right hand
     connector: Pose | None  # world_from_connector as last found for a grasp
-    sure: bool  # whether the whole of it was seen there
+    sure: bool  # whether the whole connector was seen there
     found_by: str | None
     last_seen: Sighting | None
     arms: dict[str, ArmState]
-    occupied_voxels: int  # of the obstacles that it mapped
+    occupied_voxels: int  # of the obstacles that it has mapped
     vain_searches: int  # since the connector was found last
-    notices: tuple[tuple[float, str], ...]  # losses that it noticed: when (simulated s), by which test
+    notices: tuple[tuple[float, str], ...]  # noticed losses: when (simulated s), by which test
 
 
 @dataclasses.dataclass(frozen=True)
 class Result:
-    """What came out of a run; the fields of result.json in their order. Seconds and ratios are plain floats."""
+    """The result of a run: the fields of result.json in their order."""
 
     schema: int = dataclasses.field(default=SCHEMA, init=False)
     scenario: str
     seed: int
     outcome: Outcome
     succeeded: bool
-    case: str = DEFAULT_CASE  # of the scenario's, where some of its values vary
+    case: str = DEFAULT_CASE  # which of the scenario's cases, if its values vary
     cause: Cause | None = None
-    chain: tuple[Link, ...] | None = None  # None where the run ended stowed, or in no node
+    chain: tuple[Link, ...] | None = None  # None if the run ended stowed, or in no node
     traceback: str | None = None  # of an internal_error
     expectations: tuple[Expectation, ...] = ()
     slips: tuple[Slip, ...] = ()
@@ -146,7 +149,7 @@ class Result:
     attempts: tuple[Attempt, ...] = ()
 
     def to_json(self) -> str:
-        """The text of result.json; numbers that JSON has no word for (inf, nan) become null."""
+        """The text of result.json; inf and nan, which JSON cannot state, become null."""
         return json.dumps(plain(dataclasses.asdict(self)), indent=2, allow_nan=False) + "\n"
 
 

@@ -1,4 +1,4 @@
-"""What came out of a run, in lines for a person."""
+"""The result of a run as lines of text."""
 
 import sys
 from collections.abc import Iterator, Mapping
@@ -11,8 +11,8 @@ if TYPE_CHECKING:
     from regrasp.app.records.result import Expectation, Result
 
 
-def summary(result: "Result", folder: Path) -> str:
-    """What `regrasp run` says in the end."""
+def run_summary(result: "Result", folder: Path) -> str:
+    """What `regrasp run` prints at the end."""
     lines = [headline(result)]
     if result.cause:
         at = f" ({result.cause.node})" if result.cause.node else ""
@@ -40,17 +40,17 @@ def what_ran(scenario: str, case: str, seed: object) -> str:
 
 
 def expectation_lines(result: "Result") -> Iterator[str]:
-    """Each expectation with a mark: met or not, what came out, what was asked."""
+    """Each expectation with a mark: met or not, what came out, what was expected."""
     yes, no = marks()
     for e in result.expectations:
-        yield f"{yes if e.met else no} {e.name}: {_plain(e.value)} (asked: {asked(e)})"
+        yield f"{yes if e.met else no} {e.name}: {_plain(e.value)} (expected: {limit_words(e)})"
 
 
-def asked(expectation: "Expectation") -> str:
-    """What was asked for, and whether more or less of it is met too."""
+def limit_words(expectation: "Expectation") -> str:
+    """What the scenario expects, and whether it is the least, the most or the very value."""
     limit = _plain(expectation.limit)
     if expectation.name == "slips":
-        return f"at least {limit} noticed, none unseen"
+        return f"at least {limit}, all noticed"
     return limit if expectation.name in ("outcome", "cause", "hidden") else f"at most {limit}"
 
 
@@ -65,7 +65,7 @@ def slip_lines(result: "Result") -> Iterator[str]:
         yield f"lost at {slip.released_at:.2f} s, {seen}"
 
 
-def in_words(event: str, values: Mapping[str, Any]) -> str:
+def event_words(event: str, values: Mapping[str, Any]) -> str:
     """An event's name, and its values as name=value."""
     told = ", ".join(f"{name}={_short(value)}" for name, value in values.items())
     return f"{event}: {told}" if told else event
@@ -76,7 +76,7 @@ def _short(value: object) -> str:
 
 
 def marks() -> tuple[str, str]:
-    """The signs for met and not met that stdout can show."""
+    """Signs for met and not met, in characters that stdout can show."""
     return ("✓", "✗") if (sys.stdout.encoding or "").lower().startswith("utf") else ("ok", "NOT MET")
 
 

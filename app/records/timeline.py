@@ -1,4 +1,4 @@
-"""A run's attempts as lines: grouped by where in the tree they stand, with times aligned and repeats folded."""
+"""A run's attempts as lines, grouped by their place in the tree; times are aligned, repeated rounds are folded."""
 
 import textwrap
 from bisect import bisect_left, bisect_right
@@ -7,25 +7,30 @@ from dataclasses import dataclass
 from itertools import groupby
 from typing import Any
 
-from regrasp.app.records.history import Course
+from regrasp.app.records.history import NodeHistory
 from regrasp.app.records.reader import Event
 from regrasp.app.records.result import Attempt
-from regrasp.app.records.summary import in_words
+from regrasp.app.records.summary import event_words
 
-Names = tuple[str, ...]  # a path's parts
-STATUS = {"INVALID": "stopped", "RUNNING": "still running"}
-MARGIN = 19  # columns of the two times
-MOST_EVENTS = 6  # shown of one attempt
-MOST_ATTEMPTS = 500  # shown of a run
-LONGEST = 1000  # characters of a text from the record
-TOLD_ELSEWHERE = ("failed", "begin", "end")
+PathParts = tuple[str, ...]  # a path's parts
+STATUS_WORDS = {"INVALID": "stopped", "RUNNING": "still running"}
+TIME_COLUMNS = 19  # width of the two times
+SHOWN_ELSEWHERE = ("failed", "begin", "end")
+
+
+@dataclass(frozen=True)
+class TimelineParameters:
+    """How much of a long run is shown."""
+
+    max_events: int = 6  # of one attempt; choice: the attempts stay in view
+    max_attempts: int = 500  # of a run, the last ones; choice: enough for any run that somebody reads
 
 
 @dataclass(frozen=True)
 class _Round:
     """Attempts up to the next round of a loop; `again` is what the loop began anew, for the `number`th time."""
 
-    again: Names
+    again: PathParts
     number: int
     attempts: tuple[Attempt, ...]
 
@@ -34,16 +39,23 @@ class _Round:
         return self.again, [(a.path, a.status, a.cause and a.cause.code) for a in self.attempts]
 
 
-def timeline(attempts: Sequence[Attempt], events: Sequence[Event], course: Course, width: int) -> Iterator[str]:
-    """Lines of at most `width` columns: begin and end of each attempt, and below it its cause and its events."""
-    if len(attempts) > MOST_ATTEMPTS:
-        yield f"{'':{MARGIN}}{len(attempts) - MOST_ATTEMPTS} earlier attempts are left out; --json has them all"
-        attempts = attempts[-MOST_ATTEMPTS:]
+def timeline(
+    attempts: Sequence[Attempt],
+    events: Sequence[Event],
+    history: NodeHistory,
+    width: int,
+    parameters: TimelineParameters = TimelineParameters(),
+) -> Iterator[str]:
+    """Lines of at most `width` columns: begin and end of each attempt, and below it its events and its cause."""
+    most = parameters.max_attempts
+    if len(attempts) > most:
+        yield f"{'':{TIME_COLUMNS}}{len(attempts) - most} earlier attempts are left out; --json has them all"
+        attempts = attempts[-most:]
     headings = _Headings(attempts)
     by_node: dict[str, list[Event]] = {}
     for event in events:
         by_node.setdefault(event.node, []).append(event)
-    for _, same in groupby(_rounds(attempts, course), key=_Round.signature):
+    for _, same in groupby(_rounds(attempts, history), key=_Round.signature):
         first, *more = same
         shown, again = headings.reopened(first)
         for attempt in first.attempts:
@@ -51,21 +63,22 @@ def timeline(attempts: Sequence[Attempt], events: Sequence[Event], course: Cours
             for depth, heading in enumerate(open_now):
                 if shown[: len(heading)] != heading:
                     note = f"  again, round {first.number}" if heading == again else ""
-                    yield f"{'':{MARGIN}}{'  ' * depth}{'/'.join(heading[above:])}{note}"
+                    yield f"{'':{TIME_COLUMNS}}{'  ' * depth}{'/'.join(heading[above:])}{note}"
                 above = len(heading)
             shown = open_now[-1] if open_now else ()
-            yield from _lines(attempt, above, len(open_now), by_node.get(attempt.path, []), width)
+            own = by_node.get(attempt.path, [])
+            yield from _lines(attempt, above, len(open_now), own, width, parameters.max_events)
         if more:
             begin, end = more[0].attempts[0].started, max(a.ended for a in more[-1].attempts)
             yield f"{begin:8.2f} {end:8.2f}  and the same again, {len(more)} more time{'s' * (len(more) > 1)}"
 
 
-def _rounds(attempts: Sequence[Attempt], course: Course) -> Iterator[_Round]:
+def _rounds(attempts: Sequence[Attempt], history: NodeHistory) -> Iterator[_Round]:
     """The attempts, parted where a loop begins what is below it anew."""
-    again: tuple[Names, int] = ((), 1)
+    again: tuple[PathParts, int] = ((), 1)
     members: list[Attempt] = []
     for attempt in attempts:
-        if members and (new := course.new_round(attempt.path, members[-1].started, attempt.started)):
+        if members and (new := history.new_round(attempt.path, members[-1].started, attempt.started)):
             yield _Round(*again, tuple(members))
             again, members = (tuple(new[0].split("/")), new[1]), []
         members.append(attempt)
@@ -77,17 +90,17 @@ class _Headings:
     """The ancestors at which the attempts' paths part; a chain of only children is one."""
 
     def __init__(self, attempts: Sequence[Attempt]) -> None:
-        self._below: dict[Names, set[str]] = {}
+        self._below: dict[PathParts, set[str]] = {}
         for names in map(_names, attempts):
             for depth in range(len(names)):
                 self._below.setdefault(names[:depth], set()).add(names[depth])
 
-    def of(self, attempt: Attempt) -> list[Names]:
+    def of(self, attempt: Attempt) -> list[PathParts]:
         """From the top."""
         names = _names(attempt)
         return [names[:depth] for depth in range(1, len(names)) if len(self._below[names[:depth]]) > 1]
 
-    def reopened(self, group: _Round) -> tuple[Names, Names]:
+    def reopened(self, group: _Round) -> tuple[PathParts, PathParts]:
         """What stays open of the headings above when a round begins, and the heading that it begins with."""
         if not group.again:
             return (), ()
@@ -95,23 +108,23 @@ class _Headings:
         return heading[:-1], heading
 
 
-def _names(attempt: Attempt) -> Names:
+def _names(attempt: Attempt) -> PathParts:
     return tuple(attempt.path.split("/"))
 
 
-def _lines(attempt: Attempt, above: int, depth: int, events: Sequence[Event], width: int) -> Iterator[str]:
-    """The attempt's own line, its events and its cause."""
+def _lines(attempt: Attempt, above: int, depth: int, events: Sequence[Event], width: int, most: int) -> Iterator[str]:
+    """The attempt's own line, at most `most` of its events, and its cause."""
     name = "  " * depth + "/".join(_names(attempt)[above:])
-    status = STATUS.get(attempt.status, attempt.status)
+    status = STATUS_WORDS.get(attempt.status, attempt.status)
     times = f", {attempt.times} times" if attempt.times > 1 else ""
     yield f"{attempt.started:8.2f} {attempt.ended:8.2f}  {name:<36} {status}{times}"
-    indent = " " * (MARGIN + 2 * depth + 4)
+    indent = " " * (TIME_COLUMNS + 2 * depth + 4)
     first = bisect_left(events, attempt.started, key=_time)
-    mine = [e for e in events[first : bisect_right(events, attempt.ended, key=_time)] if e.event not in TOLD_ELSEWHERE]
-    for event in mine[:MOST_EVENTS]:
+    mine = [e for e in events[first : bisect_right(events, attempt.ended, key=_time)] if e.event not in SHOWN_ELSEWHERE]
+    for event in mine[:most]:
         yield from wrapped(f"{event.t:.2f} s {event_text(event)}", width, indent)
-    if len(mine) > MOST_EVENTS:
-        yield f"{indent}and {len(mine) - MOST_EVENTS} events more"
+    if len(mine) > most:
+        yield f"{indent}and {len(mine) - most} more events"
     if attempt.cause:
         yield from wrapped(f"{attempt.cause.code}: {attempt.cause.message}", width, indent)
 
@@ -120,13 +133,16 @@ def _time(event: Event) -> float:
     return event.t
 
 
-def wrapped(text: str, width: int, indent: str = "", further: str = "  ") -> list[str]:
-    """The text in lines of at most `width` columns, the first after `indent`, the others after `further` besides."""
-    text = text if len(text) <= LONGEST else text[: LONGEST - 3] + "..."
+def wrapped(text: str, width: int, indent: str = "", further: str = "  ", longest: int = 1000) -> list[str]:
+    """The text in lines of at most `width` columns, each after `indent`, all but the first after `further`, too.
+
+    A text of more than `longest` characters is cut.
+    """
+    text = text if len(text) <= longest else text[: longest - 3] + "..."
     width = max(width, len(indent) + len(further) + 20)
     return textwrap.wrap(text, width, initial_indent=indent, subsequent_indent=indent + further)
 
 
 def event_text(event: Event) -> str:
     """An event in words: its name, and its values as name=value."""
-    return in_words(event.event, event.values)
+    return event_words(event.event, event.values)

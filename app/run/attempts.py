@@ -1,4 +1,4 @@
-"""What a run tried: every execution of a leaf with how it ended, and the chain from the root down that decided."""
+"""The attempts of a run: every execution of a leaf and how it ended, and the nodes that decided the outcome."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -16,16 +16,16 @@ from regrasp.trees import in_tree_order, node_paths
 
 @dataclass(frozen=True)
 class _Failure:
-    """A node's latest failure: in which tick, what the chain says of it, its cause, and the child that decided it."""
+    """A node's latest failure: its tick, its link in the chain, its cause, and the failure below that decided it."""
 
     tick: int
     link: Link
     cause: Cause | None
-    passed_on: bool  # the cause was another leaf's: a safe stop's
+    passed_on: bool  # whether the cause is another leaf's, as a safe stop passes on
     below: "_Failure | None"
 
     def down(self) -> Iterator["_Failure"]:
-        """This failure and those below it, down to the leaf's."""
+        """This failure and those below it, down to the leaf."""
         failure: _Failure | None = self
         while failure is not None:
             yield failure
@@ -33,11 +33,11 @@ class _Failure:
 
 
 class Attempts(py_trees.visitors.VisitorBase):
-    """Watches a tree through its ticks; `made` are the attempts in the order of their beginning.
+    """A visitor of a tree; `made` are the attempts so far, in the order of their beginning.
 
-    It has to watch: a node with memory resets what failed before, at the next tick. `causes` is the list to which
-    failing leaves append. `types` are the words of the tree file by path; without one it is the class. After a stop
-    outside a tick call `finalise()`.
+    The attempts must be noted tick by tick: a node with memory resets what failed before at the next tick. `causes` is
+    the list to which failing leaves append. `types` holds the tree file's element name of each node by path; a node
+    without one is named by its class. After a stop outside a tick call `finalise()`.
     """
 
     def __init__(
@@ -52,7 +52,7 @@ class Attempts(py_trees.visitors.VisitorBase):
         self._open: set[int] = set()  # ids of leaves that run
         self._latest: dict[int, tuple[int, int]] = {}  # of a leaf: index of its last attempt, tick of its last visit
         self._failures: dict[int, _Failure] = {}
-        self._told = 0  # causes that have found their attempt
+        self._told = 0  # how many causes belong to an attempt already
         self._tick = 0
 
     def initialise(self) -> None:
@@ -60,7 +60,7 @@ class Attempts(py_trees.visitors.VisitorBase):
         self._tick += 1
 
     def run(self, behaviour: Behaviour) -> None:
-        """At a node's visit; its children's visits come first."""
+        """At a node's visit, after its children's visits."""
         failed = behaviour.status is Status.FAILURE
         if behaviour.children:
             if failed:
@@ -73,29 +73,32 @@ class Attempts(py_trees.visitors.VisitorBase):
             self._failures[id(behaviour)] = _Failure(self._tick, self._link(behaviour, why), cause, passed_on, None)
 
     def finalise(self) -> None:
-        """After a tick, or after a stop outside one: what was stopped unseen has ended."""
+        """After a tick, or after a stop outside one: end the attempts of leaves that were stopped without a visit."""
         for leaf in self._leaves:
             if id(leaf) in self._open and leaf.status is not Status.RUNNING:
                 self._close(leaf, Status.INVALID)
 
     def raised(self, leaf: Behaviour, cause: Cause) -> None:
-        """An exception came out of a leaf, before its visit: its attempt ends with this cause."""
+        """End a leaf's attempt with this cause: it raised an exception, and so is not visited."""
         if id(leaf) not in self._open:
             self._begin(leaf)
         self._close(leaf, Status.INVALID, cause)
 
     def cause(self) -> Cause | None:
-        """The cause of the leaf that decided the root's failure; None when it gave none."""
+        """The cause of the leaf that decided the root's failure; None if it gave none."""
         failure = self._failures.get(id(self._root))
         return [*failure.down()][-1].cause if failure else None
 
     def failed_chain(self) -> tuple[Link, ...] | None:
-        """From the root down to the leaf whose failure decided; None while the root has not failed."""
+        """The chain from the root down to the leaf whose failure decided; None while the root has not failed."""
         failure = self._failures.get(id(self._root))
         return tuple(f.link for f in failure.down()) if failure else None
 
     def chain_to(self, node: Behaviour | None, verb: str, why: str) -> tuple[Link, ...] | None:
-        """From the root down to the node at which a run was cut short: "child x `verb`", and at the node `why`."""
+        """The chain from the root down to the node at which a run was cut short.
+
+        Each link above the node says "child x `verb`", the node's own link says `why`.
+        """
         links: list[Link] = []
         while node is not None:
             links.insert(0, self._link(node, why))
@@ -110,9 +113,9 @@ class Attempts(py_trees.visitors.VisitorBase):
         return round(self._now(), 6)
 
     def _new_cause(self) -> tuple[Cause | None, bool]:
-        """The last cause that came since the last failed leaf's visit, so from the one that is visited now.
+        """The cause of the failed leaf that is visited now, and whether the leaf passes on an earlier one.
 
-        And whether that leaf passed it on: it stands in the list before.
+        It is the last one that came since the visit of the failed leaf before.
         """
         old, new, self._told = self._causes[: self._told], self._causes[self._told :], len(self._causes)
         return (new[-1], any(cause is new[-1] for cause in old)) if new else (None, False)
@@ -136,9 +139,9 @@ class Attempts(py_trees.visitors.VisitorBase):
         self._open.discard(id(leaf))
 
     def _repeats(self, leaf: Behaviour, cause: Cause | None) -> bool:
-        """Whether the leaf ends at once, exactly as it did in the tick before: counted as the same attempt.
+        """Whether the leaf ended within this tick exactly as it did in the tick before: it is then the same attempt.
 
-        A loop's next round is another attempt.
+        In the next round of a loop it is another attempt.
         """
         index, tick = self._latest.get(id(leaf), (-1, -1))
         if leaf.status is Status.RUNNING or tick != self._tick - 1 or _in_a_new_round(leaf):
@@ -151,18 +154,19 @@ class Attempts(py_trees.visitors.VisitorBase):
         return True
 
     def _failure(self, node: Behaviour) -> _Failure:
-        """Of a node with children."""
+        """The failure of a node with children."""
         child = self._deciding_child(node)
         below = self._failures[id(child)] if child is not None else None
         return _Failure(self._tick, self._link(node, _why(node, child)), None, False, below)
 
     def _deciding_child(self, node: Behaviour) -> Behaviour | None:
-        """The child whose failure made the node fail; None where it was none's.
+        """The child whose failure made the node fail; None if no child's did.
 
-        A Fallback's is the last one with a cause of its own: the stop after a failed mission passes on the mission's.
+        Of a Fallback it is the last child with a cause of its own: a safe stop after a failed mission passes on the
+        mission's cause.
         """
         failures = {id(child): f for child in node.children if (f := self._failures.get(id(child)))}
-        if isinstance(node, Selector):  # all its children have failed, with memory in earlier ticks
+        if isinstance(node, Selector):  # all its children have failed; with memory, some in earlier ticks
             leaves = {id(child): [*failures[id(child)].down()][-1] for child in node.children}
             own = [c for c in node.children if leaves[id(c)].cause is not None and not leaves[id(c)].passed_on]
             return (own or node.children)[-1]
@@ -170,7 +174,7 @@ class Attempts(py_trees.visitors.VisitorBase):
 
 
 def _why(node: Behaviour, child: Behaviour | None) -> str:
-    """What the chain says of a failed node with children, of which `child` decided."""
+    """Why a node with children failed, in words; `child` decided it."""
     if isinstance(node, Selector):
         return f"all {len(node.children)} children failed"
     if isinstance(node, Retry):
@@ -185,9 +189,9 @@ def _why(node: Behaviour, child: Behaviour | None) -> str:
 
 
 def _in_a_new_round(leaf: Behaviour) -> bool:
-    """Whether the leaf is visited because a decorator such as Retry, which goes on, has begun what is below it anew.
+    """Whether a decorator above the leaf, such as Retry, has begun a new round in this tick.
 
-    At a node's visit those above it still have their status of the tick before.
+    At a node's visit the nodes above it still have the status of the tick before: RUNNING for a loop that goes on.
     """
     node = leaf
     while node.parent is not None and node.parent.status is not Status.RUNNING:

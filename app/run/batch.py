@@ -1,4 +1,4 @@
-"""Many runs, each in a process of its own, and the row that each leaves."""
+"""Many runs, each in a process of its own, and a row of figures for each."""
 
 import contextlib
 import math
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from regrasp.app.records.record import finish_killed
 from regrasp.app.records.result import Outcome, Result
-from regrasp.app.records.summary import asked
+from regrasp.app.records.summary import limit_words
 from regrasp.app.run.processes import Done, run_each
 from regrasp.app.scenario.load import Scenario
 from regrasp.interfaces.cause import Cause, CauseCode
@@ -19,12 +19,12 @@ from regrasp.interfaces.cause import Cause, CauseCode
 if TYPE_CHECKING:
     from regrasp.sim.render.renderer import RendererName
 
-Episode = Callable[..., Result]
+RunEpisode = Callable[..., Result]
 
 
 @dataclass(frozen=True)
 class Settings:
-    """How runs are done: what is drawn and shown, and the seconds of wall time that each may take."""
+    """How runs are done: what is rendered and shown, and how many seconds of wall time each may take."""
 
     video: bool = False
     renderer: "RendererName" = "auto"
@@ -34,7 +34,7 @@ class Settings:
 
 @dataclass(frozen=True)
 class Run:
-    """One run to do: a scenario's case with a seed, and the folder of its record."""
+    """One run to do: a case of a scenario, its seed, and the folder of its record."""
 
     scenario: Scenario
     seed: int
@@ -47,7 +47,7 @@ class Run:
 
 @dataclass(frozen=True)
 class Row:
-    """What is kept of a run. Seconds are simulated ones unless said otherwise, forces newtons; None: not known."""
+    """The figures of a run. Seconds are simulated unless a field says otherwise, forces in newtons; None: unknown."""
 
     scenario: str
     case: str
@@ -62,9 +62,9 @@ class Row:
     detected_by: list[str] = field(default_factory=list)
     unintended_force: float | None = None
     unmet: list[str] = field(default_factory=list)
-    why: str = ""  # the cause and the unmet expectations in words; '' for a run that came out as expected
+    why: str = ""  # the cause and the unmet expectations in words; '' if the run came out as expected
     sim_seconds: float = 0.0
-    wall_seconds: float = 0.0  # on the clock on the wall
+    wall_seconds: float = 0.0  # real ones
     real_time_factor: float = 0.0
 
 
@@ -73,13 +73,13 @@ def run_all(
     jobs: int,
     keep: Callable[[list[Row]], None] = lambda rows: None,
     settings: Settings = Settings(),
-    episode: Episode | None = None,
+    episode: RunEpisode | None = None,
 ) -> tuple[dict[int, Row], bool]:
-    """Do all, `jobs` at a time; the rows by the runs' numbers, and whether Ctrl-C cut it short.
+    """Do the runs, `jobs` at a time. Returns the rows by the runs' numbers, and whether Ctrl-C came.
 
-    After each run a line goes to stderr, unless `quiet`, and `keep` gets the rows so far. A run whose process died
-    counts as an internal error; one that takes longer than the wall limit is stopped.
-    `episode` stands in for `run_episode` in tests.
+    After each run a line goes to stderr (not if `settings.quiet`), and `keep` gets the rows so far. If a run's process
+    dies, its outcome is an internal error; a run that takes longer than the wall limit is stopped. `episode` replaces
+    `run_episode` in tests.
     """
     tasks = [
         partial(
@@ -108,7 +108,7 @@ def run_all(
 
 
 def _run_episode(*args: Any, **kwargs: Any) -> Result:
-    """`run_episode`, which brings the physics into the process of its own and not into ours."""
+    """`run_episode`, imported in the run's own process only: it brings the physics engine."""
     from regrasp.app.run.episode import run_episode
 
     return run_episode(*args, **kwargs)
@@ -120,7 +120,7 @@ def _summary(row: Row) -> str:
 
 
 def result_of(run: Run, done: Done[Result]) -> Result:
-    """What a run came to; of a process that died or was killed the record is finished here, with the leaf at work."""
+    """The result of a run. If its process died or was killed, its record is finished here, with the leaf at work."""
     if done.value is not None:
         return done.value
     code = CauseCode.WALL_LIMIT if done.timed_out else CauseCode.INTERNAL_ERROR
@@ -131,7 +131,7 @@ def result_of(run: Run, done: Done[Result]) -> Result:
 
 
 def row_of(run: Run, done: Done[Result]) -> Row:
-    """A run's row."""
+    """The row of a run that has ended."""
     what = (run.scenario.name, run.scenario.case, run.scenario.file.gravity, run.seed)
     result = result_of(run, done)
     values = {e.name: e.value for e in result.expectations}
@@ -145,7 +145,7 @@ def row_of(run: Run, done: Done[Result]) -> Row:
         detected_by=[s.detected_by for s in result.slips if s.detected_by],
         unintended_force=values.get("unintended_force"),
         unmet=[e.name for e in result.expectations if not e.met],
-        why="" if result.succeeded else failure(result),
+        why="" if result.succeeded else failure_words(result),
         sim_seconds=result.sim_seconds,
         wall_seconds=result.wall_seconds,
         real_time_factor=result.real_time_factor,
@@ -153,7 +153,9 @@ def row_of(run: Run, done: Done[Result]) -> Row:
     )
 
 
-def failure(result: Result) -> str:
-    """Why a run did not come out as expected, in words: its cause and every unmet expectation."""
+def failure_words(result: Result) -> str:
+    """Why a run did not come out as expected, in words: its cause and each unmet expectation."""
     cause = [f"{result.cause.code}: {result.cause.message}"] if result.cause else []
-    return "; ".join([*cause, *(f"{e.name} is {e.value}, asked {asked(e)}" for e in result.expectations if not e.met)])
+    return "; ".join(
+        [*cause, *(f"{e.name} is {e.value}, expected {limit_words(e)}" for e in result.expectations if not e.met)]
+    )

@@ -1,4 +1,4 @@
-"""One run: the world, the services, the tree, and the loop that ticks it."""
+"""One run: the loop that ticks the tree, how it can end, and its result."""
 
 import time
 import traceback
@@ -6,49 +6,31 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import py_trees
 from py_trees.common import Status
 
 from regrasp.app.interrupts import WallLimit
-from regrasp.app.records.record import OnEvent, Progress, Record
+from regrasp.app.records.record import Progress, Record
 from regrasp.app.records.result import Link, Outcome, Result
-from regrasp.app.run.attempts import Attempts
-from regrasp.app.run.fault_injection import EnteredNodes, FaultLog, break_services
+from regrasp.app.run.compose import Episode, assemble, build_world
+from regrasp.app.run.fault_injection import EnteredNodes, FaultLog
 from regrasp.app.run.film import Film
+from regrasp.app.run.observers import Observers
 from regrasp.app.run.tick_log import TickLog, active_leaf, note_leaf_at_work, running_leaf
 from regrasp.app.scenario.copies import copies
 from regrasp.app.scenario.load import Scenario
-from regrasp.app.scenario.sampling import draw_faults, draw_obstacles
 from regrasp.app.tasks.cable.belief import belief_state
-from regrasp.app.tasks.cable.judge import Judge
-from regrasp.behaviors import LEAVES
-from regrasp.behaviors.services import Services
 from regrasp.interfaces.cause import Cause, CauseCode
-from regrasp.motion.service import Motion
-from regrasp.perception.service import Perception
-from regrasp.sim.ground_truth import GroundTruth
+from regrasp.interfaces.devices import TICK
 from regrasp.sim.render.renderer import RendererName
-from regrasp.sim.world import World
-from regrasp.trees import in_tree_order, load_tree, node_paths, read_graph
+from regrasp.trees import in_tree_order, node_paths
 
-TICK = 0.05  # simulated seconds
-
-
-@dataclass
-class Episode:
-    """All that one run is made of."""
-
-    world: World
-    services: Services
-    tree: py_trees.trees.BehaviourTree
-    judge: Judge
-    attempts: Attempts
+STOP_SECONDS = 0.3  # simulated: after a stop both arms must be at rest within this time (the specification)
 
 
 @dataclass
 class Ending:
-    """How a run ended, and what decided it."""
+    """How a run ended and what decided it. `chain`: the nodes from the root down to the one that decided."""
 
     outcome: Outcome
     cause: Cause | None = None
@@ -64,20 +46,18 @@ def run_episode(
     video: bool = False,
     gui: bool = False,
     renderer: RendererName = "auto",
-    progress: Progress | None = None,
-    on_event: OnEvent | None = None,
+    observers: Observers = Observers(),  # noqa: B008 - it does not change
 ) -> Result:
     """Run a scenario to its end and leave its record in the folder `out` (None: nowhere).
 
-    `progress` is called at every tick with the simulated second and the active leaf, `on_event` with each event of
-    the run's log. A KeyboardInterrupt, from them or inside a leaf, ends the run cleanly. An exception inside a leaf
-    ends it with the cause `internal_error` and its traceback in the record.
+    A KeyboardInterrupt, inside a leaf or from an observer, ends the run cleanly. An exception inside a leaf ends it
+    with the cause `internal_error`, and its traceback goes into the record.
     """
     began = time.perf_counter()
     with Record(out, scenario.name, seed, scenario.case, copies(scenario, seed)) as record:
         world = build_world(scenario, seed, renderer, gui)
         try:
-            log = record.logger(world.now, on_event)
+            log = record.logger(world.now, observers.event)
             log.info(
                 "begin",
                 scenario=scenario.name,
@@ -92,13 +72,14 @@ def run_episode(
                 renderer=world.renderer.name,
                 renderer_reason=world.renderer.reason,
             )
-            episode = _assemble(scenario, world, seed, log)
+            episode = assemble(scenario, world, seed, log)
+            observers.assembled(episode)
             ticks = TickLog(episode.tree.root, record.ticks, world.now)
             faults = [EnteredNodes(episode.tree.root, world.notice), FaultLog(world.faults, log)]
             episode.tree.visitors += [ticks, episode.attempts, *faults]
             note_leaf_at_work(episode.tree, lambda node: record.at_work(world.now(), node))
             with Film(out / "video.mp4" if video and out else None, world) as film:
-                ending = _run(episode, scenario, film, progress, log)
+                ending = _run(episode, scenario, film, observers.tick, log)
             ticks.finalise()
             episode.attempts.finalise()
             result = _result(episode, scenario, seed, ending, time.perf_counter() - began)
@@ -110,35 +91,11 @@ def run_episode(
     return result
 
 
-def build_world(scenario: Scenario, seed: int, renderer: RendererName = "auto", gui: bool = False) -> World:
-    """The scenario's world as this seed makes it; close it."""
-    rng = np.random.default_rng([seed, 0])
-    obstacles = draw_obstacles(scenario.file, rng)
-    faults = draw_faults(scenario.file, rng)
-    return World(scenario.lit_cell, scenario.file.gravity, seed, obstacles, faults, renderer, gui)
-
-
-def _assemble(scenario: Scenario, world: World, seed: int, log: Any) -> Episode:
-    known = scenario.cell.known
-    grippers = {name: arm.gripper for name, arm in world.arms.items()}
-    motion = Motion(known, world.arms, grippers, world, seed * 1000)
-    motion.execution.on_anomaly = lambda sentence: log.warning("does not follow", why=sentence)
-    perception = Perception(known, world.cameras, world, motion.camera_pose, motion.spheres)
-    services = Services(known, world, motion, perception, log)
-    break_services(services, world.faults, world.now)
-    py_trees.blackboard.Blackboard.clear()
-    tree = py_trees.trees.BehaviourTree(load_tree(scenario.tree, LEAVES, scenario.inputs))
-    graph = read_graph(scenario.tree, LEAVES, scenario.inputs)
-    types = {node.path: node.type for node in graph.walk() if node.kind != "subtree"}
-    attempts = Attempts(tree.root, services.belief.causes, world.now, types)
-    return Episode(world, services, tree, Judge(GroundTruth(world), scenario.file.expect), attempts)
-
-
-def _run(episode: Episode, scenario: Scenario, film: Film, progress: Progress | None, log: Any) -> Ending:
-    """Tick until the tree ends, the time is over or somebody interrupts; the arms are stopped in the end."""
+def _run(episode: Episode, scenario: Scenario, film: Film, on_tick: Progress, log: Any) -> Ending:
+    """Tick until the tree ends, the time limit is reached or somebody interrupts; then stop the arms."""
     root = episode.tree.root
     try:
-        ending = _loop(episode, scenario, film, progress)
+        ending = _loop(episode, scenario, film, on_tick)
     except KeyboardInterrupt as stop:
         ending = _stopped(episode, stop)
     except Exception as error:
@@ -149,11 +106,11 @@ def _run(episode: Episode, scenario: Scenario, film: Film, progress: Progress | 
         ending = ending if ending.outcome == "internal_error" else _broken(episode, error, log)
     finally:
         episode.services.motion.stop()
-        episode.world.advance(0.3)
+        episode.world.advance(STOP_SECONDS)
     return ending
 
 
-def _loop(episode: Episode, scenario: Scenario, film: Film, progress: Progress | None) -> Ending:
+def _loop(episode: Episode, scenario: Scenario, film: Film, on_tick: Progress) -> Ending:
     world, root, attempts = episode.world, episode.tree.root, episode.attempts
     belief, limit = episode.services.belief, scenario.file.limits.sim_seconds
     episode.tree.setup(services=episode.services)
@@ -162,8 +119,7 @@ def _loop(episode: Episode, scenario: Scenario, film: Film, progress: Progress |
         episode.judge.observe(world.now(), belief)
         leaf = active_leaf(root)
         film.show(leaf)
-        if progress:
-            progress(world.now(), leaf)
+        on_tick(world.now(), leaf)
         if root.status is Status.SUCCESS:
             return Ending("stowed")
         if root.status is Status.FAILURE:
@@ -176,7 +132,7 @@ def _loop(episode: Episode, scenario: Scenario, film: Film, progress: Progress |
 
 
 def _stopped(episode: Episode, stop: KeyboardInterrupt) -> Ending:
-    """The ending by a stop from outside: between two ticks, or inside a leaf, which it then names."""
+    """The ending by a stop from outside. If it came inside a leaf, the cause names the leaf."""
     root, seconds = episode.tree.root, episode.world.now()
     inside = _raising(stop, root)
     is_limit = isinstance(stop, WallLimit)
@@ -192,12 +148,12 @@ def _stopped(episode: Episode, stop: KeyboardInterrupt) -> Ending:
 
 
 def _unfinished(episode: Episode, leaf: py_trees.behaviour.Behaviour | None = None) -> tuple[Link, ...] | None:
-    """The chain down to the leaf that the run's end cut short, by default the one that is RUNNING."""
+    """The chain down to the leaf that the end of the run cut short, by default the RUNNING one."""
     return episode.attempts.chain_to(leaf or running_leaf(episode.tree.root), "was running", "was still running")
 
 
 def _broken(episode: Episode, error: Exception, log: Any) -> Ending:
-    """The ending that an exception makes, most likely a leaf's."""
+    """The ending by an exception, most likely from a leaf."""
     node = _raising(error, episode.tree.root)
     cause = Cause(CauseCode.INTERNAL_ERROR, f"{type(error).__name__}: {error}", _path(node, episode.tree.root))
     log.error("exception in a leaf", node=cause.node, exc_info=error)
@@ -208,7 +164,7 @@ def _broken(episode: Episode, error: Exception, log: Any) -> Ending:
 
 
 def _stop(root: py_trees.behaviour.Behaviour) -> None:
-    """Stop all that runs, also beside a leaf whose terminate raises; then raises what the first of these raised."""
+    """Stop all RUNNING nodes, even if some raise in `terminate`; then raise the first of these exceptions."""
     first: Exception | None = None
     for node in in_tree_order(root):
         while node.status is Status.RUNNING:
@@ -223,7 +179,7 @@ def _stop(root: py_trees.behaviour.Behaviour) -> None:
 
 
 def _path(node: py_trees.behaviour.Behaviour | None, root: py_trees.behaviour.Behaviour) -> str:
-    """Tree path of a node, '' of None."""
+    """The tree path of a node; '' for None."""
     return "" if node is None else node_paths(root)[node.id]
 
 

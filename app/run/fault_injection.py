@@ -1,4 +1,4 @@
-"""The faults that lie in the robot's software, and what the world is told of the tree for the others."""
+"""Injects the faults of the robot's software, and tells the world of entered nodes, at which other faults begin."""
 
 from collections.abc import Callable, Iterable
 from typing import Any
@@ -14,7 +14,7 @@ from regrasp.trees import node_paths
 
 
 class EnteredNodes(py_trees.visitors.VisitorBase):
-    """Tells `notice` the tree path of each node when it is first entered; a visitor of the tree."""
+    """A visitor of the tree that calls `notice` with the path of each node when it is first entered."""
 
     def __init__(self, root: py_trees.behaviour.Behaviour, notice: Callable[[str], None]) -> None:
         super().__init__(full=False)
@@ -28,7 +28,7 @@ class EnteredNodes(py_trees.visitors.VisitorBase):
 
 
 class FaultLog(py_trees.visitors.VisitorBase):
-    """Writes into the run's log when each fault begins and ends; a visitor of the tree."""
+    """A visitor of the tree that logs when each fault begins and ends."""
 
     def __init__(self, faults: Iterable[Fault], log: Any) -> None:
         super().__init__(full=False)
@@ -45,7 +45,7 @@ class FaultLog(py_trees.visitors.VisitorBase):
 
 
 def break_services(services: Services, faults: Iterable[Fault], now: Callable[[], float]) -> None:
-    """Put the software's faults before the services: while one is in force the call raises."""
+    """Wrap the calls that the software faults concern: while a fault is active, its call raises."""
     for fault in faults:
         spec = fault.spec
         if isinstance(spec, ServiceRaises):

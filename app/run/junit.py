@@ -1,20 +1,21 @@
-"""JUnit XML of the runs of a scenario's cases, as build servers read it."""
+"""Writes the runs of a scenario's cases as JUnit XML, for build servers."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
-from regrasp.app.files.findings import Findings, printable
+from regrasp.app.files.findings import Findings
 from regrasp.app.files.whole_file import write_whole
 from regrasp.app.run.batch import Row, Run
+from regrasp.interfaces.quote import printable
 
-ERRORS = ("internal_error", "wall_limit")  # outcomes that say nothing of the robot
+ERRORS = ("internal_error", "wall_limit")  # outcomes that say nothing about the robot
 
 
 def write_junit(path: Path, name: str, runs: Sequence[Run], rows: Mapping[int, Row]) -> None:
-    """One testcase a run: time on the wall, why it failed in a sentence and in full, the record's folder.
+    """Write one testcase per run: its wall time, why it failed (in a sentence and in full), its record's folder.
 
-    `rows` by the runs' numbers; a run without one was interrupted and counts as skipped.
+    `rows` go by the runs' numbers; a run without a row was interrupted and counts as skipped.
 
     Raises:
         OSError: the file cannot be written.
@@ -28,7 +29,9 @@ def write_junit(path: Path, name: str, runs: Sequence[Run], rows: Mapping[int, R
         "time": f"{sum(row.wall_seconds for row in rows.values()):.3f}",
     }
     told = {key: str(value) for key, value in counts.items()}
-    above = {key: text for key, text in told.items() if key != "skipped"}  # the common schema has no such sum
+    above = {
+        key: text for key, text in told.items() if key != "skipped"
+    }  # the common JUnit schema has no `skipped` there
     suites = ET.Element("testsuites", {"name": "regrasp", **above})
     suite = ET.SubElement(suites, "testsuite", {"name": printable(name), **told})
     for number, run in enumerate(runs):
@@ -53,7 +56,7 @@ def _testcase(suite: ET.Element, run: Run, row: Row | None) -> None:
 
 
 def _in_full(folder: Path | None) -> str:
-    """The page that `regrasp explain` shows of a record; '' where the run did not come to have one."""
+    """The page that `regrasp explain` shows of a record; '' if there is no record."""
     from regrasp.app.records.explain import REPORT_WIDTH, explanation  # late: the command line starts with this module
     from regrasp.app.records.reader import read_record
 

@@ -1,4 +1,4 @@
-"""Work in processes of its own, one a task: py_trees' blackboard and PyBullet's globals are one per process."""
+"""Tasks in processes, one process per task: py_trees' blackboard and PyBullet's globals exist once per process."""
 
 import contextlib
 import math
@@ -14,13 +14,12 @@ from typing import Any, Generic, NamedTuple, TypeVar
 from regrasp.app.interrupts import WALL_LIMIT_SIGNAL, listen_to_parent
 
 T = TypeVar("T")
-GRACE = 10.0  # seconds that a process has to put its things in order
 
 
 class Done(NamedTuple, Generic[T]):
-    """How one task ended: its number, what it returned (None where it died), the error in words, peak memory in MB.
+    """How one task ended: its number, what it returned (None if it died), the error in words, peak memory in MB.
 
-    `timed_out`: it was stopped at the wall limit, and returned nothing after that.
+    `timed_out`: it was stopped at the wall limit and returned nothing.
     """
 
     number: int
@@ -35,16 +34,17 @@ class _Child:
     number: int
     process: Any
     deadline: float  # on the monotonic clock
-    told: bool = False  # that its time is over
+    signalled: bool = False  # that its time is over
 
 
-def run_each(tasks: Sequence[Callable[[], T]], jobs: int, wall_limit: float = math.inf) -> Generator[Done[T]]:
-    """Run picklable tasks, at most `jobs` at a time, and yield each as it ends, in whatever order.
+def run_each(
+    tasks: Sequence[Callable[[], T]], jobs: int, wall_limit: float = math.inf, grace: float = 10.0
+) -> Generator[Done[T]]:
+    """Run picklable tasks, at most `jobs` at a time, and yield each as it ends, in any order.
 
-    A task that raises or crashes yields its error; the others go on. One that takes longer than `wall_limit` seconds,
-    by the clock on the wall, gets a `WallLimit`, and is killed when it has not ended `GRACE` seconds later. When the
-    caller closes the iterator or Ctrl-C comes, those under way get a KeyboardInterrupt and as long to put their things
-    in order.
+    A task that raises or crashes yields its error; the others go on. A task that takes longer than `wall_limit`
+    seconds of wall time gets a `WallLimit`; if it has not ended `grace` seconds later, it is killed. When the caller
+    closes the iterator, or at Ctrl-C, the running tasks get a KeyboardInterrupt and have `grace` seconds to end.
     """
     context = get_context("spawn")
     waiting = list(enumerate(tasks))
@@ -55,42 +55,43 @@ def run_each(tasks: Sequence[Callable[[], T]], jobs: int, wall_limit: float = ma
                 number, task = waiting.pop(0)
                 reader, writer = context.Pipe(duplex=False)
                 process = context.Process(target=_child, args=(writer, task), daemon=True)
-                with _deaf():
+                with _signals_blocked():
                     process.start()
                 writer.close()  # the child has the only one now: its death shows as an end of file
                 running[reader] = _Child(number, process, time.monotonic() + wall_limit)
-            for ready in wait(list(running), _until_a_deadline(running.values())):
+            for ready in wait(list(running), _seconds_to_deadline(running.values())):
                 child = running[ready]
                 yield _received(child, ready, wall_limit)
                 del running[ready]
-            _press(running.values())
+            _enforce_deadlines(running.values(), grace)
     finally:
-        _stop([child.process for child in running.values()])
+        _stop([child.process for child in running.values()], grace)
 
 
-def _until_a_deadline(children: Iterable[_Child]) -> float | None:
-    """Seconds; None where there is none."""
+def _seconds_to_deadline(children: Iterable[_Child]) -> float | None:
+    """Wall-clock seconds until the first child's deadline; None if none has one."""
     first = min(child.deadline for child in children)
     return None if first == math.inf else max(0.0, first - time.monotonic())
 
 
-def _press(children: Iterable[_Child]) -> None:
-    """Tell those whose time is over, and kill those that were told and did not end."""
+def _enforce_deadlines(children: Iterable[_Child], grace: float) -> None:
+    """Signal the children whose time is over; kill those that were signalled `grace` seconds ago and go on."""
     now = time.monotonic()
     for child in children:
         if now >= child.deadline:
-            if child.told:
+            if child.signalled:
                 child.process.kill()
             else:
                 os.kill(child.process.pid, WALL_LIMIT_SIGNAL)
-            child.told, child.deadline = True, math.inf if child.told else now + GRACE
+            child.signalled, child.deadline = True, math.inf if child.signalled else now + grace
 
 
 @contextlib.contextmanager
-def _deaf() -> Iterator[None]:
-    """What is started meanwhile never hears of a terminal's Ctrl-C or end, which reach all of us; we do afterwards.
+def _signals_blocked() -> Iterator[None]:
+    """Children started in this context do not get SIGINT and SIGHUP; this process gets them when it ends.
 
-    Ignored by the child itself they would come while it still imports.
+    A terminal sends both to all its processes. A child that ignored them by itself would do so too late: they could
+    come while it still imports.
     """
     resource_tracker.ensure_running()  # its start would end the block
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGHUP})
@@ -107,7 +108,7 @@ def _received(child: _Child, reader: Any, wall_limit: float) -> Done[Any]:
         value, error, peak = None, "", 0.0
     child.process.join()
     reader.close()
-    timed_out = value is None and child.told
+    timed_out = value is None and child.signalled
     if timed_out:
         error = f"stopped after {wall_limit:g} s of wall time"
     elif value is None and not error:
@@ -115,11 +116,11 @@ def _received(child: _Child, reader: Any, wall_limit: float) -> Done[Any]:
     return Done(child.number, value, error, peak, timed_out)
 
 
-def _stop(processes: Sequence[Any]) -> None:
+def _stop(processes: Sequence[Any], grace: float) -> None:
     for process in processes:
         process.terminate()
     for process in processes:
-        process.join(GRACE)
+        process.join(grace)
         if process.is_alive():
             process.kill()
             process.join()
@@ -127,7 +128,7 @@ def _stop(processes: Sequence[Any]) -> None:
 
 def _child(writer: "Connection[Any, Any]", task: Callable[[], Any]) -> None:
     listen_to_parent()
-    with contextlib.suppress(KeyboardInterrupt, BrokenPipeError):  # nobody waits for the answer any more
+    with contextlib.suppress(KeyboardInterrupt, BrokenPipeError):  # the parent waits no more
         try:
             value, error = task(), ""
         except Exception as problem:

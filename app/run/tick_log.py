@@ -1,4 +1,4 @@
-"""The tick log: each change of a node's status, and each end that is like the one before, as one JSON line."""
+"""The tick log: a JSON line for each change of a node's status, and for each end, even if it is like the last one."""
 
 import json
 from collections.abc import Callable, Iterator
@@ -13,12 +13,12 @@ from regrasp.trees import in_tree_order, node_paths
 class TickLog(py_trees.visitors.VisitorBase):
     """Writes {"t": simulated s, "path": "root/carry/move", "status": "RUNNING"} for every status that a tick changed.
 
-    A node that ends again as it ended before, such as a guard that is asked at every tick, has a line for each end: a
-    reader can count what was done.
+    A node that ends again as it ended before, such as a guard that is ticked every time, has a line for each end: so
+    executions can be counted.
 
-    Add it to a `BehaviourTree` as a visitor. Lines of one tick stand in tree order. Status is taken when a node is
-    visited, and once more after the tick: a node that was stopped later in the tick (preempted, or its Parallel ended)
-    is not visited again and goes INVALID unseen. After `root.stop(...)` outside a tick call `finalise()`.
+    Add it to a `BehaviourTree` as a visitor. The lines of one tick are in tree order. A node's status is read when it
+    is visited, and again after the tick: a node that is stopped later in the tick (preempted, or its Parallel ended)
+    becomes INVALID without another visit. After `root.stop(...)` outside a tick call `finalise()`.
     """
 
     def __init__(self, root: py_trees.behaviour.Behaviour, stream: TextIO, now: Callable[[], float]) -> None:
@@ -35,7 +35,7 @@ class TickLog(py_trees.visitors.VisitorBase):
         self._visited.clear()
 
     def run(self, behaviour: py_trees.behaviour.Behaviour) -> None:
-        """At a node's visit: its status may be gone when the tick ends."""
+        """At a node's visit: note its status, which may have changed when the tick ends."""
         self._visited[id(behaviour)] = behaviour.status
 
     def finalise(self) -> None:
@@ -56,9 +56,9 @@ class TickLog(py_trees.visitors.VisitorBase):
 
 
 def note_leaf_at_work(tree: py_trees.trees.BehaviourTree, note: Callable[[str], None]) -> None:
-    """Have `note` called with the path of each leaf before each of its ticks, and with "" after each tick of the tree.
+    """Have `note` called with a leaf's path before each of its ticks, and with "" after each tick of the tree.
 
-    py_trees calls visitors after a node's tick: of one that never returns they hear nothing.
+    A visitor would not do: py_trees calls visitors after a node's tick, so never for a leaf that hangs.
     """
     paths = node_paths(tree.root)
     for node in in_tree_order(tree.root):
@@ -78,9 +78,9 @@ def _noting(
 
 
 def running_leaf(root: py_trees.behaviour.Behaviour) -> py_trees.behaviour.Behaviour | None:
-    """The deepest RUNNING node, None when the tree is at rest.
+    """The deepest RUNNING node; None if no node is RUNNING.
 
-    Of a Parallel's RUNNING children the last counts: monitors come first.
+    Of the RUNNING children of a Parallel it is the last one: monitors come first.
     """
     node, deepest = root if root.status is Status.RUNNING else None, None
     while node is not None:
@@ -90,6 +90,6 @@ def running_leaf(root: py_trees.behaviour.Behaviour) -> py_trees.behaviour.Behav
 
 
 def active_leaf(root: py_trees.behaviour.Behaviour) -> str:
-    """The own name of the `running_leaf`, '' when the tree is at rest."""
+    """The name, without namespaces, of the `running_leaf`; '' if there is none."""
     leaf = running_leaf(root)
     return "" if leaf is None else str(leaf.name.rsplit(".", 1)[-1])

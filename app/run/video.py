@@ -1,4 +1,4 @@
-"""A run as a film: overview, both cameras, and a few lines of text."""
+"""Video frames (overview, both cameras, a few lines of text), and their encoding as a film."""
 
 import contextlib
 import subprocess
@@ -12,24 +12,24 @@ import numpy as np
 from imageio_ffmpeg import get_ffmpeg_exe
 from numpy.typing import NDArray
 
-Frame = NDArray[np.uint8]
-# In pieces of a second that play without the end, should ffmpeg be killed; one whole film when it is closed.
+RgbImage = NDArray[np.uint8]
+# One file, in fragments of 1 s: if ffmpeg is killed, those that are written can still be played.
 _KEPT = ["-movflags", "+hybrid_fragmented", "-frag_duration", "1000000"]
 
 # Width and height are multiples of 16, as h264 has it. The cameras' 848x480 halved give the right column.
 SIZE = (1280, 544)
 OVERVIEW_SIZE = (856, 480)  # what an overview camera should render, to be shown without scaling
 _CAMERA_SIZE = (424, 240)
-_INK, PAPER = (235, 235, 235), 24
+_INK, PAPER = (235, 235, 235), 24  # of 255: light letters on a dark ground
 
 
-def compose(overview: Frame | None, rear: Frame | None, wrist: Frame | None, lines: Sequence[str]) -> Frame:
-    """One frame (544, 1280, 3) uint8 RGB: overview at the left, rear and wrist stacked at the right, text below.
+def compose(overview: RgbImage | None, rear: RgbImage | None, wrist: RgbImage | None, lines: Sequence[str]) -> RgbImage:
+    """One video frame (544, 1280, 3) uint8 RGB: overview on the left, rear and wrist on the right, text below.
 
-    Images are (H, W, 3) uint8 RGB of any size, scaled to fit; None leaves the place dark. Up to four lines, in two
-    columns; they stand on a dark band of their own.
+    Images are (H, W, 3) uint8 RGB of any size and are scaled to fit; None leaves the place dark. Up to four lines are
+    shown, in two columns.
     """
-    frame: Frame = np.full((SIZE[1], SIZE[0], 3), PAPER, np.uint8)
+    frame: RgbImage = np.full((SIZE[1], SIZE[0], 3), PAPER, np.uint8)
     _place(frame, overview, (0, 0), OVERVIEW_SIZE)
     for row, (label, image) in enumerate({"rear camera": rear, "wrist camera": wrist}.items()):
         left, top = OVERVIEW_SIZE[0], row * _CAMERA_SIZE[1]
@@ -41,7 +41,7 @@ def compose(overview: Frame | None, rear: Frame | None, wrist: Frame | None, lin
     return frame
 
 
-def _place(frame: Frame, image: Frame | None, corner: tuple[int, int], size: tuple[int, int]) -> None:
+def _place(frame: RgbImage, image: RgbImage | None, corner: tuple[int, int], size: tuple[int, int]) -> None:
     """Copy the image, scaled to fit and centred, into the box at `corner` (left, top) of `size` (width, height)."""
     if image is None:
         return
@@ -53,8 +53,8 @@ def _place(frame: Frame, image: Frame | None, corner: tuple[int, int], size: tup
     frame[top : top + height, left : left + width] = image
 
 
-def write_text(frame: Frame, text: str, origin: tuple[int, int], scale: float) -> None:
-    """Light letters on a dark plate, readable on anything; `origin` is the left end of the base line. ASCII only."""
+def write_text(frame: RgbImage, text: str, origin: tuple[int, int], scale: float) -> None:
+    """Write light letters on a dark rectangle; `origin` (x, y) px is the left end of the base line. ASCII only."""
     text = text.encode("ascii", "replace").decode()
     (width, height), below = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, scale, 1)
     left, base = origin
@@ -63,9 +63,9 @@ def write_text(frame: Frame, text: str, origin: tuple[int, int], scale: float) -
 
 
 class VideoWriter:
-    """An h264 film that any player takes, written by imageio_ffmpeg's own ffmpeg; a context manager.
+    """An H.264 film, encoded by imageio_ffmpeg's own ffmpeg; a context manager.
 
-    ffmpeg runs in a session of its own, so that Ctrl-C reaches only us and the film can still be closed properly.
+    ffmpeg runs in a session of its own: Ctrl-C does not reach it, and the film can still be closed properly.
     """
 
     def __init__(self, path: Path, fps: float, size: tuple[int, int] = SIZE) -> None:
@@ -85,7 +85,7 @@ class VideoWriter:
             start_new_session=True,
         )
 
-    def write(self, frame: Frame) -> None:
+    def write(self, frame: RgbImage) -> None:
         """Append a frame, (height, width, 3) uint8 RGB.
 
         Raises:
@@ -99,12 +99,12 @@ class VideoWriter:
             return
         try:
             self._ffmpeg.stdin.write(np.ascontiguousarray(frame).data)
-        except BaseException:  # half a frame may be through: another one behind it would be torn
+        except BaseException:  # half a frame may be written: the next one would be shifted
             self._broken = True
             raise
 
     def close(self) -> None:
-        """End the film and wait until it is whole; again does nothing.
+        """End the film and wait until it is written; a second call does nothing.
 
         Raises:
             OSError: ffmpeg could not write it.

@@ -1,36 +1,46 @@
-"""The shape in which a plugged cable comes to rest, without the physics engine."""
+"""The rest shape of a plugged cable, by energy minimisation, without the physics engine."""
+
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.spatial.transform import RigidTransform
 
+from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cell import Cable
 from regrasp.interfaces.scene import EARTH_GRAVITY, Gravity
 
-FloatArray = NDArray[np.float64]
-STRETCHING = 1e4  # stiffness of a link against stretching, in units of k / l^2: it then gives way by less than 0.1 mm
-MOST_ITERATIONS = 5000
+
+@dataclass(frozen=True)
+class RestShapeParameters:
+    """How the energy of a resting cable is stated and minimised."""
+
+    stretching: float = 1e4  # stiffness of a link against stretching, in k / l^2: it then gives way by less than 0.1 mm
+    max_iterations: int = 5000  # of L-BFGS-B; a bound only: it stops by itself at the minimum
 
 
 def rest_shape(
-    cable: Cable, world_from_connector: RigidTransform, connector_length: float, gravity: Gravity
+    cable: Cable,
+    world_from_connector: RigidTransform,
+    connector_length: float,
+    gravity: Gravity,
+    parameters: RestShapeParameters = RestShapeParameters(),
 ) -> FloatArray:
-    """Ends (n + 1, 3) m, in the world, of the links of a cable whose loose end is held by a connector at this pose.
+    """Ends (n + 1, 3) m, in the world, of the n links of a cable whose loose end a connector holds at this pose.
 
     The minimum of the energy of a discretised rod (Bergou et al. 2008, "Discrete Elastic Rods", without twist):
 
     .. math:: E = \\sum_i k_i |u_{i+1} - u_i|^2 / 2 + \\sum_i m g z_i + \\sum_i s (|d_i| - l)^2 / 2
 
     d are the links between their ends, u = d / l, k = EI / l is the bending stiffness (2 k at the clamp), m the mass of
-    a link, z the height of its middle, s the stiffness against stretching. Before the first link stands the clamp's
-    direction; the last link lies along the connector. Nothing but gravity touches the cable. A cable that is nearly as
-    long as its way has one such shape (within 3 mm of the simulated one); a slack one may rest elsewhere.
+    a link, z the height of its middle, s the stiffness against stretching. u_0 is the direction of the clamp; the last
+    link lies along the connector. Contacts are left out. If the distance of the ends is nearly the cable's length, this
+    shape is within 3 mm of the simulated one; a slack cable has several minima and may rest in another one.
     """
     n, link = cable.links, cable.length / cable.links
     weight = cable.mass_per_length * link * (0.0 if gravity == "zero" else EARTH_GRAVITY)
     bending = np.full((n, 1), (cable.stiffness.zero if gravity == "zero" else cable.stiffness.earth) / link)
-    stretching = STRETCHING * float(bending[0, 0]) / link**2
+    stretching = parameters.stretching * float(bending[0, 0]) / link**2
     bending[0] *= 2
     anchor = np.asarray(cable.anchor)
     clamp = np.asarray(cable.anchor_axis) / np.linalg.norm(cable.anchor_axis)
@@ -59,7 +69,7 @@ def rest_shape(
         guess[1:-1].ravel(),
         jac=True,
         method="L-BFGS-B",
-        options={"maxiter": MOST_ITERATIONS, "maxfun": 10 * MOST_ITERATIONS},
+        options={"maxiter": parameters.max_iterations, "maxfun": 10 * parameters.max_iterations},
     )
     return points_of(found.x)
 

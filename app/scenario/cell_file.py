@@ -1,34 +1,34 @@
-"""Cell files: what stands in a cell, read and checked."""
+"""Reads and checks cell files."""
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from regrasp.app.files.findings import Finding, Findings, attempt, nearest, shown
-from regrasp.app.files.overrides import Assignment, apply, lay_over
+from regrasp.app.files.findings import Finding, Findings, catch_findings, shown
+from regrasp.app.files.overrides import Assignment, apply_assignments, merge_into
 from regrasp.app.files.resources import read_text, resolve
 from regrasp.app.files.validation import validated
 from regrasp.app.files.yaml_lines import Document, Place, parse
-from regrasp.app.scenario.cell_layout import impossible
+from regrasp.app.scenario.cell_layout import layout_findings
 from regrasp.interfaces.cell import Cell
-from regrasp.interfaces.quote import MOST, cut, quoted
+from regrasp.interfaces.quote import MAX_QUOTE, cut, nearest, quoted
 
 
 def load_cell(path: Path, assignments: Sequence[Assignment] = (), where: Place | None = None) -> Cell:
-    """Read and check a cell file with values laid over it.
+    """Read and check a cell file, with the assignments applied.
 
-    A cell may name another as its `base`, whose values it takes where it gives none; that one names no base in turn.
-    Raises `Findings`, at `where` (the place that names the cell) when there is no such file.
+    A cell may name another as its `base` and give only what differs; the base itself has no base. Raises `Findings`;
+    if there is no such file, the finding stands at `where`, the place that names the cell.
     """
     document = parse(read_text(path, where), shown(path))
     if isinstance(document.value, dict) and "base" in document.value:
         document = _on_base(document, path.parent)
-    fits = isinstance(document.value, dict)  # else that alone is wrong, and not what is laid over it
-    _, found = attempt(apply, document, assignments if fits else ())
-    cell, wrong = attempt(validated, document, Cell)
+    fits = isinstance(document.value, dict)  # else only that is reported, not the assignments
+    _, found = catch_findings(apply_assignments, document, assignments if fits else ())
+    cell, wrong = catch_findings(validated, document, Cell)
     found += wrong
     if cell:
-        found += [*_misnamed(document, cell)] or impossible(document, cell)
+        found += [*_misnamed(document, cell)] or layout_findings(document, cell)
     if found or not cell:
         raise Findings(found)
     return cell
@@ -45,12 +45,12 @@ def _on_base(top: Document, folder: Path) -> Document:
         raise Findings(
             [Finding(*place, f"{quoted(shown(path))} has a base itself; name that one, and give here what it adds")]
         )
-    lay_over(document, top)
+    merge_into(document, top)
     return document
 
 
 def _misnamed(document: Document, cell: Cell) -> Iterator[Finding]:
-    """Names in a cell that do not go together."""
+    """Names in a cell that are missing, taken twice, or refer to nothing."""
     known = cell.known
     boxes = [*known.boxes, *known.clip.bracket]
     for name, count in Counter(box.name for box in boxes).items():
@@ -65,5 +65,5 @@ def _misnamed(document: Document, cell: Cell) -> Iterator[Finding]:
     groups = {"sockets": (sockets, sockets), "arms": (arms, ["left", "right"]), "cameras": (cameras, ["rear", "wrist"])}
     for key, (names, needed) in groups.items():
         if sorted(names) != sorted(set(needed)):
-            given, right = (cut(", ".join(group), 3 * MOST) for group in (names, sorted(set(needed))))
+            given, right = (cut(", ".join(group), 3 * MAX_QUOTE) for group in (names, sorted(set(needed))))
             yield Finding(*document.place(("known", key)), f"{key} are {given}; give one each of {right}")

@@ -1,6 +1,7 @@
-"""What in a cell cannot be: parts that stand in one another, joints past their limits, a cable that is too short."""
+"""Checks of a cell's layout: parts that overlap, joints past their limits, a cable that is too short."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import lru_cache
 from itertools import combinations
 from typing import NamedTuple
@@ -11,25 +12,30 @@ from scipy.spatial.transform import RigidTransform
 from regrasp.app.files.findings import Finding
 from regrasp.app.files.yaml_lines import Document, Path
 from regrasp.app.scenario.placement import (
-    FloatArray,
     arm_base,
-    asleep,
-    box_halves,
     cable_at_start,
     cable_error,
     cube_depths,
     fixed_cameras,
+    half_edges,
     line_depth,
-    penetration,
+    penetration_depth,
+    sleeping_arm_cubes,
     socket_block,
 )
+from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cell import PLUGGED_INTO, Cell, FixedMount, KnownCell
 from regrasp.interfaces.fault import JOINT_NAMES
 from regrasp.interfaces.quote import cut, quoted
 from regrasp.interfaces.scene import GRAVITIES
 
-MOST_OVERLAP = 0.005  # metres: the spheres that fill an arm stand out of it by less
-ENDS = 0.05  # metres of the cable at its sockets, which are built in
+
+@dataclass(frozen=True)
+class CellLayoutParameters:
+    """How deep the parts of a cell may reach into one another, metres."""
+
+    overlap: float = 0.005  # the spheres that fill an arm stand out of it by less
+    cable_ends: float = 0.05  # of the cable at both ends: they lie in their sockets
 
 
 class Part(NamedTuple):
@@ -41,17 +47,19 @@ class Part(NamedTuple):
     halves: FloatArray
 
 
-def impossible(document: Document, cell: Cell) -> list[Finding]:
-    """What is wrong with a cell although each of its values is right."""
+def layout_findings(
+    document: Document, cell: Cell, parameters: CellLayoutParameters = CellLayoutParameters()
+) -> list[Finding]:
+    """What is wrong with a cell although each of its values is right by itself."""
     known = cell.known
     found = [
         *_joints(document, known),
-        *_overlaps(document, known),
+        *_overlaps(document, known, parameters.overlap),
         *_cable(document, cell),
         *_clip(document, known),
         *_sight(document, known),
     ]
-    return found or [*_in_the_way(document, cell), *_plug(document, known)]  # which take a moment
+    return found or [*_in_the_way(document, cell, parameters), *_plug(document, known)]  # these take a moment
 
 
 def _joints(document: Document, known: KnownCell) -> Iterator[Finding]:
@@ -65,21 +73,21 @@ def _joints(document: Document, known: KnownCell) -> Iterator[Finding]:
                 yield Finding(*document.place(("known", "arms", i, "sleep", j)), told + inside)
 
 
-def _overlaps(document: Document, known: KnownCell) -> Iterator[Finding]:
+def _overlaps(document: Document, known: KnownCell, most: float) -> Iterator[Finding]:
     """Arms, cameras, the plugged and the stowed connector in other parts of the cell."""
     parts = [*_parts(known)]
     bases = [Part(("known", "arms", i), *arm_base(arm)) for i, arm in enumerate(known.arms)]
     for part in [*parts, *bases]:
         for name, depth in _inside(known, part, bases):
-            if depth > MOST_OVERLAP:
+            if depth > most:
                 message = f"{cut(part.name)} reaches {depth:.3f} m into {name}; move one of them"
                 yield Finding(*document.place(part.path), message)
-    if (depth := _between_the_arms(known)) > MOST_OVERLAP:
+    if (depth := _between_the_arms(known)) > most:
         message = f"the arms asleep reach {depth:.3f} m into each other; change their sleep or their bases"
         yield Finding(*document.place(("known", "arms")), message)
     for name, place in fixed_cameras(known):
         for part in [*parts, *bases]:
-            if penetration(part.halves, place - part.center) > 0:
+            if penetration_depth(part.halves, place - part.center) > 0:
                 yield Finding(
                     *document.place(part.path), f"the {name} camera is inside {cut(part.name)}; move one of them"
                 )
@@ -91,7 +99,7 @@ def _between_the_arms(known: KnownCell) -> float:
 
     moving = SPHERE_LINKS > 0
     radii = SPHERES[moving, 3]
-    bodies = [asleep(arm)[0][moving] for arm in known.arms]
+    bodies = [sleeping_arm_cubes(arm)[0][moving] for arm in known.arms]
     deepest = [
         float((radii[:, None] + radii[None] - np.linalg.norm(a[:, None] - b[None], axis=2)).max())
         for a, b in combinations(bodies, 2)
@@ -105,8 +113,8 @@ def _inside(known: KnownCell, part: Part, bases: list[Part]) -> Iterator[tuple[s
         if part.path == base.path:
             continue
         if part.path[1] != "arms" or part.path > base.path:  # a pair of bases once
-            yield base.name, penetration(np.vstack([part.halves, base.halves]), part.center - base.center)
-        centers, halves = asleep(arm)
+            yield base.name, penetration_depth(np.vstack([part.halves, base.halves]), part.center - base.center)
+        centers, halves = sleeping_arm_cubes(arm)
         yield f"the {arm.name} arm asleep", float(cube_depths(part.halves, part.center - centers, halves).max())
     length, radius = known.connector.length, known.connector.radius
     size = (length, radius * np.sqrt(2), radius * np.sqrt(2))  # the box inside the cylinder
@@ -121,31 +129,32 @@ def _inside(known: KnownCell, part: Part, bases: list[Part]) -> Iterator[tuple[s
     }
     for name, pose in poses.items():
         if part.path[: len(own[name])] != own[name]:
-            halves = box_halves(pose.rotation.as_matrix(), size)
-            yield name, penetration(np.vstack([part.halves, halves]), part.center - pose.translation)
+            halves = half_edges(pose.rotation.as_matrix(), size)
+            yield name, penetration_depth(np.vstack([part.halves, halves]), part.center - pose.translation)
 
 
 def _parts(known: KnownCell) -> Iterator[Part]:
     """Boxes, sockets and the clip's bracket."""
     for i, box in enumerate(known.boxes):
-        yield Part(("known", "boxes", i), box.name, np.array(box.center), box_halves(np.eye(3), box.size))
+        yield Part(("known", "boxes", i), box.name, np.array(box.center), half_edges(np.eye(3), box.size))
     for i, box in enumerate(known.clip.bracket):
-        yield Part(("known", "clip", "bracket", i), box.name, np.array(box.center), box_halves(np.eye(3), box.size))
+        yield Part(("known", "clip", "bracket", i), box.name, np.array(box.center), half_edges(np.eye(3), box.size))
     for i, socket in enumerate(known.sockets):
         yield Part(("known", "sockets", i), *socket_block(socket))
 
 
-def _in_the_way(document: Document, cell: Cell) -> Iterator[Finding]:
-    """Boxes through which the cable hangs at the start, in one gravity or the other, but at its ends."""
+def _in_the_way(document: Document, cell: Cell, parameters: CellLayoutParameters) -> Iterator[Finding]:
+    """Boxes through which the cable hangs at the start, in either gravity; its ends are left out."""
+    ends = parameters.cable_ends
     for part in _parts(cell.known):
         if part.path[1] == "sockets":
             continue
         for gravity in GRAVITIES:
             points = np.array(cable_at_start(cell, gravity))
-            points = points[(along := np.linspace(0.0, cell.hidden.cable.length, len(points))) > ENDS]
-            points = points[: -np.count_nonzero(along > cell.hidden.cable.length - ENDS)]
+            points = points[(along := np.linspace(0.0, cell.hidden.cable.length, len(points))) > ends]
+            points = points[: -np.count_nonzero(along > cell.hidden.cable.length - ends)]
             depth = line_depth(part.halves, part.center, points, cell.hidden.cable.radius) if len(points) > 1 else 0.0
-            if depth > max(MOST_OVERLAP, cable_error(cell, gravity)):
+            if depth > max(parameters.overlap, cable_error(cell, gravity)):
                 told = (
                     f"{cut(part.name)} reaches {depth:.3f} m into the cable at the start ({gravity} gravity); move it"
                 )
@@ -154,7 +163,7 @@ def _in_the_way(document: Document, cell: Cell) -> Iterator[Finding]:
 
 
 def _sight(document: Document, known: KnownCell) -> Iterator[Finding]:
-    """The rear camera, which watches the carrying, must see where it begins or ends."""
+    """The rear camera watches the carrying: it must see where this begins or where it ends."""
     camera = known.camera("rear")
     if not isinstance(camera.mount, FixedMount):
         return

@@ -1,6 +1,6 @@
-"""What was run, as files of a record: scenario, cell and tree as they were, with overrides applied.
+"""Copies of what was run, for the record: scenario and cell with overrides applied, and the tree.
 
-`regrasp run DIR/scenario.yaml` runs the same again, whatever became of the files since.
+`regrasp run DIR/scenario.yaml` runs the same again, even if the original files have changed.
 """
 
 from typing import Any
@@ -11,7 +11,7 @@ from regrasp.app.scenario.load import Scenario
 
 
 def copies(scenario: Scenario, seed: int) -> dict[str, str]:
-    """Name to text of scenario.yaml, which names the other two, cell.yaml and tree.xml."""
+    """The text by file name of scenario.yaml, cell.yaml and tree.xml; the first names the others."""
     values = scenario.file.model_dump(mode="json") | {"cell": "cell.yaml", "tree": "tree.xml", "seed": seed}
     return {
         "scenario.yaml": _yaml(values),

@@ -1,4 +1,4 @@
-"""Scenario files: which cell, which tree, what goes wrong, and what must come out."""
+"""Reads and checks scenario files with all their cases, their cells and their trees."""
 
 from collections.abc import Callable, Collection, Hashable, Iterable, Mapping, Sequence
 from copy import deepcopy
@@ -6,25 +6,25 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal, ParamSpec, TypeVar
 
-from regrasp.app.files.findings import Finding, Findings, attempt, nearest, shown
-from regrasp.app.files.overrides import Assignment, apply, path_of, read, was_typed
+from regrasp.app.files.findings import Finding, Findings, catch_findings, shown
+from regrasp.app.files.overrides import Assignment, apply_assignments, parse_overrides, path_of, was_typed
 from regrasp.app.files.resources import read_text, resolve
-from regrasp.app.files.schema_nodes import at
+from regrasp.app.files.schema_nodes import value_at
 from regrasp.app.files.validation import Error, read_as
 from regrasp.app.files.yaml_lines import Document, Place, parse
 from regrasp.app.files.yaml_lines import Path as KeyPath
 from regrasp.app.records.result import DEFAULT_CASE
 from regrasp.app.scenario import vary
 from regrasp.app.scenario.cell_file import load_cell
-from regrasp.app.scenario.placement import misplaced
-from regrasp.app.scenario.references import check_inputs, check_names, names_of, tree_text
+from regrasp.app.scenario.placement import check_obstacles
+from regrasp.app.scenario.references import check_names, check_tree_inputs, names_of, tree_text
 from regrasp.app.scenario.schema import ScenarioFile
 from regrasp.interfaces.cell import Cell
-from regrasp.interfaces.quote import MOST, cut, quoted
+from regrasp.interfaces.quote import MAX_QUOTE, cut, nearest, quoted
 
 P = ParamSpec("P")
 T = TypeVar("T")
-_REQUIRED = {  # right values, for a look at other keys alone
+_REQUIRED = {  # valid values, to check other keys by themselves
     name: field.examples[0]
     for name, field in ScenarioFile.model_fields.items()
     if field.is_required() and field.examples
@@ -33,7 +33,7 @@ _REQUIRED = {  # right values, for a look at other keys alone
 
 @dataclass(frozen=True)
 class Scenario:
-    """One case of a scenario, checked: the file with the case's values, and the cell and the tree that it names."""
+    """A checked case of a scenario: the file with the case's values, the cell, and the path of the tree file."""
 
     name: str
     path: Path
@@ -45,12 +45,12 @@ class Scenario:
 
     @property
     def title(self) -> str:
-        """Name and case, for a person."""
+        """Name and case, as messages show them."""
         return self.name if self.case == DEFAULT_CASE else f"{self.name} {self.case}"
 
     @property
     def lit_cell(self) -> Cell:
-        """The cell in the scenario's light."""
+        """The cell with the scenario's light."""
         spec, hidden = self.file.light, self.cell.hidden
         given = spec.model_dump(include={"direction", "ambient", "diffuse"}, exclude_none=True)
         light = hidden.light.model_copy(update=given)
@@ -60,12 +60,12 @@ class Scenario:
 
     @property
     def inputs(self) -> dict[str, str]:
-        """The tree's inputs as a tree file would state them."""
+        """The tree's inputs as texts, in the form of a tree file."""
         return {key: tree_text(value) for key, value in self.file.inputs.items()}
 
 
 def load_scenario(name_or_path: str, overrides: Sequence[str] = (), case: str | None = None) -> Scenario:
-    """Read and check one case of a scenario, its cell and its tree; the case of the first values if none is named.
+    """Read and check one case of a scenario, its cell and its tree; without `case` the one of the first values.
 
     `overrides` are "key.path=value" with YAML values; those that start with "cell." change the cell. Raises `Findings`
     with all that is wrong in any of the three files.
@@ -90,7 +90,7 @@ def cases(name_or_path: str, overrides: Sequence[str] = ()) -> list[Scenario]:
 
 
 def case_names(name_or_path: str, overrides: Sequence[str] = ()) -> list[str]:
-    """The names of a scenario's cases, without a check of the rest. Raises `Findings`."""
+    """The names of a scenario's cases; the rest is not checked. Raises `Findings`."""
     source = _Source(name_or_path, overrides)
     if source.found:
         raise Findings(source.found)
@@ -98,18 +98,18 @@ def case_names(name_or_path: str, overrides: Sequence[str] = ()) -> list[str]:
 
 
 class _Source:
-    """A scenario's file, its cases, and what was found wrong so far.
+    """A scenario's file, its cases, and the findings so far.
 
-    The file must be right also without its `vary`, but for keys that only `vary` gives. What cases share (a cell, a
-    tree, where the obstacles stand) is read and checked once.
+    The file must be valid without its `vary`, too, except for keys that only `vary` gives. What cases share (a cell, a
+    tree, the obstacles' places) is read and checked once.
     """
 
     def __init__(self, name_or_path: str, overrides: Sequence[str]) -> None:
-        self.found: dict[Finding, dict[str, None]] = {}  # with the cases that show it, '' for the file itself
+        self.found: dict[Finding, dict[str, None]] = {}  # with the cases that have it, '' for the file itself
         self._wrong: list[KeyPath] = []  # where the file itself is wrong
         self._done: dict[Hashable, tuple[Any, list[Finding]]] = {}
         self.overrides = tuple(overrides)
-        assignments, wrong = read(overrides)
+        assignments, wrong = parse_overrides(overrides)
         self.note(wrong)
         try:
             self.path = resolve("scenario", name_or_path, Path())
@@ -121,7 +121,7 @@ class _Source:
         self.note(error.finding for error in errors if error.is_misspelt)
         of_vary = [a for a in assignments if f"{a.key}.".startswith("vary.")]
         self._fixed = [a for a in assignments if a not in of_vary]
-        self.note(attempt(apply, self._document, of_vary)[1])
+        self.note(catch_findings(apply_assignments, self._document, of_vary)[1])
         axes, wrong = vary.axes(self._document, self._fixed)
         self.note(wrong)
         self.cases = list(vary.expand(axes))
@@ -130,12 +130,12 @@ class _Source:
             self._document.value.pop("vary", None)
 
     def note(self, findings: Iterable[Finding], case: str = "") -> None:
-        """Add what a case shows, or the file itself."""
+        """Add findings of a case, or of the file itself."""
         for finding in findings:
             self.found.setdefault(finding, {})[case] = None
 
     def checked(self, chosen: Sequence[tuple[str, list[Assignment]]]) -> list[Scenario]:
-        """The scenarios of these cases. Raises `Findings`; one that only some of them show names the first."""
+        """The scenarios of these cases. Raises `Findings`; one that only some cases have names the first of them."""
         self._scenario("", [a for a in self._fixed if not any(_holds(k, a.path) for k in self._varied)])
         wrong, made = self._wrong, []
         for name, given in chosen:
@@ -146,34 +146,39 @@ class _Source:
         return [scenario for scenario in made if scenario]
 
     def _once(self, case: str, make: Callable[..., T], key: Hashable, *args: Any) -> T | None:
-        """What `make` returns, and for the case its findings; called for the first case with this key only."""
+        """What `make` returns; its findings are noted for the case. It is called once for each key."""
         if (make, key) not in self._done:
-            self._done[make, key] = attempt(make, *args)
+            self._done[make, key] = catch_findings(make, *args)
         done: T | None
         done, findings = self._done[make, key]
         self.note(findings, case)
         return done
 
     def _scenario(self, case: str, assignments: Sequence[Assignment]) -> Scenario | None:
-        """The file with values laid over it; None where it is wrong."""
+        """The scenario with the assignments applied; None if something is wrong."""
         given = self._document
         document = Document(deepcopy(given.value), dict(given.places), unread=set(given.unread))
         of_cell = [replace(a, key=a.key[5:]) for a in assignments if a.key.startswith("cell.")]
-        self.note(attempt(apply, document, [a for a in assignments if not a.key.startswith("cell.")])[1], case)
+        self.note(
+            catch_findings(apply_assignments, document, [a for a in assignments if not a.key.startswith("cell.")])[1],
+            case,
+        )
         file = self._read(case, document, {a.path[0] for a in assignments})
         cell, tree = self._cell_and_tree(case, document, of_cell)
-        inputs, obstacles, faults = (repr(at(document.value, (key,))) for key in ("inputs", "obstacles", "faults"))
-        self._once(case, check_inputs, (tree, inputs, id(cell)), document, tree, cell)
+        inputs, obstacles, faults = (
+            repr(value_at(document.value, (key,))) for key in ("inputs", "obstacles", "faults")
+        )
+        self._once(case, check_tree_inputs, (tree, inputs, id(cell)), document, tree, cell)
         self._once(case, check_names, (tree, obstacles, faults), document, tree)
-        gravity = repr(at(document.value, ("gravity",)))
-        self._once(case, misplaced, (obstacles, gravity, id(cell)), document, cell)
+        gravity = repr(value_at(document.value, ("gravity",)))
+        self._once(case, check_obstacles, (obstacles, gravity, id(cell)), document, cell)
         if not (file and cell and tree):
             return None
         name = self.path.name.removesuffix(".yaml").removesuffix(".scenario")
         return Scenario(name, self.path, file, cell, tree, self.overrides, case)
 
     def _read(self, case: str, document: Document, changed: Collection[str | int]) -> ScenarioFile | None:
-        """The file by itself. Of one that is wrong already the cases look again only at what they change."""
+        """Validate the file by itself. If it is wrong without its cases, they check only the keys that they change."""
         if self._wrong and isinstance(document.value, dict):
             value = _REQUIRED | {key: value for key, value in document.value.items() if key in changed}
             document = replace(document, value=value)
@@ -187,12 +192,14 @@ class _Source:
     def _cell_and_tree(
         self, case: str, document: Document, of_cell: Sequence[Assignment]
     ) -> tuple[Cell | None, Path | None]:
-        """The cell with these values, and the tree's file; None for what cannot be read."""
+        """The cell with these assignments, and the tree's path; None for what is invalid."""
         folder = self.path.parent
         cell_at, tree_at = (document.place((key,)) for key in ("cell", "tree"))
         laid = repr([(a.key, a.new.value, a.place) for a in of_cell])
-        cell = self._once(case, _cell, (repr(at(document.value, ("cell",))), cell_at, laid), document, folder, of_cell)
-        name = repr(at(document.value, ("tree",)))
+        cell = self._once(
+            case, _cell, (repr(value_at(document.value, ("cell",))), cell_at, laid), document, folder, of_cell
+        )
+        name = repr(value_at(document.value, ("tree",)))
         tree = self._once(case, _named, (name, tree_at), document, "tree", folder)
         if tree:
             self._once(case, check_tree_file, (tree, tree_at, id(cell)), tree, tree_at, names_of(cell))
@@ -204,31 +211,31 @@ class _Source:
         return error.finding
 
     def _is_for_cases(self, case: str, error: Error) -> bool:
-        """Whether the cases say more of it: of a key that stands in `vary` alone, of values that `vary` changes."""
+        """Whether the error is left to the cases: the key stands only in `vary`, or `vary` changes the values."""
         if error.is_missing and len(error.path) == 1:
             return error.path in self._varied
         return error.is_of_several and case == "" and any(_holds(error.path, key) for key in self._varied)
 
 
 def _holds(outer: KeyPath, inner: KeyPath) -> bool:
-    """Whether one path is the other, or leads to it."""
+    """Whether `outer` is the path `inner` or the beginning of it."""
     return inner[: len(outer)] == outer
 
 
 def _of_cases(finding: Finding, cases: Sequence[str], of: int) -> Finding:
-    """The finding with the first of the cases that show it, if not all do."""
+    """The finding; if not all cases have it, the message names the first that does."""
     if "" in cases or len(cases) == of:
         return finding
     more = f" and {len(cases) - 1} more" if cases[1:] else ""
-    return replace(finding, message=f"{finding.message} (case {cut(cases[0], 3 * MOST)}{more})")
+    return replace(finding, message=f"{finding.message} (case {cut(cases[0], 3 * MAX_QUOTE)}{more})")
 
 
 def _named(document: Document, key: Literal["cell", "tree"], folder: Path) -> Path | None:
-    """The file that the scenario names under `key`; None when the check of the scenario has found no name there.
+    """The file that the scenario names under `key`; None if there is no name, which is a finding elsewhere.
 
-    A path is taken from `folder`, the scenario's, but one of the command line from the current folder.
+    A relative path starts at `folder`, the scenario's; one from the command line starts at the current folder.
     """
-    name, place = at(document.value, (key,)), document.place((key,))
+    name, place = value_at(document.value, (key,)), document.place((key,))
     if not isinstance(name, str):
         return None
     return resolve(key, name, Path() if was_typed(place) else folder, place)
@@ -240,9 +247,9 @@ def _cell(document: Document, folder: Path, assignments: Sequence[Assignment]) -
 
 
 def check_tree_file(path: Path, where: Place | None = None, names: Mapping[str, Collection[str]] | None = None) -> None:
-    """Raises `Findings` for all that is wrong in a tree file; at `where`, which names it, when there is none.
+    """Raises `Findings` for all that is wrong in a tree file; if there is no file, at `where`, which names it.
 
-    `names` are those that the cell has, by kind; without them the tree's are not checked.
+    `names` are the names in the cell, by kind; without them the tree's references to the cell are not checked.
     """
     read_text(path, where)
     from regrasp.trees import check_tree  # the leaves bring the planner and the compiler with them: seconds
@@ -253,6 +260,6 @@ def check_tree_file(path: Path, where: Place | None = None, names: Mapping[str, 
 
 
 def description(path: Path) -> str:
-    """The sentence that a scenario file gives of itself, without a check of the rest."""
+    """The `description` of a scenario file; the rest is not checked."""
     value = parse(read_text(path), shown(path)).value
     return str(value.get("description", "")) if isinstance(value, dict) else ""

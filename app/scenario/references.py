@@ -1,4 +1,4 @@
-"""What the parts of a scenario must be to one another, its cell and its tree, as far as each part is right alone."""
+"""Checks of references between a scenario, its cell and its tree: inputs, obstacles and nodes that must exist."""
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -6,26 +6,26 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
-from regrasp.app.files.findings import Finding, Findings, nearest
-from regrasp.app.files.schema_nodes import at
-from regrasp.app.files.validation import part
+from regrasp.app.files.findings import Finding, Findings
+from regrasp.app.files.schema_nodes import value_at
+from regrasp.app.files.validation import validated_part
 from regrasp.app.files.yaml_lines import Document
 from regrasp.app.scenario.schema import TreeInput
 from regrasp.interfaces.cell import PLUGGED_INTO, Cell
-from regrasp.interfaces.quote import cut, quoted
+from regrasp.interfaces.quote import cut, nearest, quoted
 
 _INPUT = TypeAdapter[TreeInput](TreeInput)
 
 
 def tree_text(value: TreeInput) -> str:
-    """An input's value as a tree file would state it."""
+    """An input's value in the form of a tree file."""
     return str(value).lower() if isinstance(value, bool) else str(value)
 
 
 def names_of(cell: Cell | None) -> dict[str, dict[str, str]]:
-    """What a tree may name of the cell, by kind, each with why it cannot work there, "" if it can (`trees.check_tree`).
+    """The names in the cell that a tree may refer to, by kind, for `trees.check_tree`.
 
-    Without a cell, what it may name in any.
+    Each has the reason why it cannot be used in this cell, or "". Without a cell: the names that every cell has.
     """
     from regrasp.perception.pose.technique import TECHNIQUES  # late: it brings the compiler with it
 
@@ -40,44 +40,42 @@ def names_of(cell: Cell | None) -> dict[str, dict[str, str]]:
     return {"socket": {PLUGGED_INTO: ""} | sockets, "technique": techniques}
 
 
-def check_inputs(document: Document, tree: Path | None, cell: Cell | None) -> None:
-    """Raises `Findings` for inputs that the tree does not take, or not with these values."""
-    from regrasp.trees import (
-        check_inputs as of_tree,  # the leaves bring the planner and the compiler with them: seconds
-    )
+def check_tree_inputs(document: Document, tree: Path | None, cell: Cell | None) -> None:
+    """Raises `Findings` for inputs that the tree does not have, and for values that it does not take."""
+    from regrasp.trees import check_inputs  # late: the leaves bring the planner and the compiler with them: seconds
 
-    written = at(document.value, ("inputs",))
+    written = value_at(document.value, ("inputs",))
     if tree is None or not isinstance(written, dict):
         return
-    values = {key: part(document, ("inputs", key), _INPUT) for key in written}
+    values = {key: validated_part(document, ("inputs", key), _INPUT) for key in written}
     given = {key: tree_text(value) for key, value in values.items() if value is not None}
     if found := [
         Finding(*document.place(("inputs", key)), f"inputs.{cut(key)}: {message}")
-        for key, message in of_tree(tree, given, names=names_of(cell))
+        for key, message in check_inputs(tree, given, names=names_of(cell))
     ]:
         raise Findings(found)
 
 
 def check_names(document: Document, tree: Path | None) -> None:
-    """Raises `Findings` for obstacles and nodes of the tree that faults name and that are not there."""
+    """Raises `Findings` if faults name obstacles, or nodes of the tree, that do not exist."""
     if found := [*_obstacles(document), *_nodes(document, tree)]:
         raise Findings(found)
 
 
 def _faults(document: Document) -> Iterator[tuple[int, Mapping[str, Any]]]:
-    """Number and keys of each fault that has any."""
-    written = at(document.value, ("faults",))
+    """Index and keys of each fault that is a mapping."""
+    written = value_at(document.value, ("faults",))
     for i, fault in enumerate(written if isinstance(written, list) else []):
         if isinstance(fault, dict):
             yield i, fault
 
 
 def _obstacles(document: Document) -> Iterator[Finding]:
-    written = at(document.value, ("obstacles",))
+    written = value_at(document.value, ("obstacles",))
     obstacles = written if isinstance(written, list) else []
-    names = [name for i in range(len(obstacles)) if isinstance(name := at(obstacles, (i, "name")), str)]
+    names = [name for i in range(len(obstacles)) if isinstance(name := value_at(obstacles, (i, "name")), str)]
     if len(names) < len(obstacles) or (written is not None and not isinstance(written, list)):
-        return  # nobody knows what the others are called
+        return  # some names cannot be read: any name may be right
     for i, fault in _faults(document):
         name = fault.get("obstacle")
         if fault.get("type") == "obstacle_moves_in" and isinstance(name, str) and name not in names:
@@ -87,7 +85,7 @@ def _obstacles(document: Document) -> Iterator[Finding]:
 
 def _nodes(document: Document, tree: Path | None) -> Iterator[Finding]:
     for i, _ in _faults(document):
-        name = at(document.value, ("faults", i, "when", "node"))
+        name = value_at(document.value, ("faults", i, "when", "node"))
         if tree and isinstance(name, str) and (names := _node_names(tree)) and name not in names:
             alike = [other for other in names if ("/" in other) == ("/" in name)]
             message = f"no node {quoted(name)} in {tree.name}; {nearest(name, alike)}"
@@ -95,7 +93,7 @@ def _nodes(document: Document, tree: Path | None) -> Iterator[Finding]:
 
 
 def _node_names(tree: Path) -> set[str]:
-    """Every way to name a node of the tree: its path, and the last names of it; none where the file is no tree."""
+    """Every way to name a node of the tree: its path, or the end of it; none if the file is no valid tree."""
     from regrasp.trees import TreeSyntaxError, read_graph
 
     try:

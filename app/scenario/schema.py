@@ -1,4 +1,4 @@
-"""What a scenario file may say, as pydantic models: each field with its meaning, its unit and an example."""
+"""Scenario files as pydantic models: each field with its meaning, its unit and an example."""
 
 from typing import Annotated, Any, get_args
 
@@ -9,7 +9,7 @@ from regrasp.interfaces.cell import Color, Direction, Fraction, Model, Vector
 from regrasp.interfaces.fault import AnyFault
 from regrasp.interfaces.scene import Gravity
 
-MOST_SEED = 2**31 - 1
+MAX_SEED = 2**31 - 1
 FaultSpec = Annotated[AnyFault, Field(discriminator="type")]
 FAULT_TYPES: dict[str, type] = {get_args(f.model_fields["type"].annotation)[0]: f for f in get_args(AnyFault)}
 Edge = Annotated[float, Field(ge=1e-3, le=3)]  # metres
@@ -139,9 +139,7 @@ class ScenarioFile(Model):
         ),
     ] = Field(default_factory=dict)
     gravity: Annotated[Gravity, Field(description="None, or Earth's.", examples=["zero"])]
-    seed: Annotated[
-        int, Field(ge=0, le=MOST_SEED, description="Draws every error, noise and jitter.", examples=[7])
-    ] = 0
+    seed: Annotated[int, Field(ge=0, le=MAX_SEED, description="Draws every error, noise and jitter.", examples=[7])] = 0
     obstacles: Annotated[
         tuple[ObstacleSpec, ...],
         Field(

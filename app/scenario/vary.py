@@ -1,4 +1,4 @@
-"""A scenario's `vary`: from lists and ranges to named cases."""
+"""Expands a scenario's `vary`, lists and ranges of values, into named cases."""
 
 import json
 import math
@@ -17,31 +17,31 @@ from regrasp.app.records.result import DEFAULT_CASE
 from regrasp.app.scenario.schema import Steps, Vary
 from regrasp.interfaces.quote import cut
 
-MOST_CASES = 10_000
+MAX_CASES = 10_000
 
 
 class _Varied(BaseModel):
-    """Of a scenario file only what varies."""
+    """The part of a scenario file that varies."""
 
     vary: Vary = {}
 
 
 @dataclass(frozen=True)
 class Axis:
-    """One key that varies, and its values, which know where they stand."""
+    """A key that varies, and its values with their places in the file."""
 
     key: str
     values: Sequence[Document]
 
     def assignment(self, value: Document) -> Assignment:
-        """One of the values for the key."""
+        """The assignment of one of the values."""
         return Assignment(self.key, value, value.place(()), f"vary: {cut(self.key)}: ")
 
 
 def axes(document: Document, overrides: Sequence[Assignment]) -> tuple[list[Axis], list[Finding]]:
-    """What varies, in the file's order, as far as it is right; and what is wrong with the rest.
+    """The valid axes, in the file's order, and the findings of the others.
 
-    A key that `overrides` set varies no more: it keeps that one value. One inside a value that they set is gone.
+    A key that `overrides` set varies no more: it keeps that value. A key inside a value that they set is dropped.
     """
     written = keys(document)
     _, errors = read_as(document, _Varied)
@@ -55,24 +55,27 @@ def axes(document: Document, overrides: Sequence[Assignment]) -> tuple[list[Axis
             found.append(Axis(key, _values(document, key, spec)))
         elif fixed[-1].key == key:
             found.append(Axis(key, [fixed[-1].new]))
-    own = [error.finding for error in errors if error.path]  # a file that is no mapping at all is told elsewhere
+    own = [error.finding for error in errors if error.path]  # that a file is no mapping is a finding elsewhere
     return found, [*own, *_problems(found, document.place(("vary",)))]
 
 
 def keys(document: Document) -> dict[str, Value]:
-    """What stands in `vary`, right or wrong, by key."""
+    """The content of `vary` by key, valid or not."""
     vary = document.value.get("vary") if isinstance(document.value, dict) else None
     return vary if isinstance(vary, dict) else {}
 
 
 def count(axes: Sequence[Axis]) -> int:
-    """How many cases there are."""
+    """The number of cases."""
     return math.prod(len(axis.values) for axis in axes)
 
 
 def expand(axes: Sequence[Axis]) -> Iterator[tuple[str, list[Assignment]]]:
-    """Name and assignments of every case, the last key varying fastest; of too many only those with one key changed."""
-    chosen = product(*(axis.values for axis in axes)) if count(axes) <= MOST_CASES else _one_by_one(axes)
+    """Name and assignments of every case; the last key varies fastest.
+
+    If there are more than `MAX_CASES`, only some that change a single key: enough to find what is wrong with values.
+    """
+    chosen = product(*(axis.values for axis in axes)) if count(axes) <= MAX_CASES else _one_by_one(axes)
     for values in chosen:
         given = list(zip(axes, values, strict=True))
         name = ",".join(f"{axis.key}={_text(value.value)}" for axis, value in given)
@@ -87,16 +90,16 @@ def _values(document: Document, key: str, spec: Sequence[Value] | str | Steps) -
 
 
 def _numbers(spec: str | Steps) -> Sequence[int] | Sequence[float]:
-    """The numbers of a range; of one that is too long as many as make too many cases, the last among them."""
+    """The numbers of a range; of a range that is too long only the first `MAX_CASES` and the last."""
     if isinstance(spec, str):
         whole = range(*map(int, spec.split(":")))
-        return whole if len(whole) <= MOST_CASES else [*whole[:MOST_CASES], whole[-1]]
+        return whole if len(whole) <= MAX_CASES else [*whole[:MAX_CASES], whole[-1]]
     numbers = [float(f"{v:.12g}") for v in np.linspace(spec.first, spec.last, spec.steps)]
     return [int(v) for v in numbers] if all(v.is_integer() for v in numbers) else numbers
 
 
 def _one_by_one(axes: Sequence[Axis]) -> Iterator[Sequence[Document]]:
-    """The first values, and those with one other in the place of each: of a long list some from both ends."""
+    """The first values, then those in which a single key has another value: of a long list some from both ends."""
     first = [axis.values[0] for axis in axes]
     yield first
     for i, axis in enumerate(axes):
@@ -105,9 +108,9 @@ def _one_by_one(axes: Sequence[Axis]) -> Iterator[Sequence[Document]]:
 
 
 def _problems(axes: Sequence[Axis], place: Place) -> Iterator[Finding]:
-    """Too many cases, or a value twice."""
-    if count(axes) > MOST_CASES:
-        yield Finding(*place, f"vary makes more than {MOST_CASES} cases; shorten a list or a range")
+    """Findings of too many cases, and of values that stand twice."""
+    if count(axes) > MAX_CASES:
+        yield Finding(*place, f"vary makes more than {MAX_CASES} cases; shorten a list or a range")
     for axis in axes:
         seen: set[str] = set()
         for value in axis.values:

@@ -10,7 +10,7 @@ from pathlib import Path
 from regrasp.app.files.whole_file import write_whole
 from regrasp.app.records.folders import folder_name
 from regrasp.app.records.result import plain, versions
-from regrasp.app.run.batch import Episode, Row, Run, Settings, run_all
+from regrasp.app.run.batch import Row, Run, RunEpisode, Settings, run_all
 from regrasp.app.scenario.load import Scenario, cases
 from regrasp.app.studies.statistics import wilson_interval
 from regrasp.app.studies.table import print_table
@@ -24,7 +24,7 @@ def run_demo(
     out: Path | None,
     overrides: Sequence[str] = (),
     settings: Settings = Settings(),  # noqa: B008 - it does not change
-    episode: Episode | None = None,
+    episode: RunEpisode | None = None,
 ) -> int:
     """Run every case of three scenarios with every seed, each run in its own process.
 

@@ -87,7 +87,7 @@ MISTAKES = [
         ("tree: tree.xml", "tree: gone.xml", "'gone.xml' does not exist; name a file"),
         ("gravity: zero", "gravity: mars", "gravity: no 'mars'; there are earth, zero"),
         ("seed: 3", "seed: -3", "seed is -3; expected a whole number"),
-        ("  tries: 4", "  trys: 4", "inputs.trys: unknown input 'trys'; did you mean tries?"),
+        ("  tries: 4", "  trys: 4", "inputs.trys: unknown input 'trys'; did you mean 'tries'?"),
         (
             "  tries: 4",
             "  tries: four",

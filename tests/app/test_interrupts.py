@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from regrasp.app.interrupts import BURST
+from regrasp.app.interrupts import StopRequests
 from regrasp.app.records.explain import explanation
 from regrasp.app.records.reader import read_record
 from regrasp.app.records.record import AT_WORK, Record, leaf_at_work
@@ -41,7 +41,7 @@ def start(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Started]:
 
     def started(leaf: str, *options: str) -> "subprocess.Popen[str]":
         write(tmp_path, leaf)
-        command = [sys.executable, str(ROOT / "tests/app/hanging.py"), "run", "mine.yaml", "--out", "run", *options]
+        command = [sys.executable, str(ROOT / "tests/support/hanging.py"), "run", "mine.yaml", "--out", "run", *options]
         environment = {**os.environ, "PYTHONPATH": str(ROOT)}
         pipe = subprocess.PIPE
         process = subprocess.Popen(
@@ -96,7 +96,7 @@ def test_a_second_ctrl_c_ends_a_leaf_that_hangs_in_its_first_tick_and_names_it(s
     process = start("Hangs")
     until(at_work, process)
     process.send_signal(signal.SIGINT)
-    time.sleep(BURST + 0.2)
+    time.sleep(StopRequests().burst + 0.2)
     process.send_signal(signal.SIGINT)
     out, _ = process.communicate(timeout=PATIENCE)
     assert process.returncode == 130
@@ -153,7 +153,7 @@ def test_a_run_whose_parent_is_killed_ends_with_its_record(start: Started, optio
 
 def test_a_run_stopped_before_it_began_has_no_record_and_says_so(start: Started, tmp_path: Path) -> None:
     write(tmp_path, "Goes")
-    command = [sys.executable, str(ROOT / "tests/app/hanging.py"), "run", "mine.yaml", "--wall-limit", "1"]
+    command = [sys.executable, str(ROOT / "tests/support/hanging.py"), "run", "mine.yaml", "--wall-limit", "1"]
     ran = subprocess.run(command, capture_output=True, text=True, env={**os.environ, "PYTHONPATH": str(ROOT)})
     assert ran.returncode == 1
     if "before the run began" in ran.stderr:  # a very quick machine may come further in a second
@@ -175,9 +175,8 @@ def answer() -> int:
     return 7
 
 
-def test_a_task_that_takes_too_long_is_stopped_and_the_others_go_on(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("regrasp.app.run.processes.GRACE", 0.5)
-    with closing(run_each([hang, answer, hang_deaf], 3, wall_limit=20.0)) as ended:
+def test_a_task_that_takes_too_long_is_stopped_and_the_others_go_on() -> None:
+    with closing(run_each([hang, answer, hang_deaf], 3, wall_limit=20.0, grace=0.5)) as ended:
         done = sorted(ended)
     assert [(one.value, one.timed_out) for one in done] == [(None, True), (7, False), (None, True)]
     assert {one.error for one in done} == {"stopped after 20 s of wall time", ""}

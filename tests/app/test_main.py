@@ -83,8 +83,8 @@ def test_what_is_only_written_at_the_end_finds_no_reader_either(no_reader: IO[st
 
 def test_a_run_that_nobody_watches_ends_as_by_ctrl_c(monkeypatch: pytest.MonkeyPatch, no_reader: IO[str]) -> None:
     monkeypatch.setattr("sys.stderr", no_reader)
-    with shown_progress(quiet=False) as show, pytest.raises(KeyboardInterrupt):
-        show.tick(0.0, "carry")
+    with shown_progress(quiet=False) as observers, pytest.raises(KeyboardInterrupt):
+        observers.tick(0.0, "carry")
 
 
 def test_an_encoding_without_a_sign_shows_a_question_mark() -> None:
@@ -97,6 +97,6 @@ def test_a_technique_that_no_cell_has_is_a_finding_without_a_cell(tmp_path: Path
     leaf = '<UseTechnique name="look" technique="fuzed"/>'
     tree = f'<root main_tree_to_execute="m"><BehaviorTree ID="m">{leaf}</BehaviorTree></root>'
     (tmp_path / "tree.xml").write_text(tree)
-    assert "technique='fuzed' is unknown; did you mean fused?" in shell("regrasp trees check tree.xml").stderr
+    assert "technique='fuzed' is unknown; did you mean 'fused'?" in shell("regrasp trees check tree.xml").stderr
     (tmp_path / "tree.xml").write_text(tree.replace("fuzed", "fiducial"))
     assert shell("regrasp trees check tree.xml").returncode == 0

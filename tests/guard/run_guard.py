@@ -23,7 +23,9 @@ from typing import Any
 
 import numpy as np
 
-from regrasp.app.run import episode
+from regrasp.app.run.compose import Episode
+from regrasp.app.run.episode import run_episode
+from regrasp.app.run.observers import Observers
 from regrasp.app.run.processes import run_each
 from regrasp.app.scenario.load import load_scenario
 
@@ -37,7 +39,7 @@ TICKS = 20  # between two digests that are kept: a second, to tell where runs pa
 class StateTrace:
     """The digest of all states so far, kept every so many ticks."""
 
-    def __init__(self, made: episode.Episode) -> None:
+    def __init__(self, made: Episode) -> None:
         self._made, self._digest = made, hashlib.sha256()
         self._ticks = 0
         self.kept: list[str] = []
@@ -71,19 +73,15 @@ class StateTrace:
 def digests(scenario: str, gravity: str, seed: int) -> dict[str, Any]:
     """What the run comes to."""
     traces: list[StateTrace] = []
-    assemble = episode._assemble
 
-    def watched(*args: Any) -> episode.Episode:
-        made = assemble(*args)
+    def watch(made: Episode) -> None:
         traces.append(StateTrace(made))
         made.tree.add_post_tick_handler(lambda _tree: traces[0].note())
-        return made
 
-    episode._assemble = watched  # type: ignore[assignment]
     loaded = load_scenario(scenario, [f"vary.gravity=[{gravity}]", f"seed={seed}"])
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "run"
-        episode.run_episode(loaded, out, seed=seed)
+        run_episode(loaded, out, seed=seed, observers=Observers(assembled=watch))
         result = json.loads((out / "result.json").read_text(encoding="utf-8"))
         texts = {name: (out / name).read_bytes() for name in ("ticks.jsonl", "events.jsonl")}
     texts["result.json"] = json.dumps({k: v for k, v in result.items() if k not in OF_THE_CLOCK}).encode()

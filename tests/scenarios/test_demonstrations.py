@@ -12,6 +12,7 @@ import pytest
 from regrasp.app.records.folders import FILES
 from regrasp.app.records.result import Result
 from regrasp.app.run.episode import run_episode
+from regrasp.app.run.observers import Observers
 from regrasp.app.scenario.load import load_scenario
 from regrasp.sim.world import World
 
@@ -145,7 +146,7 @@ class WatchedWorld(World):
 def test_an_interrupt_in_the_middle_of_a_motion_leaves_the_arms_at_rest_0_3_s_later(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, state: str
 ) -> None:
-    monkeypatch.setattr("regrasp.app.run.episode.World", WatchedWorld)
+    monkeypatch.setattr("regrasp.app.run.compose.World", WatchedWorld)
     stopped: list[float] = []
 
     def progress(now: float, leaf: str) -> None:
@@ -153,7 +154,7 @@ def test_an_interrupt_in_the_middle_of_a_motion_leaves_the_arms_at_rest_0_3_s_la
             stopped.append(now)
             raise KeyboardInterrupt
 
-    result = run_episode(load_scenario("no_obstacle"), tmp_path / "run", seed=0, progress=progress)
+    result = run_episode(load_scenario("no_obstacle"), tmp_path / "run", seed=0, observers=Observers(tick=progress))
     assert result.outcome == "interrupted"
     [at] = stopped
     assert result.sim_seconds == pytest.approx(at + 0.3)

@@ -44,8 +44,8 @@ CASES = {
         3,
         "memory='yes' is unknown; there are false, true",
     ),
-    "unknown attribute of a control node": ('memory="true"', 'memory="true" memry="1"', 3, "did you mean memory?"),
-    "unknown port": ("angle=", "angel=", 16, "unknown attribute of Look 'angel'; did you mean angle?"),
+    "unknown attribute of a control node": ('memory="true"', 'memory="true" memry="1"', 3, "did you mean 'memory'?"),
+    "unknown port": ("angle=", "angel=", 16, "unknown attribute of Look 'angel'; did you mean 'angle'?"),
     "missing port": ('ticks="99"', "", 6, "does not state ticks"),
     "port of another type": ('ticks="99"', 'ticks="9.5"', 6, "ticks='9.5' is no int"),
     "port not finite": ('angle="0.25"', 'angle="nan"', 16, "angle='nan' is not finite"),
@@ -67,8 +67,8 @@ CASES = {
         "num_failures={tries} is '0' here, which is not above 0; write more than 0",
     ),
     "decorator argument not constant": ('num_failures="{tries}"', 'num_failures="{place}"', 13, "must be a constant"),
-    "unknown leaf": ("<Go ", "<Goo ", 9, "unknown element 'Goo'; did you mean Go?"),
-    "tag in the wrong case": ("<Go ", "<go ", 9, "unknown element 'go'; did you mean Go?"),
+    "unknown leaf": ("<Go ", "<Goo ", 9, "unknown element 'Goo'; did you mean 'Go'?"),
+    "tag in the wrong case": ("<Go ", "<go ", 9, "unknown element 'go'; did you mean 'Go'?"),
     "wall clock": ("Inverter", "Timeout", 15, "unknown element 'Timeout'"),
     "missing name": ('name="go" ', "", 9, "Go has no name; give it one of letters"),
     "dotted name": ('name="go"', 'name="go.on"', 9, "Go has the name 'go.on'"),
@@ -77,11 +77,11 @@ CASES = {
         '"success_on_one"',
         '"success_on_any"',
         5,
-        "'success_on_any' is unknown; did you mean success_on_one?",
+        "'success_on_any' is unknown; did you mean 'success_on_one'?",
     ),
     "policy that cannot be built": ("success_on_one", "success_on_selected", 5, "'success_on_selected' is unknown"),
-    "missing subtree": ('ID="Search" name', 'ID="Serch" name', 4, "unknown subtree 'Serch'; did you mean Search?"),
-    "unknown main tree": ('execute="Main"', 'execute="Man"', 1, "unknown main tree 'Man'; did you mean Main?"),
+    "missing subtree": ('ID="Search" name', 'ID="Serch" name', 4, "unknown subtree 'Serch'; did you mean 'Search'?"),
+    "unknown main tree": ('execute="Main"', 'execute="Man"', 1, "unknown main tree 'Man'; did you mean 'Main'?"),
     "no main tree": (' main_tree_to_execute="Main"', "", 1, "root does not state main_tree_to_execute; write"),
     "subtree that includes itself": (
         '<Look name="look"',
@@ -283,7 +283,7 @@ def test_a_leaf_states_what_its_ports_hold(tmp_path: Path, through_a_subtree: bo
 
     assert findings("0.1", "back_2", names) == ""
     assert findings("0.1", "back_3", None) == ""
-    assert "is unknown; did you mean back_" in findings("0.1", "back_3", names)
+    assert "is unknown; did you mean 'back_" in findings("0.1", "back_3", names)
     assert "is not above 0; write more than 0" in findings("0", "back_1", names)
     assert "is not above 0; write more than 0" in findings("-1e300", "back_1", names)
     assert "is not finite; write a number such as 0.5" in findings("inf", "back_1", names)

@@ -25,7 +25,7 @@ TREE = """\
     [
         ({}, []),
         ({"times": "5"}, []),
-        ({"tims": "5"}, ["tims: unknown input 'tims'; did you mean times?"]),
+        ({"tims": "5"}, ["tims: unknown input 'tims'; did you mean 'times'?"]),
         ({"deep": "5"}, ["deep: unknown input 'deep'; there are times"]),
         ({"ID": "Below"}, ["ID: unknown input 'ID'; there are times"]),
         (

@@ -44,5 +44,5 @@ def test_a_wrong_tree_is_refused_with_every_finding_at_file_and_line(tmp_path: P
     with pytest.raises(TreeError) as caught:
         load_tree(path, LEAVES)
     assert f"{path}:6: " in str(caught.value)
-    assert f"{path}:9: unknown element 'Goo'; did you mean Go?" in str(caught.value)
+    assert f"{path}:9: unknown element 'Goo'; did you mean 'Go'?" in str(caught.value)
     assert len(caught.value.findings) == 2

@@ -12,7 +12,7 @@ from py_trees.behaviours import Failure, Running, Success
 from py_trees.common import Status
 from random_trees import LEAVES, Dice, trees
 
-from regrasp.app.records.history import told_by_ticks
+from regrasp.app.records.history import attempts_from_ticks
 from regrasp.app.run.attempts import Attempts
 from regrasp.app.run.tick_log import TickLog
 from regrasp.trees import Execution, TreeError, executions, load_tree, run_stats
@@ -54,7 +54,7 @@ def test_the_ticks_of_any_tree_tell_its_attempts_and_one_count_of_visits(text: s
         attempts, lines = ticked(root, 30)
     except LookupError:  # a key that was never written
         return
-    told = told_by_ticks(executions(lines), [])
+    told = attempts_from_ticks(executions(lines), [])
     leaves = {attempt.path for attempt in told}
     assert told == attempts.made
     visits = {path: stats.visits for path, stats in run_stats(lines).items() if path in leaves}
@@ -69,13 +69,13 @@ def test_each_round_of_a_loop_is_an_attempt_and_a_guard_s_ticks_are_one() -> Non
     body = py_trees.composites.Sequence("try", memory=True, children=[Success("held"), Failure("grasp")])
     attempts, lines = ticked(py_trees.decorators.Retry("root", body, 3), 9)
     assert [(a.path, a.times) for a in attempts.made] == [("root/try/held", 1), ("root/try/grasp", 1)] * 3
-    assert told_by_ticks(executions(lines), []) == attempts.made
+    assert attempts_from_ticks(executions(lines), []) == attempts.made
     assert run_stats(lines)["root/try"].text == "3 visits, 3 failed"
 
     guarded = py_trees.composites.Sequence("root", memory=False, children=[Success("guard"), Running("move")])
     attempts, lines = ticked(guarded, 3)
     assert [(a.path, a.times) for a in attempts.made] == [("root/guard", 3), ("root/move", 1)]
-    assert told_by_ticks(executions(lines), []) == attempts.made
+    assert attempts_from_ticks(executions(lines), []) == attempts.made
 
 
 def test_what_runs_when_the_log_ends_has_run_until_its_last_line() -> None:

@@ -135,7 +135,7 @@ def test_leaves_do_only_what_the_real_ones_can(scripted_tree: Make) -> None:
 
 def test_stand_ins_have_the_ports_of_the_real_leaves(scripted_tree: Make, good: Path) -> None:
     good.write_text(GOOD.replace("angle=", "angel="))
-    with pytest.raises(TreeError, match="did you mean angle"):
+    with pytest.raises(TreeError, match="did you mean 'angle'"):
         scripted_tree(good, leaves=LEAVES)
 
 

@@ -29,7 +29,7 @@ def test_a_shipped_tree_is_clean_loads_and_is_shown_in_full(path: Path) -> None:
 WRONG = {
     "a period of no time": ('period="0.1"', 'period="-1"', "period='-1' is not above 0; write more than 0"),
     "no time for the search": ('time_limit="300.0"', 'time_limit="0"', "time_limit='0' is not above 0"),
-    "no such socket": ('"plugged_into"', '"back_44"', "is 'back_44' here, which is unknown; did you mean back_4?"),
+    "no such socket": ('"plugged_into"', '"back_44"', "is 'back_44' here, which is unknown; did you mean 'back_4'?"),
     "an empty socket": (
         '"plugged_into"',
         '"back_3"',

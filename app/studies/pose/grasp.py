@@ -7,17 +7,16 @@ import structlog
 from py_trees.common import Status
 from scipy.spatial.transform import RigidTransform
 
+from regrasp.app.run.compose import build_services
 from regrasp.app.studies.pose.scenes import StudyScene
 from regrasp.behaviors.cable.hand import HANDLING_ARM
 from regrasp.behaviors.cable.regrasp import Regrasp
 from regrasp.behaviors.common.start_up import StartUp
 from regrasp.behaviors.leaf import Leaf
 from regrasp.behaviors.services import Services
+from regrasp.interfaces.devices import TICK
 from regrasp.motion.failure import PlanningError
-from regrasp.motion.service import Motion
-from regrasp.perception.service import Perception
 
-TICK = 0.05  # simulated seconds
 FRESH = 0.2  # s until the camera shows the scene as it is: its first picture is older than the foam piece's place
 
 
@@ -33,12 +32,8 @@ class GraspParameters:
 def services_of(scene: StudyScene) -> Services:
     """A robot in the scene, which has looked at nothing yet; its cameras show the scene as it is."""
     scene.world.advance(FRESH)
-    world, known = scene.world, scene.world.cell.known
-    grippers = {name: arm.gripper for name, arm in world.arms.items()}
-    motion = Motion(known, world.arms, grippers, world, scene.seed * 1000)
-    perception = Perception(known, world.cameras, world, motion.camera_pose, motion.spheres)
     silent = structlog.make_filtering_bound_logger(logging.CRITICAL)
-    return Services(known, world, motion, perception, structlog.wrap_logger(None, wrapper_class=silent))
+    return build_services(scene.world, scene.seed, structlog.wrap_logger(None, wrapper_class=silent))
 
 
 def grasp(

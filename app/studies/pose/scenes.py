@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from regrasp.app.files.findings import Findings
-from regrasp.app.files.overrides import read
+from regrasp.app.files.overrides import parse_overrides
 from regrasp.app.files.resources import resolve
 from regrasp.app.scenario.cell_file import load_cell
 from regrasp.interfaces.cell import Box, Cell, FixedMount
@@ -88,7 +88,7 @@ def study_cell(name: str = "thesis", overrides: Sequence[str] = (), cable_stiffn
     Raises:
         Findings: no such cell, or something wrong in it or in the overrides.
     """
-    assignments, wrong = read([f"hidden.cable.stiffness.zero={cable_stiffness}", *overrides])
+    assignments, wrong = parse_overrides([f"hidden.cable.stiffness.zero={cable_stiffness}", *overrides])
     if wrong:
         raise Findings(wrong)
     return load_cell(resolve("cell", name, Path()), assignments)

@@ -1,4 +1,4 @@
-"""The robot's belief as plain values for the record."""
+"""The robot's belief as plain values, for the record."""
 
 from scipy.spatial.transform import RigidTransform
 
@@ -8,16 +8,14 @@ from regrasp.perception.pose.estimate import Estimate
 
 
 def belief_state(services: Services) -> BeliefState:
-    """What the robot knows now, by its own eyes and joints; lengths rounded to 0.1 mm."""
+    """What the robot knows now from its cameras and joint readings; lengths are rounded to 0.1 mm."""
     belief, last = services.belief, services.perception.track.last
     return BeliefState(
         held=_pose(belief.held),
         connector=_pose(belief.connector),
         sure=belief.sure,
         found_by=belief.found_by,
-        last_seen=None
-        if last is None
-        else Sighting(round(last.stamp, 3), last.camera, tuple(last.position.round(4).tolist())),
+        last_seen=None if last is None else _sighting(last),
         arms={name: _arm(services, name) for name in services.motion.arms},
         occupied_voxels=len(services.perception.occupancy.occupied_points()),
         vain_searches=belief.vain_searches,

@@ -1,4 +1,4 @@
-"""What a scenario of the cable task may expect, as pydantic models."""
+"""The expectations of a cable scenario as pydantic models."""
 
 from typing import Annotated, Literal, Self
 

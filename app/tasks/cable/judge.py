@@ -1,60 +1,67 @@
-"""Whether a run came out as its scenario expects, by ground truth."""
+"""The judge of the cable task: whether a run came out as its scenario expects, by ground truth."""
 
 from collections import deque
 from collections.abc import Iterator
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from regrasp.app.records.result import Expectation, Slip
 from regrasp.app.tasks.cable.expectations import Expect
 from regrasp.behaviors.services import Belief
+from regrasp.interfaces.arrays import FloatArray
 from regrasp.sim.cable.phase import LOST_SECONDS, STILL_SECONDS, STILL_SPEED
 from regrasp.sim.ground_truth import GroundTruth
 
-HOLD_SECONDS = 0.5  # of both pads' touch: a hand that closes beside its middle may touch it and push it away
-SLIDE = 0.003  # m in the jaw ...
-SLIDE_SECONDS = 0.5  # ... within so long: a squeezed end crept so for a second before it sprang out
+
+@dataclass(frozen=True)
+class JudgeParameters:
+    """When the judge says that the connector is held, and that it slides in the jaw."""
+
+    hold_seconds: float = 0.5  # with both pads in touch: a hand that closes beside its middle may push it away again
+    slide_distance: float = 0.003  # m in the jaw ...
+    slide_seconds: float = 0.5  # ... within this time: a squeezed connector crept so for 1 s before it sprang out
 
 
 class GripWatch:
-    """Whether the end slides in the jaw that holds it."""
+    """Watches whether the connector slides in the jaw that holds it."""
 
-    def __init__(self) -> None:
-        self._offsets: deque[tuple[float, NDArray[np.float64]]] = deque()
-        self.slid_at: float | None = None  # since when it slides; None while it sits fast
+    def __init__(self, parameters: JudgeParameters = JudgeParameters()) -> None:
+        self._parameters = parameters
+        self._offsets: deque[tuple[float, FloatArray]] = deque()
+        self.sliding_since: float | None = None  # since which second it slides; None while it does not
 
-    def feed(self, now: float, offset: NDArray[np.float64]) -> None:
-        """Take the end's place (3,) m in the hand at second `now`."""
+    def update(self, now: float, offset: FloatArray) -> None:
+        """Take the connector's position (3,) m in the hand's frame at second `now`."""
         self._offsets.append((now, offset))
-        while self._offsets[0][0] < now - SLIDE_SECONDS:
+        while self._offsets[0][0] < now - self._parameters.slide_seconds:
             self._offsets.popleft()
-        if float(np.linalg.norm(offset - self._offsets[0][1])) < SLIDE:
-            self.slid_at = None
-        elif self.slid_at is None:
-            self.slid_at = now
+        if float(np.linalg.norm(offset - self._offsets[0][1])) < self._parameters.slide_distance:
+            self.sliding_since = None
+        elif self.sliding_since is None:
+            self.sliding_since = now
 
 
 class Judge:
-    """Watches the truth at every tick and holds it against a scenario's expectations at the end."""
+    """Watches the ground truth at every tick; at the end it compares with the scenario's expectations."""
 
-    def __init__(self, truth: GroundTruth, expect: Expect) -> None:
-        self._truth, self._expect = truth, expect
+    def __init__(self, truth: GroundTruth, expect: Expect, parameters: JudgeParameters = JudgeParameters()) -> None:
+        self._truth, self._expect, self._parameters = truth, expect, parameters
         self._now = 0.0
         self._was_held = False
         self._held_since: float | None = None  # since when both pads touch it
-        self._grip = GripWatch()
-        self._unheld_at: float | None = None  # since when not both pads touch it, or it slid before that
-        self._untouched_at: float | None = None  # since when none does
+        self._grip = GripWatch(parameters)
+        self._unheld_at: float | None = None  # since when both pads touch it no more, or when it began to slide before
+        self._untouched_at: float | None = None  # since when no pad touches it
         self._still_since: float | None = None
-        self.takes = 0  # times that the hand took hold of it
-        self.losses: list[float] = []
-        self.settled_pixels: int | None = None  # of the connector in the rear image once it had settled after a loss
+        self.grasps = 0  # how often the hand has grasped it
+        self.losses: list[float] = []  # seconds
+        self.settled_pixels: int | None = None  # of the connector in the rear image when it had settled after a loss
         self.found_by: str | None = None  # the camera that found the connector first after its loss
 
     def observe(self, now: float, belief: Belief) -> None:
-        """Look at the truth after a tick at second `now`."""
+        """Update with the ground truth after a tick at second `now`."""
         self._now = now
         self.found_by = self.found_by or belief.found_by
         if self._truth.held():
@@ -63,29 +70,29 @@ class Judge:
         self._held_since = None
         if self._was_held and not self._truth.stowed():
             if self._unheld_at is None:
-                self._unheld_at = now if self._grip.slid_at is None else self._grip.slid_at
+                self._unheld_at = now if self._grip.sliding_since is None else self._grip.sliding_since
             if self._truth.touched():
                 self._untouched_at = None
             else:
                 self._untouched_at = now if self._untouched_at is None else self._untouched_at
                 if now - self._untouched_at >= LOST_SECONDS:
                     self.losses.append(self._unheld_at)
-                    self._was_held, self._grip = False, GripWatch()
+                    self._was_held, self._grip = False, GripWatch(self._parameters)
         if self.losses and not self._was_held and self.settled_pixels is None:
             self._watch_settling(now)
 
     def _watch_hold(self, now: float) -> None:
         self._held_since = now if self._held_since is None else self._held_since
-        self._grip.feed(now, self._truth.connector_in_hand())
+        self._grip.update(now, self._truth.connector_in_hand())
         self._unheld_at = self._untouched_at = self._still_since = None
-        if not self._was_held and now - self._held_since >= HOLD_SECONDS:
-            self.takes += 1
+        if not self._was_held and now - self._held_since >= self._parameters.hold_seconds:
+            self.grasps += 1
             self._was_held = True
 
     def slips(self, belief: Belief) -> tuple[Slip, ...]:
-        """Each real loss with the first notice that came after it and before the next.
+        """Each real loss, with the first notice after it and before the next one.
 
-        A loss begins when the end slides in the jaw: a robot that sees this may notice it before the last pad lets go.
+        A loss begins when the connector slides in the jaw: the robot may notice this before the last pad lets go.
         """
         slips = []
         for released, end in pairwise([*self.losses, float("inf")]):
@@ -94,7 +101,7 @@ class Judge:
         return tuple(slips)
 
     def expectations(self, outcome: str, cause: str | None, belief: Belief) -> tuple[Expectation, ...]:
-        """Every expectation of the scenario, met or not."""
+        """Every expectation of the scenario, met or not, given how the run ended and what the robot believes."""
         wanted = self._expect
         ended = "lost" if outcome == "stowed" and not self._truth.stowed() else outcome
         found = [Expectation("outcome", ended == wanted.outcome, ended, wanted.outcome)]
@@ -110,10 +117,10 @@ class Judge:
         return (*found, *self._limits(belief))
 
     def _limits(self, belief: Belief) -> Iterator[Expectation]:
-        """What must not be more than the scenario says."""
+        """The expectations that are upper limits."""
         wanted = self._expect
         yield from _at_most("sim_seconds", self._now, wanted.sim_seconds)
-        yield from _at_most("tries", self.takes, wanted.tries)
+        yield from _at_most("tries", self.grasps, wanted.tries)
         yield from _at_most("detection_delay", self._longest_delay(belief), wanted.detection_delay)
         peak = max(self._truth.contact_peaks().values(), default=0.0)
         yield from _at_most("unintended_force", peak, wanted.unintended_force)
@@ -123,7 +130,7 @@ class Judge:
             yield from _at_most("pose_error.angle_deg", angle_deg, wanted.pose_error.angle_deg)
 
     def _longest_delay(self, belief: Belief) -> float | None:
-        """Seconds from a loss to its notice, the longest; 0 without a loss, None when one went unseen."""
+        """The longest time (s) from a loss to its notice; 0 without a loss, None if one was not noticed."""
         delays = [None if s.detected_at is None else s.detected_at - s.released_at for s in self.slips(belief)]
         known = [delay for delay in delays if delay is not None]
         return max(known, default=0.0) if len(known) == len(delays) else None

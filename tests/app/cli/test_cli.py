@@ -18,6 +18,7 @@ from regrasp.app.files.resources import shipped
 from regrasp.app.records.folders import new_folder
 from regrasp.app.records.result import Expectation, Result, Slip
 from regrasp.app.run.batch import Settings
+from regrasp.app.run.observers import Observers
 from regrasp.interfaces.cause import Cause, CauseCode
 
 Episode = Callable[..., Result]
@@ -53,10 +54,10 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> list[SimpleNamespace]:
     """What `run_episode` was called with; it ticks five simulated seconds and succeeds."""
     made: list[SimpleNamespace] = []
 
-    def episode(scenario: Any, out: Path, progress: Callable[[float, str], None], **rest: Any) -> Result:
+    def episode(scenario: Any, out: Path, observers: Observers, **rest: Any) -> Result:
         made.append(SimpleNamespace(scenario=scenario, out=out, **rest))
         for tick in range(100):
-            progress(tick / 20, "carry" if tick < 60 else "look")
+            observers.tick(tick / 20, "carry" if tick < 60 else "look")
         return result()
 
     use_episode(monkeypatch, episode)
@@ -73,8 +74,8 @@ def test_run_ends_with_a_summary_on_stdout_and_progress_on_stderr(calls: list[Si
     assert ran.exit_code == 0
     assert ran.stdout.splitlines() == [
         "mine, seed 7: stowed, 2 of 2 expectations met",
-        "  ✓ slips: 1 (asked: at least 1 noticed, none unseen)",
-        "  ✓ unintended_force: 1.23 (asked: at most 5)",
+        "  ✓ slips: 1 (expected: at least 1, all noticed)",
+        "  ✓ unintended_force: 1.23 (expected: at most 5)",
         "  slip    lost at 12.00 s, noticed at 12.25 s by gap",
         "  record  runs/mine-7-1",
         "  time    80.0 s simulated in 100.0 s, real-time factor 0.80, renderer moderngl",
@@ -99,20 +100,20 @@ def test_what_was_not_met_exits_1_with_the_cause(monkeypatch: pytest.MonkeyPatch
     ran = invoke("run", "mine.yaml")
     assert ran.exit_code == 1
     assert "  cause   search_exhausted: 18 stops, nothing seen (root/search)" in ran.stdout
-    assert "  ✗ slips: 0 (asked: at least 1 noticed, none unseen)" in ran.stdout
+    assert "  ✗ slips: 0 (expected: at least 1, all noticed)" in ran.stdout
 
 
 def test_ctrl_c_reaches_the_episode_between_two_ticks(monkeypatch: pytest.MonkeyPatch) -> None:
     ticks: list[str] = []
 
-    def episode(*_: Any, progress: Callable[[float, str], None], **__: Any) -> Result:
+    def episode(*_: Any, observers: Observers, **__: Any) -> Result:
         try:
             for tick in range(9):
                 ticks.append(f"{tick} begins")
                 if tick == 3:
                     os.kill(os.getpid(), signal.SIGINT)
                 ticks.append(f"{tick} ends")
-                progress(tick / 20, "carry")
+                observers.tick(tick / 20, "carry")
         except KeyboardInterrupt:
             return result(outcome="interrupted", succeeded=False)
         raise AssertionError("not interrupted")
@@ -331,9 +332,9 @@ def test_a_dry_run_says_what_would_run_and_runs_nothing(calls: list[SimpleNamesp
 
 
 def test_events_are_shown_from_a_level_on(monkeypatch: pytest.MonkeyPatch) -> None:
-    def episode(*_: Any, on_event: Callable[[dict[str, Any]], None], **__: Any) -> Result:
-        on_event({"t": 1.0, "level": "info", "event": "grasped", "node": "root/unplug", "gap": 0.02})
-        on_event({"t": 2.0, "level": "warning", "event": "slipped"})
+    def episode(*_: Any, observers: Observers, **__: Any) -> Result:
+        observers.event({"t": 1.0, "level": "info", "event": "grasped", "node": "root/unplug", "gap": 0.02})
+        observers.event({"t": 2.0, "level": "warning", "event": "slipped"})
         return result()
 
     use_episode(monkeypatch, episode)

@@ -64,7 +64,7 @@ def test_every_case_leaves_a_line_a_record_and_a_testcase(
     assert lines[0] == ["case", "as", "expected", "outcome", "simulated", "s", "seconds"]
     assert lines[1] == ["seed=0", "yes", "stowed", "80.0", "12.5"]
     assert lines[3] == ["seed=2", "no", "internal_error", "0.0", "0.0"]
-    assert "seed=1: search_exhausted: 18 stops; slips is 0, asked at least 1 noticed, none unseen" in out.splitlines()
+    assert "seed=1: search_exhausted: 18 stops; slips is 0, expected at least 1, all noticed" in out.splitlines()
     assert out.splitlines()[-1] == "mine: 1 of 4 cases as expected; records in out"
     assert "[4/4]" in err
     assert sorted(p.name for p in Path("out").iterdir()) == ["seed=0", "seed=1", "seed=3"]
@@ -84,7 +84,7 @@ def test_every_case_leaves_a_line_a_record_and_a_testcase(
     assert suite[0][0].text == "out/seed=0"
     assert suite[1][0].attrib == {
         "type": "search_exhausted",
-        "message": "search_exhausted: 18 stops; slips is 0, asked at least 1 noticed, none unseen",
+        "message": "search_exhausted: 18 stops; slips is 0, expected at least 1, all noticed",
     }
     page = suite[1][0].text or ""
     assert page == CliRunner().invoke(app, ["explain", "out/seed=1"]).stdout

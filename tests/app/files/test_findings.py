@@ -4,7 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from regrasp.app.files.findings import Finding, Findings, nearest, shown
+from regrasp.app.files.findings import Finding, Findings, shown
+from regrasp.interfaces.quote import nearest
 
 
 def test_findings_are_kept_once_and_in_the_order_of_the_file() -> None:

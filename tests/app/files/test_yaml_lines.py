@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from regrasp.app.files.findings import Findings
-from regrasp.app.files.yaml_lines import MAX_DEPTH, parse
+from regrasp.app.files.yaml_lines import MAX_NESTING, parse
 
 
 def findings(text: str) -> str:
@@ -59,7 +59,7 @@ def test_a_merge_key_yields_to_own_keys_and_to_earlier_mappings() -> None:
         ("a: &a [*a]", "f.yaml:1: aliases expand to more than"),
         ("a: &a {<<: *a}", "f.yaml:1: aliases expand to more than"),
         ("a: {<<: 3}", "f.yaml:1: '<<' takes a mapping"),
-        ("[" * 1000, f"nests deeper than {MAX_DEPTH} levels"),
+        ("[" * 1000, f"nests deeper than {MAX_NESTING} levels"),
     ],
 )
 def test_what_yaml_lets_pass_is_a_finding(text: str, expected: str) -> None:

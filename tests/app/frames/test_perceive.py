@@ -22,7 +22,7 @@ from regrasp.app.files.findings import Findings
 from regrasp.app.frames.camera_pose_file import write_camera_pose
 from regrasp.app.frames.image_files import read_depth
 from regrasp.app.frames.snapshot import write_frame
-from regrasp.app.run.episode import build_world
+from regrasp.app.run.compose import build_world
 from regrasp.app.scenario.load import load_scenario
 from regrasp.perception.pose.technique import TECHNIQUES
 from regrasp.sim.ground_truth import GroundTruth

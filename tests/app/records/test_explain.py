@@ -7,7 +7,7 @@ from typer.testing import CliRunner
 
 from regrasp.app.cli.commands import app
 from regrasp.app.records.explain import explanation
-from regrasp.app.records.history import Course
+from regrasp.app.records.history import NodeHistory
 from regrasp.app.records.reader import Event, read_record
 from regrasp.app.records.result import Attempt, Link
 from regrasp.app.records.timeline import timeline
@@ -63,8 +63,8 @@ def test_the_page_of_a_run_that_stopped_safely(tmp_path: Path) -> None:
         "  noticed a loss at 1.50 s by gap",
         "",
         "What was expected",
-        "  ✗ outcome: safe_stop (asked: stowed)",
-        "  ✓ slips: 1 (asked: at least 1 noticed, none unseen)",
+        "  ✗ outcome: safe_stop (expected: stowed)",
+        "  ✓ slips: 1 (expected: at least 1, all noticed)",
     ]
 
 
@@ -139,8 +139,8 @@ def attempts(*lines: tuple[str, float, float, str]) -> list[Attempt]:
     return [Attempt(path, start, end, status) for path, start, end, status in lines]  # type: ignore[arg-type]
 
 
-def ticks(*lines: tuple[float, str, str]) -> Course:
-    return Course(executions(lines))
+def ticks(*lines: tuple[float, str, str]) -> NodeHistory:
+    return NodeHistory(executions(lines))
 
 
 def test_rounds_that_went_alike_are_folded() -> None:
@@ -192,7 +192,7 @@ def test_many_events_of_an_attempt_are_counted() -> None:
     events = [Event(1.0, "look", "a/b", {"n": i}) for i in range(20)]
     told = [*timeline(attempts(("a/b", 0.0, 2.0, "SUCCESS")), events, ticks(), 100)]
     assert len(told) == 8
-    assert told[-1].strip() == "and 14 events more"
+    assert told[-1].strip() == "and 14 more events"
 
 
 def test_explain_prints_the_page_or_json(tmp_path: Path) -> None:

@@ -142,7 +142,7 @@ def test_of_two_runs_that_take_a_folder_at_once_the_second_is_told(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
-        "regrasp.app.records.record.folders.findings", lambda _folder: []
+        "regrasp.app.records.record.folders.run_folder_findings", lambda _folder: []
     )  # as both saw it before either began
     first = Record(tmp_path / "run", "s", 1)
     with pytest.raises(Findings, match=r"run: holds a run already \(events.jsonl, ticks.jsonl\); name another folder"):

@@ -37,7 +37,7 @@ GRASP = "root/mission/tries/one/try/grasp"
 
 
 def test_every_node_has_its_status_at_every_tick(replay: Replay) -> None:
-    assert [frame.t for frame in replay.frames] == [0.0, 0.5, 1.0, 1.5]
+    assert [change.t for change in replay.changes] == [0.0, 0.5, 1.0, 1.5]
     assert [replay.status(GRASP, i) for i in range(4)] == ["RUNNING", "FAILURE", "FAILURE", "INVALID"]
     assert [replay.status("root/never", i) for i in range(4)] == ["INVALID"] * 3 + ["FAILURE"]
     assert [row.path for row in replay.rows][:4] == [
@@ -75,8 +75,8 @@ def test_in_a_pipe_it_prints_lines(folder: Path) -> None:
 
 def test_the_screen_ends_where_it_is_told(folder: Path) -> None:
     record = read_record(folder)
-    assert [frame.t for frame in Replay(record, 1.0).frames] == [0.0, 0.5, 1.0]
-    assert [frame.t for frame in Replay(record, 0.2).frames] == [0.0]
+    assert [change.t for change in Replay(record, 1.0).changes] == [0.0, 0.5, 1.0]
+    assert [change.t for change in Replay(record, 0.2).changes] == [0.0]
 
 
 WRONG = {
@@ -99,7 +99,7 @@ def test_an_end_like_the_one_before_is_no_change(folder: Path) -> None:
     lines = [f'{{"t": {t}, "path": "root", "status": "{s}"}}\n' for t, s in ((0.0, "SUCCESS"), (1.0, "SUCCESS"))]
     (folder / "ticks.jsonl").write_text("".join(lines))
     (folder / "events.jsonl").write_text("")
-    assert [frame.t for frame in Replay(read_record(folder)).frames] == [0.0]
+    assert [change.t for change in Replay(read_record(folder)).changes] == [0.0]
 
 
 def press(replay: Replay, view: View, *keys: str) -> View | None:
@@ -278,5 +278,5 @@ def test_a_long_record_takes_a_time_that_grows_with_its_length(folder: Path) -> 
     statuses: list[NodeStatus] = ["RUNNING", "SUCCESS"]
     ticks = tuple(Tick(Second(0.05 * i), "root", statuses[i % 2]) for i in range(2000))
     long = replace(read_record(folder), ticks=ticks, events=())
-    assert len(Replay(long).frames) == 2000
+    assert len(Replay(long).changes) == 2000
     assert compared < 50 * 2000

@@ -13,6 +13,7 @@ from regrasp.app.records.explain import explanation
 from regrasp.app.records.reader import read_record
 from regrasp.app.records.result import Result
 from regrasp.app.run.episode import run_episode
+from regrasp.app.run.observers import Observers
 from regrasp.app.scenario.load import Scenario, load_scenario
 from regrasp.behaviors.leaf import Leaf, LeafFailed, LeafSteps, StepsLeaf
 from regrasp.interfaces.cause import CauseCode
@@ -100,7 +101,7 @@ def ends(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[tuple[bool, float]]]:
 
     monkeypatch.setattr(World, "close", watched)
     monkeypatch.setattr("regrasp.behaviors.LEAVES", LEAVES)
-    monkeypatch.setattr("regrasp.app.run.episode.LEAVES", LEAVES)
+    monkeypatch.setattr("regrasp.app.run.compose.LEAVES", LEAVES)
     yield found
     py_trees.blackboard.Blackboard.clear()
 
@@ -214,7 +215,7 @@ def test_ctrl_c_between_two_ticks_leaves_a_whole_record(tmp_path: Path, ends: li
             raise KeyboardInterrupt
 
     made = scenario(tmp_path, '<Swing name="swing"/>')
-    result = run_episode(made, tmp_path / "run", seed=0, progress=progress)
+    result = run_episode(made, tmp_path / "run", seed=0, observers=Observers(tick=progress))
     read = check_record(tmp_path / "run", result)
     assert (result.outcome, read["cause"]["code"]) == ("interrupted", "interrupted")
     assert read["cause"]["node"].endswith("swing")

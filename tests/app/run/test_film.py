@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from regrasp.app.run.film import RATE, Film
+from regrasp.app.run.film import Film, FilmParameters
 from regrasp.app.run.video import OVERVIEW_SIZE, SIZE
 from regrasp.sim.world import World
 
@@ -46,7 +46,7 @@ def test_two_seconds_give_frames_at_the_films_rate_in_their_order(tmp_path: Path
             film.show("carry")
             film.show("carry")  # the same instant once more
     shades = green(tmp_path / "video.mp4")
-    assert len(shades) == 2 * RATE
+    assert len(shades) == 2 * FilmParameters().rate
     assert shades == sorted(shades)
     assert shades[-1] == pytest.approx(190, abs=8)
 

@@ -9,10 +9,10 @@ import cv2
 import numpy as np
 import pytest
 
-from regrasp.app.run.video import OVERVIEW_SIZE, SIZE, Frame, VideoWriter, compose
+from regrasp.app.run.video import OVERVIEW_SIZE, SIZE, RgbImage, VideoWriter, compose
 
 
-def image(width: int, height: int, color: tuple[int, int, int]) -> Frame:
+def image(width: int, height: int, color: tuple[int, int, int]) -> RgbImage:
     return np.full((height, width, 3), color, np.uint8)
 
 

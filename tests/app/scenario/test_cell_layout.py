@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from regrasp.app.files.findings import Findings
-from regrasp.app.files.overrides import read
+from regrasp.app.files.overrides import parse_overrides
 from regrasp.app.files.resources import shipped
 from regrasp.app.scenario.cell_file import load_cell
 from regrasp.app.scenario.load import load_scenario
@@ -118,7 +118,7 @@ def test_no_number_of_a_cell_may_be_huge() -> None:
     text = shipped("cell")["thesis"].read_text(encoding="utf-8")
     keys = list(numbers(yaml.safe_load(text)))
     for huge in ("1.0e+300", "-1.0e+300"):
-        assignments, _ = read([f"{key}={huge}" for key in keys])
+        assignments, _ = parse_overrides([f"{key}={huge}" for key in keys])
         with pytest.raises(Findings) as raised:
             load_cell(shipped("cell")["thesis"], assignments)
         assert {item.source.partition("=")[0].removeprefix("--set ") for item in raised.value.items} == set(keys)

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 from scipy.optimize import linprog
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from regrasp.app.scenario.placement import overlaps, penetration
+from regrasp.app.scenario.placement import JitteredBox, overlaps, penetration_depth
 from regrasp.interfaces.cell import KnownCell
 from regrasp.motion.robots.kinematics import ArmKinematics
 from regrasp.motion.robots.spheres import SPHERE_LINKS, SPHERES
@@ -36,20 +36,20 @@ def test_penetration_agrees_with_a_linear_programme(
     jitter: tuple[float, ...],
 ) -> None:
     generators = np.vstack([halves(size, turn), np.diag(jitter), halves(other, other_turn)])
-    depth = penetration(generators, np.array(place))
+    depth = penetration_depth(generators, np.array(place))
     if abs(depth) > 1e-6:
         assert share_a_point(generators, np.array(place)) == (depth > 0)
 
 
 def test_penetration_is_the_shortest_way_out() -> None:
     boxes = np.vstack([halves((0.2, 0.2, 0.2), (0, 0, 0)), halves((1.0, 1.0, 0.1), (0, 0, 0))])
-    np.testing.assert_allclose(penetration(boxes, np.array([0.3, 0.1, 0.12])), 0.03, atol=1e-12)
-    np.testing.assert_allclose(penetration(boxes, np.array([0.0, 0.0, 0.25])), -0.10, atol=1e-12)
+    np.testing.assert_allclose(penetration_depth(boxes, np.array([0.3, 0.1, 0.12])), 0.03, atol=1e-12)
+    np.testing.assert_allclose(penetration_depth(boxes, np.array([0.0, 0.0, 0.25])), -0.10, atol=1e-12)
 
 
 def test_a_block_in_a_sleeping_arm_or_around_the_camera_is_told(known: KnownCell) -> None:
     def named(center: tuple[float, float, float], edge: float = 0.03) -> list[str]:
-        return [name for name, _ in overlaps(known, np.array(center), (edge, edge, edge), 20.0, (0.0, 0.0, 0.0))]
+        return [name for name, _ in overlaps(known, JitteredBox(np.array(center), (edge, edge, edge), 20.0))]
 
     for arm in known.arms:
         kinematics = ArmKinematics(RigidTransform.from_translation(arm.base))
@@ -63,7 +63,7 @@ def test_a_block_in_a_sleeping_arm_or_around_the_camera_is_told(known: KnownCell
 def test_an_arm_asleep_is_told_where_one_of_its_spheres_is_in_the_block(
     known: KnownCell, place: tuple[float, float, float], edge: float, yaw_deg: float
 ) -> None:
-    found = dict(overlaps(known, np.array(place), (edge, edge, edge), yaw_deg, (0.0, 0.0, 0.0)))
+    found = dict(overlaps(known, JitteredBox(np.array(place), (edge, edge, edge), yaw_deg)))
     for arm in known.arms:
         frames = ArmKinematics(RigidTransform.from_translation(arm.base)).link_frames(np.array(arm.sleep))
         centers = np.array([(frames[link] @ [*c[:3], 1.0])[:3] for link, c in zip(SPHERE_LINKS, SPHERES, strict=True)])

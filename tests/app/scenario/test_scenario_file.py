@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from toy_scenario import write_scenario
 
 from regrasp.app.files.findings import Finding, Findings
-from regrasp.app.files.overrides import read
+from regrasp.app.files.overrides import parse_overrides
 from regrasp.app.files.resources import shipped
 from regrasp.app.scenario.cell_file import load_cell
 from regrasp.app.scenario.load import load_scenario
@@ -112,7 +112,7 @@ def test_shipped_cells_are_right(name: str) -> None:
         ("0.12, 0.18]", "0.12, 0.18, 1]", "mine.yaml:8: obstacles.0.size is [0.08, 0.12, 0.18, 1]; expected 3 values"),
         ("slips: 1", "slips: 1.5", "mine.yaml:18: expect.slips is 1.5; expected a whole number (at least 0"),
         ("sim_seconds: 600", "sim_seconds:", "mine.yaml:15: limits.sim_seconds is empty; expected a number in seconds"),
-        ("tries: 4", "trys: 4", "mine.yaml:5: inputs.trys: unknown input 'trys'; did you mean tries?"),
+        ("tries: 4", "trys: 4", "mine.yaml:5: inputs.trys: unknown input 'trys'; did you mean 'tries'?"),
         ("tries: 4", "tries: many", "mine.yaml:5: inputs.tries: Retry 'again': num_failures={tries} is 'many' here"),
         ("tries: 4", "tries: '{x}'", "mine.yaml:5: inputs.tries is '{x}'; expected"),
         ("hidden: true", "hidden: yep", "mine.yaml:19: expect.hidden is 'yep'; expected true or false"),
@@ -251,7 +251,7 @@ def test_a_tree_that_names_a_socket_which_the_cell_has_not_is_a_finding_in_the_t
     tree.write_text(
         tree.read_text().replace('<Wait name="settle" seconds="0.1"/>', '<Unplug name="u" socket="bck_4"/>')
     )
-    assert findings() == ["tree.xml:2: Unplug 'u': socket='bck_4' is unknown; did you mean back_4?"]
+    assert findings() == ["tree.xml:2: Unplug 'u': socket='bck_4' is unknown; did you mean 'back_4'?"]
     tree.write_text(tree.read_text().replace("bck_4", "back_4"))
     assert findings_if_any() == []
 
@@ -347,7 +347,7 @@ def test_inputs_reach_the_tree_as_a_tree_file_writes_them(scenario: Path) -> Non
 
 def test_of_a_cell_that_is_no_mapping_that_alone_is_told(tmp_path: Path) -> None:
     (tmp_path / "cell.yaml").write_text("- 1\n- 2\n")
-    assignments, _ = read(["hidden.cable.stiffness.zero=0.005"])
+    assignments, _ = parse_overrides(["hidden.cable.stiffness.zero=0.005"])
     with pytest.raises(Findings) as caught:
         load_cell(tmp_path / "cell.yaml", assignments)
     assert len(caught.value.items) == 1

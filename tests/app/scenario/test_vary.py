@@ -110,7 +110,7 @@ def test_what_is_wrong_in_all_cases_is_told_once_beside_what_is_in_some(scenario
     vary(scenario, "  seed: '0:3'\n  obstacles.0.size.2: [0.2, 0.9]\n")
     scenario.write_text(scenario.read_text().replace("tries: 4", "trys: 4"))
     wrong, *placed = findings()
-    assert wrong == "mine.yaml:5: inputs.trys: unknown input 'trys'; did you mean tries?"
+    assert wrong == "mine.yaml:5: inputs.trys: unknown input 'trys'; did you mean 'tries'?"
     assert placed
     assert all(
         f.endswith("; move it, or jitter it less (case seed=0,obstacles.0.size.2=0.9 and 2 more)") for f in placed

@@ -115,7 +115,7 @@ def test_a_touch_while_the_hand_closes_is_neither_hold_nor_loss() -> None:
     run = Run(Expect(tries=1))
     run.go(0.3, fingers=2)
     run.go(1.0, fingers=0)
-    assert (run.judge.losses, run.judge.takes) == ([], 0)
+    assert (run.judge.losses, run.judge.grasps) == ([], 0)
 
 
 def test_what_slid_and_was_held_fast_again_is_lost_only_later() -> None:
