@@ -134,6 +134,7 @@ def run(
         raise ValueError("video is filmed into the record; name a folder with out")
     with late_imports():
         from regrasp.app.run.episode import run_episode  # brings the planner, the compiler and the physics: seconds
+        from regrasp.app.run.observers import Observers
 
     failures: list[Exception] = []
 
@@ -158,8 +159,7 @@ def run(
             video=video,
             gui=gui,
             renderer=renderer,
-            progress=tick,
-            on_event=lambda event: call(on_event, event),
+            observers=Observers(tick=tick, event=lambda event: call(on_event, event)),
         )
     finally:
         if failures:
@@ -188,11 +188,11 @@ def load_cell(cell: str | Path = "thesis", overrides: Sequence[str] = ()) -> Cel
     Raises:
         Findings: something in the file or the overrides is wrong.
     """
-    from regrasp.app.files.overrides import read
+    from regrasp.app.files.overrides import parse_overrides
     from regrasp.app.files.resources import resolve
     from regrasp.app.scenario.cell_file import load_cell
 
-    assignments, wrong = read(overrides)
+    assignments, wrong = parse_overrides(overrides)
     if wrong:
         from regrasp.app.files.findings import Findings
 
@@ -215,9 +215,9 @@ def load_frame(
     Raises:
         Findings: a file cannot be read, or they do not fit together.
     """
-    from regrasp.app.frames.perceive import load_frame
+    from regrasp.app.frames.frame_files import read_frame
 
-    return load_frame(Path(rgb), None if depth is None else Path(depth), Path(intrinsics), depth_unit)
+    return read_frame(Path(rgb), None if depth is None else Path(depth), Path(intrinsics), unit=depth_unit)
 
 
 def estimate_pose(
@@ -242,10 +242,15 @@ def estimate_pose(
     Raises:
         ValueError: the cell lacks what the technique needs, such as a tag on the connector.
     """
-    from regrasp.app.frames.perceive import make_estimator
+    from scipy.spatial.transform import RigidTransform
+
+    from regrasp.app.frames.perceive import without_boxes
+    from regrasp.perception.pose.technique import make_technique
 
     known = (cell or load_cell()).known
-    return make_estimator(technique, known, world_from_camera).estimate(frame)
+    if world_from_camera is None:
+        return make_technique(technique, without_boxes(known)).estimate(frame, RigidTransform.identity())
+    return make_technique(technique, known).estimate(frame, world_from_camera)
 
 
 def __getattr__(name: str) -> Any:

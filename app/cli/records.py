@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+import regrasp
 from regrasp.app.files.findings import Finding, Findings
 from regrasp.interfaces.quote import printable
 
@@ -108,9 +109,8 @@ def diff(folder: Folder, other: Annotated[Path, typer.Argument(metavar="DIR", he
 
 
 def _read(folder: Path) -> "RunRecord":
-    from regrasp.app.records.reader import read_record  # late, like all that only these commands need
 
-    return read_record(folder)
+    return regrasp.read_record(folder)
 
 
 def _read_both(*folders: Path) -> "list[RunRecord]":

@@ -10,16 +10,17 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+import regrasp
 from regrasp.app.cli.options import EXIT_UNMET, LogLevel, Renderer, ScenarioName, Seed, Sets, WallLimitSeconds
 from regrasp.app.cli.progress import shown_progress
 from regrasp.app.cli.run_every import run_every
 from regrasp.app.files.findings import Finding, Findings, shown
-from regrasp.app.interrupts import EXIT_INTERRUPTED, late_imports
+from regrasp.app.interrupts import EXIT_INTERRUPTED
 from regrasp.app.records import folders
 from regrasp.app.records.summary import run_summary
 from regrasp.app.run.batch import Run, Settings, result_of
 from regrasp.app.run.processes import run_each
-from regrasp.app.scenario.load import Scenario, cases, load_scenario
+from regrasp.app.scenario.load import Scenario
 from regrasp.interfaces.quote import printable
 
 if TYPE_CHECKING:
@@ -76,12 +77,12 @@ def run_scenario(
         wrong += _given("is for a single case; leave --all out", case=case, gui=gui, log_level=log_level)
         if dry_run:
             wrong += folders.file_findings(junit) if junit else []
-            _tell(_checked(partial(cases, scenario, overrides), wrong, out), out)
+            _tell(_checked(partial(regrasp.load_cases, scenario, overrides), wrong, out), out)
             return
         settings = Settings(video, renderer, quiet, wall_limit or math.inf)
         raise typer.Exit(run_every(scenario, overrides, jobs or os.cpu_count() or 1, out, junit, settings, wrong))
     wrong += _given("is for many cases; write --all, too", jobs=jobs, junit=junit)
-    [loaded] = _checked(lambda: [load_scenario(scenario, overrides, case)], wrong, out)
+    [loaded] = _checked(lambda: [regrasp.load_scenario(scenario, overrides, case)], wrong, out)
     if dry_run:
         _tell([loaded], out)
         return
@@ -114,30 +115,28 @@ def _checked(load: Callable[[], list[Scenario]], wrong: list[Finding], out: Path
 
 def _run(scenario: Scenario, folder: Path, settings: Settings, gui: bool, log_level: LogLevel) -> "Result":
     """Run in this process, with progress on stderr."""
-    with late_imports():
-        from regrasp.app.run.episode import run_episode  # brings the planner, the compiler and the physics: seconds
-
     with shown_progress(settings.quiet, log_level) as observers:
-        return run_episode(
-            scenario,
-            folder,
-            seed=scenario.file.seed,
-            video=settings.video,
-            gui=gui,
-            renderer=settings.renderer,
-            observers=observers,
-        )
+        try:
+            return regrasp.run(
+                scenario,
+                out=folder,
+                video=settings.video,
+                gui=gui,
+                renderer=settings.renderer,
+                on_tick=observers.tick,
+                on_event=observers.event,
+            )
+        except regrasp.Interrupted as stopped:
+            return stopped.result
 
 
 def _watched(run: Run, task: Callable[[], "Result"], wall_limit: float) -> "Result":
     """Do the run in a process of its own, which is stopped after `wall_limit` seconds."""
-    from regrasp.app.records.reader import read_record  # late: it brings py_trees
-
     assert run.folder is not None
     try:
         [done] = run_each([task], 1, wall_limit)
     except KeyboardInterrupt:
-        if (kept := read_record(run.folder).result) is None:
+        if (kept := regrasp.read_record(run.folder).result) is None:
             raise
         return kept
     return result_of(run, done)

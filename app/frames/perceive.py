@@ -16,14 +16,12 @@ from scipy.spatial.transform import RigidTransform
 
 from regrasp.app.files.findings import Finding, Findings, real_path, shown
 from regrasp.app.files.whole_file import write_whole
-from regrasp.app.frames.calibration_file import CalibrationFile, load_calibration
 from regrasp.app.frames.camera_pose_file import load_camera_pose
 from regrasp.app.frames.draw import draw_pose
-from regrasp.app.frames.image_files import read_depth, read_rgb
+from regrasp.app.frames.frame_files import read_frame
 from regrasp.interfaces.cell import FixedMount, KnownCell
 from regrasp.interfaces.frame import RgbdFrame
 from regrasp.interfaces.quote import nearest, quoted
-from regrasp.perception.camera.calibration import undistorted
 from regrasp.perception.camera.registration import expected_errors, register
 from regrasp.perception.pose.estimate import Estimate, NoEstimate
 from regrasp.perception.pose.fiducial import Fiducial
@@ -67,7 +65,7 @@ def run_perceive(technique: str, files: Sequence[FrameFiles], known: KnownCell, 
     name = _technique(technique)
     frames = _frames(name, files, known, unit)
     in_world = _in_world(files)
-    cell = known if in_world else known.model_copy(update={"boxes": ()})
+    cell = known if in_world else without_boxes(known)
     try:
         estimator = make_technique(name, cell)
     except ValueError as error:
@@ -99,6 +97,11 @@ def run_perceive(technique: str, files: Sequence[FrameFiles], known: KnownCell, 
     return bool(estimates)
 
 
+def without_boxes(known: KnownCell) -> KnownCell:
+    """The cell for a camera whose place is not known: floor and panels cannot tell where it stands."""
+    return known.model_copy(update={"boxes": ()})
+
+
 def _technique(name: str) -> TechniqueName:
     for known in TECHNIQUES:
         if name == known:
@@ -126,63 +129,14 @@ def _frames(
             if f.depth is None and technique not in NEEDS_NO_DEPTH:
                 message = f"the technique {technique} needs depth; give --depth FILE for each --rgb"
                 raise Findings([Finding("--depth", 0, message)])
-            calibration = load_calibration(f.intrinsics)
-            rgb, depth = _images(f, calibration, unit)
             camera = f.camera or ("camera" if len(number_of) == 1 else f"camera {number_of[f.intrinsics]}")
-            frame = RgbdFrame(camera, number, 0.0, rgb, depth, calibration.intrinsics)
+            frame = read_frame(f.rgb, f.depth, f.intrinsics, unit=unit, camera=camera, number=number)
             frames.append((frame, _camera_pose(f, known)))
         except Findings as error:
             wrong += error.items
     if wrong:
         raise Findings(wrong)
     return frames
-
-
-def _images(
-    files: FrameFiles, camera: CalibrationFile, unit: float, focal_range: tuple[float, float] = (0.2, 20.0)
-) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
-    """Undistorted colour and depth.
-
-    `focal_range`: plausible focal lengths over the picture's width; a fisheye lens has 0.3, a long lens 10.
-    """
-    k, source = camera.intrinsics, shown(files.intrinsics)
-    if not all(focal_range[0] <= f / k.width <= focal_range[1] for f in (k.fx, k.fy)):
-        right = f"expected {focal_range[0] * k.width:.0f} to {focal_range[1] * k.width:.0f} for pictures {k.width} wide"
-        raise Findings([Finding(source, 0, f"fx, fy are {k.fx:g}, {k.fy:g} pixels; {right}")])
-    if not (abs(k.cx - k.width / 2) < k.width and abs(k.cy - k.height / 2) < k.height):
-        right = f"expected a point near the middle of {k.width}x{k.height} pixels"
-        raise Findings([Finding(source, 0, f"cx, cy are {k.cx:g}, {k.cy:g}; {right}")])
-    if _folds(camera):
-        right = "write OpenCV's k1, k2, p1, p2, k3, or none"
-        raise Findings([Finding(source, 0, f"distortion bends the picture beyond use; {right}")])
-    rgb = read_rgb(files.rgb)
-    depth = np.zeros((k.height, k.width), np.float32) if files.depth is None else read_depth(files.depth, unit)
-    wrong = [
-        Finding(shown(path), 0, f"is {image.shape[1]}x{image.shape[0]} pixels, {source} is for {k.width}x{k.height}; "
-                "give the pictures and the intrinsics of one camera in one mode, depth aligned to colour")
-        for path, image in ((files.rgb, rgb), (files.depth, depth))
-        if path is not None and image.shape[:2] != (k.height, k.width)
-    ]  # fmt: skip
-    if wrong:
-        raise Findings(wrong)
-    if any(camera.distortion):
-        return undistorted(rgb, k, camera.distortion), undistorted(depth, k, camera.distortion)
-    return rgb, depth
-
-
-def _folds(camera: CalibrationFile) -> bool:
-    r"""Whether the radial distortion folds the picture, or more than doubles a radius, within its shorter half side.
-
-    .. math:: r_d = r (1 + k_1 r^2 + k_2 r^4 + k_3 r^6)
-
-    It folds where :math:`r_d` no longer grows with r (Brown 1971). Further out it may: a calibration may have seen no
-    corner there.
-    """
-    k, (k1, k2, _, _, k3) = camera.intrinsics, camera.distortion
-    r = np.linspace(0.0, 0.5 * min(k.width / k.fx, k.height / k.fy), 100)
-    with np.errstate(over="ignore", invalid="ignore"):
-        distorted = r * (1.0 + k1 * r**2 + k2 * r**4 + k3 * r**6)
-        return not bool(np.all(np.diff(distorted) > 0) and distorted[-1] < 2.0 * r[-1])  # NaN too
 
 
 def _camera_pose(files: FrameFiles, known: KnownCell) -> RigidTransform:
