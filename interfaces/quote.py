@@ -1,13 +1,13 @@
-"""How messages quote what somebody wrote: short, whatever its length."""
+"""Shortens what messages quote from a user's input."""
 
-MOST = 60  # letters
+MAX_QUOTE = 60  # characters; choice: a quotation then fits into one line of a terminal with words around it
 
 
-def cut(text: str, most: int = MOST) -> str:
-    """The text, its middle left out where it is longer than `most` letters."""
-    return text if len(text) <= most else f"{text[: most - 23]}...{text[-20:]}"
+def cut(text: str, longest: int = MAX_QUOTE) -> str:
+    """The text; if it has more than `longest` characters (at least 23), dots replace its middle. 20 stay at its end."""
+    return text if len(text) <= longest else f"{text[: longest - 23]}...{text[-20:]}"
 
 
 def quoted(value: object) -> str:
-    """The value as Python writes it, cut."""
+    """The value's `repr`, cut to `MAX_QUOTE` characters."""
     return cut(repr(value))

@@ -6,7 +6,8 @@ import numpy as np
 import pybullet as p
 from scipy.spatial.transform import RigidTransform, Rotation, Slerp
 
-from regrasp.interfaces.cell import Box, HiddenWorld, KnownCell, Socket
+from regrasp.interfaces.cell import Box, KnownCell, Socket
+from regrasp.interfaces.hidden_world import HiddenWorld
 from regrasp.interfaces.scene import EARTH_GRAVITY, Gravity, Obstacle, Prop
 from regrasp.sim.cable.cable import CableBody
 from regrasp.sim.cable.fixtures import Hold

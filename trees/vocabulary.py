@@ -16,7 +16,7 @@ from py_trees.common import Status
 from py_trees.ports import PortsMixin
 from py_trees.ports_utils import convert_str_to_type, is_instance_of_type
 
-from regrasp.interfaces.quote import MOST, cut
+from regrasp.interfaces.quote import MAX_QUOTE, cut
 
 Accepts = Any  # a type, or the words that may stand there as a tuple of strings
 # The names that a kind of thing has: {"socket": ["back_1", "back_2"]}. In place of a list a mapping says of each name
@@ -136,7 +136,7 @@ def nearest(word: str, known: Collection[str]) -> str:
     """The words that help after an unknown one: the nearest known one, else all that there are."""
     words = sorted(known)
     alike = [known for known in words if known.casefold() == word.casefold()]
-    if near := alike or get_close_matches(word[:MOST], words[:MOST_COMPARED], 1):
+    if near := alike or get_close_matches(word[:MAX_QUOTE], words[:MOST_COMPARED], 1):
         return f"did you mean {cut(near[0])}?"
     more = f" and {len(words) - MOST_LISTED} more" if words[MOST_LISTED:] else ""
     return f"there are {', '.join(map(cut, words[:MOST_LISTED]))}{more}" if words else "there are none, remove it"

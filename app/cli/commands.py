@@ -9,7 +9,7 @@ from typer.core import TyperGroup
 
 from regrasp.app.cli import calibrate, detector, perceive, records, run, scenarios, studies, trees
 from regrasp.app.files.findings import Findings, printable
-from regrasp.interfaces.quote import MOST, cut
+from regrasp.interfaces.quote import MAX_QUOTE, cut
 
 if TYPE_CHECKING:
     pass
@@ -48,7 +48,7 @@ class _Group(TyperGroup):
                 typer.echo(str(finding), err=True)
             raise typer.Exit(EXIT_BAD_INPUT) from None
         except typer.BadParameter as error:  # quotes all that was typed
-            error.message = cut(error.message.removeprefix("Value error, "), 3 * MOST)
+            error.message = cut(error.message.removeprefix("Value error, "), 3 * MAX_QUOTE)
             raise
         except OSError as error:  # a disk that is full, a name that is too long
             if error.errno == errno.EPIPE:

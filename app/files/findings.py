@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import ParamSpec, TypeVar
 
-from regrasp.interfaces.quote import MOST, cut, quoted
+from regrasp.interfaces.quote import MAX_QUOTE, cut, quoted
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -63,7 +63,7 @@ def nearest(name: str, names: Iterable[str], what: str = "there are") -> str:
 
 def closest(name: str, names: Iterable[str]) -> str | None:
     """The name that this one seems to mean."""
-    return next(iter(difflib.get_close_matches(name[:MOST], sorted(names), n=1)), None)
+    return next(iter(difflib.get_close_matches(name[:MAX_QUOTE], sorted(names), n=1)), None)
 
 
 def shown(path: Path) -> str:

@@ -8,7 +8,7 @@ from typing import Any
 import yaml
 
 from regrasp.app.files.findings import Finding, Findings
-from regrasp.interfaces.quote import MOST, cut, quoted
+from regrasp.interfaces.quote import MAX_QUOTE, cut, quoted
 
 Value = None | bool | int | float | str | list["Value"] | dict[str, "Value"]
 Path = tuple[str | int, ...]
@@ -106,7 +106,7 @@ def parse(text: str, source: str, line: int | None = None) -> Document:
 
 def _not_yaml(source: str, line: int, problem: str) -> Findings:
     remedy = next((r for words, r in _REMEDIES.items() if words in problem), "write it such as key: value")
-    return Findings([Finding(source, line, f"not YAML: {cut(problem, 2 * MOST)}; {remedy}")])
+    return Findings([Finding(source, line, f"not YAML: {cut(problem, 2 * MAX_QUOTE)}; {remedy}")])
 
 
 def _limit_nesting(text: str, source: str, line: int | None) -> None:

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.spatial.transform import RigidTransform
 
-from regrasp.interfaces.cell import Cable
+from regrasp.interfaces.hidden_world import Cable
 from regrasp.interfaces.scene import EARTH_GRAVITY, Gravity
 
 FloatArray = NDArray[np.float64]

@@ -11,7 +11,7 @@ from regrasp.app.files.validation import validated
 from regrasp.app.files.yaml_lines import Document, Place, parse
 from regrasp.app.scenario.cell_layout import impossible
 from regrasp.interfaces.cell import Cell
-from regrasp.interfaces.quote import MOST, cut, quoted
+from regrasp.interfaces.quote import MAX_QUOTE, cut, quoted
 
 
 def load_cell(path: Path, assignments: Sequence[Assignment] = (), where: Place | None = None) -> Cell:
@@ -65,5 +65,5 @@ def _misnamed(document: Document, cell: Cell) -> Iterator[Finding]:
     groups = {"sockets": (sockets, sockets), "arms": (arms, ["left", "right"]), "cameras": (cameras, ["rear", "wrist"])}
     for key, (names, needed) in groups.items():
         if sorted(names) != sorted(set(needed)):
-            given, right = (cut(", ".join(group), 3 * MOST) for group in (names, sorted(set(needed))))
+            given, right = (cut(", ".join(group), 3 * MAX_QUOTE) for group in (names, sorted(set(needed))))
             yield Finding(*document.place(("known", key)), f"{key} are {given}; give one each of {right}")

@@ -20,7 +20,7 @@ from regrasp.app.scenario.placement import misplaced
 from regrasp.app.scenario.references import check_inputs, check_names, names_of, tree_text
 from regrasp.app.scenario.schema import ScenarioFile
 from regrasp.interfaces.cell import Cell
-from regrasp.interfaces.quote import MOST, cut, quoted
+from regrasp.interfaces.quote import MAX_QUOTE, cut, quoted
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -220,7 +220,7 @@ def _of_cases(finding: Finding, cases: Sequence[str], of: int) -> Finding:
     if "" in cases or len(cases) == of:
         return finding
     more = f" and {len(cases) - 1} more" if cases[1:] else ""
-    return replace(finding, message=f"{finding.message} (case {cut(cases[0], 3 * MOST)}{more})")
+    return replace(finding, message=f"{finding.message} (case {cut(cases[0], 3 * MAX_QUOTE)}{more})")
 
 
 def _named(document: Document, key: Literal["cell", "tree"], folder: Path) -> Path | None:

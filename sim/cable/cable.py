@@ -13,7 +13,8 @@ import pybullet as p
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from regrasp.interfaces.cell import Cable, Connector, pose_along
+from regrasp.interfaces.cell import Connector, pose_along
+from regrasp.interfaces.hidden_world import Cable
 from regrasp.sim.render.printed import tag_boxes, visual
 
 FloatArray = NDArray[np.float64]

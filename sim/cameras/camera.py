@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from regrasp.interfaces.cell import CameraSpec, Errors
+from regrasp.interfaces.cell import CameraSpec
 from regrasp.interfaces.frame import Intrinsics, RgbdFrame
+from regrasp.interfaces.hidden_world import Errors
 from regrasp.sim.cameras.depth_noise import DepthNoise
 from regrasp.sim.render.picture import LightState
 from regrasp.sim.render.renderer import Renderer

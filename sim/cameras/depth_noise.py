@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
-from regrasp.interfaces.cell import CameraSpec, Errors
+from regrasp.interfaces.cell import CameraSpec
+from regrasp.interfaces.hidden_world import Errors
 
 MAX_DISPARITY = 126.0  # pixels that a RealSense D4xx searches; it sets the least range
 QUANTUM = 0.001  # metres

@@ -11,7 +11,8 @@ import pybullet as p
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from regrasp.interfaces.cell import ArmSpec, Errors, GripperSpec
+from regrasp.interfaces.cell import ArmSpec
+from regrasp.interfaces.hidden_world import Errors, GripperSpec
 from regrasp.interfaces.reading import JointReading
 from regrasp.interfaces.trajectory import Trajectory
 from regrasp.sim.robot.gripper import SimGripper

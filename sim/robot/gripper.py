@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 import pybullet as p
 
-from regrasp.interfaces.cell import Errors, GripperSpec
+from regrasp.interfaces.hidden_world import Errors, GripperSpec
 from regrasp.interfaces.reading import GripperReading
 from regrasp.sim.robot.model import finger_position, pad_gap
 

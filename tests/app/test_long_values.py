@@ -12,7 +12,7 @@ from regrasp.app.files.findings import Findings
 from regrasp.app.files.resources import shipped
 from regrasp.app.scenario.cell_file import load_cell
 from regrasp.app.scenario.load import cases, check_tree_file
-from regrasp.interfaces.quote import MOST
+from regrasp.interfaces.quote import MAX_QUOTE
 
 LONG = ("9" * 5000, "a" * 5000, "{" + "a" * 5000 + "}", "[" + "a, " * 90 + "]")
 MOST_OF_A_MESSAGE = 700  # letters: some words of ours, and some values
@@ -68,4 +68,4 @@ def test_what_is_wrong_on_the_command_line_is_told_in_short(line: str) -> None:
     result = CliRunner().invoke(app, [word.format("9" * 5000) for word in line.split()])
     assert result.exit_code == 2
     assert len(result.output) < 4 * MOST_OF_A_MESSAGE
-    assert "9" * 2 * MOST not in result.output or "..." in result.output
+    assert "9" * 2 * MAX_QUOTE not in result.output or "..." in result.output

@@ -2,14 +2,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from regrasp.interfaces.quote import MOST, cut, quoted
+from regrasp.interfaces.quote import MAX_QUOTE, cut, quoted
 
 
 @given(st.text() | st.binary(max_size=200) | st.lists(st.integers()))
 def test_what_is_quoted_is_short_and_whole_where_it_can_be(value: object) -> None:
     whole, text = repr(value), quoted(value)
-    assert len(text) <= MOST
-    assert text == whole or (len(whole) > MOST and "..." in text)
+    assert len(text) <= MAX_QUOTE
+    assert text == whole or (len(whole) > MAX_QUOTE and "..." in text)
 
 
 @pytest.mark.parametrize("most", [60, 180])

@@ -8,7 +8,8 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from regrasp.app.studies.pose.scenes import CAMERA
 from regrasp.app.studies.pose.trial import Setup
-from regrasp.interfaces.cell import Cell, Color, FixedMount
+from regrasp.interfaces.cell import Cell, FixedMount
+from regrasp.interfaces.fields import Color
 from regrasp.interfaces.frame import RgbdFrame
 from regrasp.interfaces.scene import Prop
 from regrasp.perception.pose.estimate import Estimate

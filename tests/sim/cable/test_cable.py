@@ -8,7 +8,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_bvp
 
-from regrasp.interfaces.cell import Cable, Cell
+from regrasp.interfaces.cell import Cell
+from regrasp.interfaces.hidden_world import Cable
 from regrasp.interfaces.scene import EARTH_GRAVITY
 from regrasp.sim.cable.cable import CableBody, build_cable, first_frequency, spring_torques
 

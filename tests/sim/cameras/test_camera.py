@@ -5,8 +5,9 @@ import pybullet as p
 import pytest
 from scipy.spatial.transform import RigidTransform
 
-from regrasp.interfaces.cell import CameraSpec, Errors, FixedMount
+from regrasp.interfaces.cell import CameraSpec, FixedMount
 from regrasp.interfaces.devices import Camera
+from regrasp.interfaces.hidden_world import Errors
 from regrasp.sim.cameras.camera import SimCamera, camera_error
 from regrasp.sim.cameras.depth_noise import DepthNoise
 from regrasp.sim.render.renderer import LightState, make_renderer

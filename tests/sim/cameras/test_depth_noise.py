@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from regrasp.interfaces.cell import CameraSpec, Errors, FixedMount
+from regrasp.interfaces.cell import CameraSpec, FixedMount
+from regrasp.interfaces.hidden_world import Errors
 from regrasp.sim.cameras.depth_noise import DepthNoise, smooth_noise
 
 REAR = CameraSpec(

@@ -6,8 +6,9 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
-from regrasp.interfaces.cell import Cell, Errors
+from regrasp.interfaces.cell import Cell
 from regrasp.interfaces.devices import Arm
+from regrasp.interfaces.hidden_world import Errors
 from regrasp.interfaces.scene import EARTH_GRAVITY
 from regrasp.interfaces.trajectory import Trajectory
 from regrasp.motion.robots.kinematics import LOWER, UPPER, ArmKinematics
