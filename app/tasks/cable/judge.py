@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from regrasp.app.records.result import Expectation, Slip
 from regrasp.app.tasks.cable.expectations import Expect
 from regrasp.behaviors.services import Belief
-from regrasp.sim.cable.phase import LOST_SECONDS, STILL_SECONDS, STILL_SPEED
+from regrasp.sim.cable.phase import PhaseParameters
 from regrasp.sim.ground_truth import GroundTruth
 
 HOLD_SECONDS = 0.5  # of both pads' touch: a hand that closes beside its middle may touch it and push it away
@@ -39,8 +39,8 @@ class GripWatch:
 class Judge:
     """Watches the truth at every tick and holds it against a scenario's expectations at the end."""
 
-    def __init__(self, truth: GroundTruth, expect: Expect) -> None:
-        self._truth, self._expect = truth, expect
+    def __init__(self, truth: GroundTruth, expect: Expect, phases: PhaseParameters = PhaseParameters()) -> None:
+        self._truth, self._expect, self._phases = truth, expect, phases
         self._now = 0.0
         self._was_held = False
         self._held_since: float | None = None  # since when both pads touch it
@@ -68,7 +68,7 @@ class Judge:
                 self._untouched_at = None
             else:
                 self._untouched_at = now if self._untouched_at is None else self._untouched_at
-                if now - self._untouched_at >= LOST_SECONDS:
+                if now - self._untouched_at >= self._phases.lost_seconds:
                     self.losses.append(self._unheld_at)
                     self._was_held, self._grip = False, GripWatch()
         if self.losses and not self._was_held and self.settled_pixels is None:
@@ -129,11 +129,11 @@ class Judge:
         return max(known, default=0.0) if len(known) == len(delays) else None
 
     def _watch_settling(self, now: float) -> None:
-        if self._truth.connector_speed() > STILL_SPEED:
+        if self._truth.connector_speed() > self._phases.still_speed:
             self._still_since = None
         elif self._still_since is None:
             self._still_since = now
-        elif now - self._still_since >= STILL_SECONDS:
+        elif now - self._still_since >= self._phases.still_seconds:
             self.settled_pixels = self._truth.connector_pixels("rear")
 
 
