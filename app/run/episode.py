@@ -25,6 +25,7 @@ from regrasp.app.tasks.cable.judge import Judge
 from regrasp.behaviors import LEAVES
 from regrasp.behaviors.services import Services
 from regrasp.interfaces.cause import Cause, CauseCode
+from regrasp.interfaces.scene import SceneSetup
 from regrasp.motion.service import Motion
 from regrasp.perception.service import Perception
 from regrasp.sim.ground_truth import GroundTruth
@@ -94,7 +95,7 @@ def run_episode(
             )
             episode = _assemble(scenario, world, seed, log)
             ticks = TickLog(episode.tree.root, record.ticks, world.now)
-            faults = [EnteredNodes(episode.tree.root, world.notice), FaultLog(world.faults, log)]
+            faults = [EnteredNodes(episode.tree.root, world.note_entered), FaultLog(world.faults, log)]
             episode.tree.visitors += [ticks, episode.attempts, *faults]
             note_leaf_at_work(episode.tree, lambda node: record.at_work(world.now(), node))
             with Film(out / "video.mp4" if video and out else None, world) as film:
@@ -115,7 +116,8 @@ def build_world(scenario: Scenario, seed: int, renderer: RendererName = "auto", 
     rng = np.random.default_rng([seed, 0])
     obstacles = draw_obstacles(scenario.file, rng)
     faults = draw_faults(scenario.file, rng)
-    return World(scenario.lit_cell, scenario.file.gravity, seed, obstacles, faults, renderer, gui)
+    setup = SceneSetup(obstacles, faults)
+    return World(scenario.lit_cell, scenario.file.gravity, seed, setup, renderer, gui)
 
 
 def _assemble(scenario: Scenario, world: World, seed: int, log: Any) -> Episode:

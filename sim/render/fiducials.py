@@ -76,7 +76,7 @@ def compound_visual(
 
 
 def _cells(inked: Mask, edge: float, color: Color, layer: int, parameters: PrintParameters) -> list[Box]:
-    """Boxes of the inked cells (rows, columns), `edge` m wide each, centred on the plate. A row's neighbours share one."""
+    """Boxes of the inked cells (rows, columns), `edge` m wide, centred on the plate; one for neighbours in a row."""
     height, width = inked.shape
     boxes = []
     for row, line in enumerate(inked):

@@ -98,7 +98,7 @@ def _merge(vertices: FloatArray, faces: NDArray[np.int64], cell: float) -> tuple
 def _vertex_normals(faces: NDArray[np.int64], normals: FloatArray, area: FloatArray, cosine: float) -> FloatArray:
     """Normals (n, 3, 3) of the faces' corners.
 
-    Each is the mean, weighted by area, over the vertex's faces whose normals have at least that cosine with this face's.
+    Each is the mean, weighted by area, over the vertex's faces whose normals have at least `cosine` with this face's.
     """
     around: list[list[int]] = [[] for _ in range(int(faces.max()) + 1)]
     for face, corner in enumerate(faces):

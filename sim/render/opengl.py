@@ -12,7 +12,7 @@ from scipy.spatial.transform import RigidTransform
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.frame import Intrinsics
 from regrasp.sim.render.meshes import triangle_corners
-from regrasp.sim.render.picture import BACKGROUND, FAR_PLANE, NEAR_PLANE, Image, LightState
+from regrasp.sim.render.picture import BACKGROUND, Z_FAR, Z_NEAR, Image, LightState
 from regrasp.sim.render.shaders import (
     BACKDROP_FRAGMENT,
     BACKDROP_VERTEX,
@@ -29,7 +29,7 @@ _INSTANCE = np.dtype([("pose", "f4", (3, 4)), ("color", "f4", 3), ("id", "i4")])
 
 @dataclass(frozen=True)
 class _Group:
-    """Items that share a mesh: their rows, the mesh's radius about its origin (m), their records here and on the card."""
+    """Items that share a mesh: their rows, its radius about its origin (m), their records here and on the card."""
 
     rows: NDArray[np.int64]
     radius: float
@@ -172,8 +172,8 @@ def _clip_from_camera(k: Intrinsics) -> FloatArray:
             [
                 0.0,
                 0.0,
-                (FAR_PLANE + NEAR_PLANE) / (FAR_PLANE - NEAR_PLANE),
-                -2 * FAR_PLANE * NEAR_PLANE / (FAR_PLANE - NEAR_PLANE),
+                (Z_FAR + Z_NEAR) / (Z_FAR - Z_NEAR),
+                -2 * Z_FAR * Z_NEAR / (Z_FAR - Z_NEAR),
             ],
             [0.0, 0.0, 1.0, 0.0],
         ]

@@ -5,13 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-NEAR_PLANE, FAR_PLANE = 0.02, 10.0  # m along the optical axis: clip planes, nothing outside them is drawn
+Z_NEAR, Z_FAR = 0.02, 10.0  # m along the optical axis: clip planes, nothing outside them is drawn
 BACKGROUND = (0.72, 0.74, 0.78)  # RGB: the lab's distant wall
 
 
 @dataclass(frozen=True, eq=False)
 class LightState:
-    """A directional light: `direction` (3,) from the scene to the light in the world, of any length; strengths 0 to 1."""
+    """A directional light: `direction` (3,) from the scene to the light in the world, any length; strengths 0 to 1."""
 
     direction: ArrayLike
     ambient: float
@@ -22,7 +22,7 @@ class LightState:
 class Image:
     """A picture without noise.
 
-    `rgb` (H, W, 3) uint8; `depth` (H, W) float32, metres along the optical axis, 0 where nothing is; `ids` (H, W) int32,
+    `rgb` (H, W, 3) uint8; `depth` (H, W) float32, m along the optical axis, 0 where nothing is; `ids` (H, W) int32,
     the `VisualItem.id` that each pixel shows, -1 for none.
     """
 

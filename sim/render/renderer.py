@@ -27,7 +27,7 @@ class Renderer(Protocol):
     def render(
         self, poses: NDArray[np.float32], world_from_camera: RigidTransform, intrinsics: Intrinsics, light: LightState
     ) -> Image:
-        """The picture from an optical frame (x right, y down, z forward) of the items at `poses`, a `Visuals.snapshot`."""
+        """The picture of the items at `poses`, a `Visuals.snapshot`, from an optical frame (x right, y down)."""
         ...
 
     def close(self) -> None:

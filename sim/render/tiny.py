@@ -7,7 +7,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from regrasp.interfaces.frame import Intrinsics
 from regrasp.sim.render.meshes import triangle_corners
-from regrasp.sim.render.picture import BACKGROUND, FAR_PLANE, NEAR_PLANE, Image, LightState
+from regrasp.sim.render.picture import BACKGROUND, Z_FAR, Z_NEAR, Image, LightState
 from regrasp.sim.render.visuals import VisualItem, Visuals
 
 
@@ -49,9 +49,7 @@ class TinyRenderer:
         )
         ids = self._ids[np.asarray(seen).reshape(k.height, k.width) + 1]
         buffer = np.asarray(depth, float).reshape(k.height, k.width)
-        metres = np.where(
-            ids == -1, 0.0, FAR_PLANE * NEAR_PLANE / (FAR_PLANE - (FAR_PLANE - NEAR_PLANE) * buffer)
-        ).astype(np.float32)
+        metres = np.where(ids == -1, 0.0, Z_FAR * Z_NEAR / (Z_FAR - (Z_FAR - Z_NEAR) * buffer)).astype(np.float32)
         rgb = np.ascontiguousarray(np.asarray(rgba, np.uint8).reshape(k.height, k.width, 4)[:, :, :3])
         rgb[ids == -1] = np.rint(255 * np.array(BACKGROUND)).astype(np.uint8)
         return Image(rgb, metres, ids)
@@ -82,15 +80,15 @@ def _view(world_from_camera: RigidTransform) -> list[float]:
 
 
 def _projection(k: Intrinsics) -> list[float]:
-    """OpenGL's projection matrix, column by column, for TinyRenderer, which samples a pixel at its lower left corner."""
+    """OpenGL's projection matrix, column by column; TinyRenderer samples a pixel at its lower left corner."""
     return [
         *(2 * k.fx / k.width, 0.0, 0.0, 0.0),
         *(0.0, 2 * k.fy / k.height, 0.0, 0.0),
         *(
             1 - 2 * k.cx / k.width,
             2 * (k.cy + 1) / k.height - 1,
-            -(FAR_PLANE + NEAR_PLANE) / (FAR_PLANE - NEAR_PLANE),
+            -(Z_FAR + Z_NEAR) / (Z_FAR - Z_NEAR),
             -1.0,
         ),
-        *(0.0, 0.0, -2 * FAR_PLANE * NEAR_PLANE / (FAR_PLANE - NEAR_PLANE), 0.0),
+        *(0.0, 0.0, -2 * Z_FAR * Z_NEAR / (Z_FAR - Z_NEAR), 0.0),
     ]

@@ -13,6 +13,7 @@ from regrasp.behaviors.services import Belief
 from regrasp.sim.cable.phase import PhaseParameters
 from regrasp.sim.ground_truth import GroundTruth
 
+PHASES = PhaseParameters()
 HOLD_SECONDS = 0.5  # of both pads' touch: a hand that closes beside its middle may touch it and push it away
 SLIDE = 0.003  # m in the jaw ...
 SLIDE_SECONDS = 0.5  # ... within so long: a squeezed end crept so for a second before it sprang out
@@ -39,7 +40,7 @@ class GripWatch:
 class Judge:
     """Watches the truth at every tick and holds it against a scenario's expectations at the end."""
 
-    def __init__(self, truth: GroundTruth, expect: Expect, phases: PhaseParameters = PhaseParameters()) -> None:
+    def __init__(self, truth: GroundTruth, expect: Expect, phases: PhaseParameters = PHASES) -> None:
         self._truth, self._expect, self._phases = truth, expect, phases
         self._now = 0.0
         self._was_held = False
