@@ -1,7 +1,7 @@
 """The simulated world of one run: a PyBullet client with the cell, the arms, the cable, the cameras and the faults.
 
-Time passes only in `advance`. Every physics step has the same order: servos, cable springs, step, holds, faults,
-contacts. Cameras expose and finger encoders sample at fixed steps, so nothing depends on who reads them and how often.
+Time passes only in `advance`. Every physics step has the same order: servos, effects of faults, cable springs, clip,
+step, socket; then, at intervals, contacts and the triggers of faults. Cameras expose and finger encoders sample at fixed steps, so nothing depends on who reads them and how often.
 """
 
 from collections.abc import Callable
@@ -42,7 +42,7 @@ class WorldParameters:
 
     contact_interval: int = 4  # physics steps between checks of contacts and of the faults' triggers
     stand_force: float = 3.0  # N that a stand's spring clip holds; choice: a light pull, twice a slack cable's force
-    spinning_friction: float = 0.005  # m, of the connector, against rotation about the contact's normal
+    spinning_friction: float = 0.005  # of the connector, against rotation about a contact's normal (PyBullet's unit)
     smallest_brightness: float = 0.3  # lower limit of the random factor on the light; choice: cameras still see
     arm: ArmParameters = field(default_factory=ArmParameters)
     gripper: GripperParameters = field(default_factory=GripperParameters)

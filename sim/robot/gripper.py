@@ -19,7 +19,7 @@ class GripperParameters:
     closed_gap: float = 0.003  # m between the pads at the lower stop
     position_gain: float = 0.1  # PyBullet's position control while opening or holding a gap
     velocity_gain: float = 1.0
-    spinning_friction: float = 0.005  # m, of the pads, against rotation about the contact's normal
+    spinning_friction: float = 0.005  # of the pads, against rotation about a contact's normal (PyBullet's unit)
     gear_force: float = 500.0  # N, limit of the constraint that couples the fingers
     gear_error_reduction: float = 0.3  # share of the coupling's error that is corrected in a step
 
