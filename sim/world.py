@@ -1,7 +1,8 @@
 """The simulated world of one run: a PyBullet client with the cell, the arms, the cable, the cameras and the faults.
 
 Time passes only in `advance`. Every physics step has the same order: servos, effects of faults, cable springs, clip,
-step, socket; then, at intervals, contacts and the triggers of faults. Cameras expose and finger encoders sample at fixed steps, so nothing depends on who reads them and how often.
+step, socket; then, at intervals, contacts and the triggers of faults. Cameras expose and finger encoders sample at
+fixed steps, so nothing depends on who reads them and how often.
 """
 
 from collections.abc import Callable
@@ -12,7 +13,7 @@ import pybullet as p
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from regrasp.interfaces.arrays import FloatArray
-from regrasp.interfaces.cell import Cell, WristMount
+from regrasp.interfaces.cell import PLUGGED_INTO, Cell, WristMount
 from regrasp.interfaces.scene import Gravity, SceneSetup
 from regrasp.sim.build import (
     OUT_OF_SIGHT,
@@ -58,9 +59,9 @@ NOTHING_ADDED = SceneSetup()
 
 
 class World:
-    """The world of one run. All errors and noise are drawn from `seed`; equal arguments give equal bits.
+    """The world of one run: the cell and what `setup` adds to it.
 
-    `setup` adds obstacles, faults and props to the cell.
+    All errors and noise are drawn from `seed`; equal arguments give equal bits.
     """
 
     def __init__(
@@ -100,8 +101,7 @@ class World:
             for fault, rng in zip(setup.faults, rngs, strict=True)
         ]
         self._triggers = TriggerState()
-        known = cell.known
-        self._start = known.socket(known.plugged_into).world_from_plug(known.connector.length).translation
+        self._start = cell.known.socket(PLUGGED_INTO).world_from_plug(cell.known.connector.length).translation
         self._phase = PhaseWatch(self._start, parameters.phase)
         for arm in self.arms.values():
             arm.restart_clock()

@@ -13,7 +13,6 @@ from regrasp.behaviors.services import Belief
 from regrasp.sim.cable.phase import PhaseParameters
 from regrasp.sim.ground_truth import GroundTruth
 
-PHASES = PhaseParameters()
 HOLD_SECONDS = 0.5  # of both pads' touch: a hand that closes beside its middle may touch it and push it away
 SLIDE = 0.003  # m in the jaw ...
 SLIDE_SECONDS = 0.5  # ... within so long: a squeezed end crept so for a second before it sprang out
@@ -40,8 +39,8 @@ class GripWatch:
 class Judge:
     """Watches the truth at every tick and holds it against a scenario's expectations at the end."""
 
-    def __init__(self, truth: GroundTruth, expect: Expect, phases: PhaseParameters = PHASES) -> None:
-        self._truth, self._expect, self._phases = truth, expect, phases
+    def __init__(self, truth: GroundTruth, expect: Expect) -> None:
+        self._truth, self._expect = truth, expect
         self._now = 0.0
         self._was_held = False
         self._held_since: float | None = None  # since when both pads touch it
@@ -69,7 +68,7 @@ class Judge:
                 self._untouched_at = None
             else:
                 self._untouched_at = now if self._untouched_at is None else self._untouched_at
-                if now - self._untouched_at >= self._phases.lost_seconds:
+                if now - self._untouched_at >= PhaseParameters.lost_seconds:
                     self.losses.append(self._unheld_at)
                     self._was_held, self._grip = False, GripWatch()
         if self.losses and not self._was_held and self.settled_pixels is None:
@@ -130,11 +129,11 @@ class Judge:
         return max(known, default=0.0) if len(known) == len(delays) else None
 
     def _watch_settling(self, now: float) -> None:
-        if self._truth.connector_speed() > self._phases.still_speed:
+        if self._truth.connector_speed() > PhaseParameters.still_speed:
             self._still_since = None
         elif self._still_since is None:
             self._still_since = now
-        elif now - self._still_since >= self._phases.still_seconds:
+        elif now - self._still_since >= PhaseParameters.still_seconds:
             self.settled_pixels = self._truth.connector_pixels("rear")
 
 
