@@ -1,1 +1,1 @@
-"""The ground floor: small value types that cross rooms, and the device protocols."""
+"""Small value types that all packages share, device protocols, and the models of cell files and faults."""

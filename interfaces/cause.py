@@ -1,11 +1,11 @@
-"""Why something failed: one enumeration for the whole house."""
+"""Causes of failure: one enumeration for all leaves, services and runs."""
 
 from dataclasses import dataclass
 from enum import StrEnum
 
 
 class CauseCode(StrEnum):
-    """Every reason that a leaf, a service or a run may name."""
+    """Every cause that a leaf, a service or a run may give."""
 
     OUT_OF_REACH = "out_of_reach"
     NO_COLLISION_FREE_GOAL = "no_collision_free_goal"
@@ -31,12 +31,12 @@ class CauseCode(StrEnum):
 
 
 class ServiceError(Exception):
-    """A service broke off for a reason that its caller must reckon with: a lost connection, a driver's timeout."""
+    """A service failed for a reason outside the program: a lost connection, a driver's timeout. Callers handle it."""
 
 
 @dataclass(frozen=True)
 class Cause:
-    """A cause: its code, one sentence with the numbers, and the tree path of its node ('' before a tree)."""
+    """A cause: its code, one sentence with the numbers, and the tree path of its node ('' without a tree)."""
 
     code: CauseCode
     message: str

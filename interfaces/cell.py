@@ -1,56 +1,40 @@
-"""The cell: what its robot is told (`KnownCell`) and what only the world knows (`HiddenWorld`).
+"""The cell: what its robot is told (`KnownCell`) and what only the simulated world knows (`HiddenWorld`).
 
-Read from a YAML file under `scenarios/cells/`. SI units; world frame on the plane of the two arm bases, midway between
-them, x forward to the panels, y left, z up.
+It is read from a YAML file under `scenarios/cells/`. Units are SI. The world frame lies on the plane of the two arm
+bases, midway between them: x points forward to the panels, y left, z up.
 """
 
 from typing import Annotated, Literal
 
 import numpy as np
-from numpy.typing import NDArray
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import Field
 from scipy.spatial.transform import RigidTransform, Rotation
 
+from regrasp.interfaces.arrays import FloatArray
+from regrasp.interfaces.fields import (
+    Color,
+    Direction,
+    Force,
+    JointAngle,
+    Length,
+    Model,
+    MountOffset,
+    Seconds,
+    SignedDegrees,
+    Size,
+    Vector,
+)
 from regrasp.interfaces.frame import Intrinsics
+from regrasp.interfaces.hidden_world import HiddenWorld
 
-# Numbers beyond these bounds are slips of the pen, and arithmetic overflows on some of them.
-Number = Annotated[float, Field(allow_inf_nan=False, strict=False)]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Length = Annotated[float, Field(ge=1e-4, le=10)]  # metres
-Force = Annotated[float, Field(ge=1e-3, le=1e4)]  # newtons
-Near = Annotated[float, Field(ge=-0.3, le=0.3)]  # metres
-Mass = Annotated[float, Field(ge=1e-5, le=100)]  # kilograms, or kilograms a metre
-Friction = Annotated[float, Field(ge=1e-3, le=10)]
-Seconds = Annotated[float, Field(ge=0, le=10)]
-Deviation = Annotated[float, Field(ge=0, le=1)]  # metres
-JointAngle = Annotated[float, Field(ge=-7, le=7)]  # radians
-Degrees = Annotated[float, Field(ge=-360, le=360)]
-Angle = Annotated[float, Field(ge=0, le=180)]  # degrees
-Coordinate = Annotated[float, Field(ge=-5, le=5, allow_inf_nan=False)]
-Vector = tuple[Coordinate, Coordinate, Coordinate]
-Size = tuple[Length, Length, Length]
-Fraction = Annotated[float, Field(ge=0, le=1)]
-Color = tuple[Fraction, Fraction, Fraction]
-
-
-def _not_zero(v: Vector) -> Vector:
-    if float(np.linalg.norm(v)) < 1e-6:
-        raise ValueError("a direction must not be zero")
-    return v
-
-
-Direction = Annotated[Vector, AfterValidator(_not_zero)]
-
-
-class Model(BaseModel):
-    """Base of all file models: unknown keys are errors, values do not change."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
+ArmName = Literal["left", "right"]
 
 
 def pose_along(position: Vector, axis: Vector) -> RigidTransform:
-    """The frame at `position` whose x axis points along `axis` and whose z axis is as close to up as can be."""
+    """Pose world_from_frame at `position` (m): x points along `axis` (any length), z as far up as that allows.
+
+    For an axis within 8 degrees of the vertical the world's x axis takes the place of up.
+    """
     x = np.asarray(axis, float) / np.linalg.norm(axis)
     up = np.array([0.0, 0.0, 1.0]) if abs(x[2]) < 0.99 else np.array([1.0, 0.0, 0.0])
     y = np.cross(up, x)
@@ -59,7 +43,7 @@ def pose_along(position: Vector, axis: Vector) -> RigidTransform:
 
 
 class Box(Model):
-    """An axis-aligned box that does not move: centre and full edge lengths."""
+    """A fixed box with its edges along the world's axes: centre and full edge lengths, m."""
 
     name: str
     center: Vector
@@ -68,49 +52,49 @@ class Box(Model):
 
 
 class Socket(Model):
-    """A socket: a block with its mouth in the middle of its face opposite to `axis`, along which a plug goes in."""
+    """A socket: a block that takes a plug. The plug goes in along `axis`, through the middle of the face it meets."""
 
     name: str
     center: Vector
-    size: Size  # metres, (across, along the plug axis, high)
+    size: Size  # (across, along the plug axis, high)
     axis: Direction
-    depth: Length  # how far the plug sits in
-    pull_out_force: Force  # newtons
+    depth: Length  # how deep the plug sits in the block
+    pull_out_force: Force
     color: Color = (0.1, 0.3, 0.8)
 
     def world_from_plug(self, connector_length: float) -> RigidTransform:
-        """Pose of a plugged connector: origin at its centre, x from cable to tip."""
+        """Pose world_from_connector of a plugged connector that is `connector_length` m long."""
         axis = np.asarray(self.axis, float) / np.linalg.norm(self.axis)
         centre = np.asarray(self.center) - axis * (0.5 * self.size[1] + 0.5 * connector_length - self.depth)
         return pose_along((float(centre[0]), float(centre[1]), float(centre[2])), self.axis)
 
     @property
     def world_from_block(self) -> Rotation:
-        """Rotation of the block: its x edge is level, its y edge lies on the plug axis and points towards +y."""
+        """Rotation of the block: its x edge is horizontal, its y edge lies on the plug axis and points towards +y."""
         along = np.asarray(self.axis, float) / np.linalg.norm(self.axis)
         if along[1] < 0:
             along = -along  # the same block
-        level = float(np.hypot(along[0], along[1]))
-        across = np.array([along[1], -along[0], 0.0]) / level if level > 0 else np.array([1.0, 0.0, 0.0])
+        horizontal = float(np.hypot(along[0], along[1]))
+        across = np.array([along[1], -along[0], 0.0]) / horizontal if horizontal > 0 else np.array([1.0, 0.0, 0.0])
         return Rotation.from_matrix(np.column_stack([across, along, np.cross(across, along)]))
 
     def upright_box(self) -> Box:
-        """The smallest box along the world's axes that holds the block."""
+        """The smallest box along the world's axes that contains the block (its bounding box)."""
         size = (np.abs(self.world_from_block.as_matrix()) * self.size).sum(axis=1)
-        # Not checked again: the bounds are for what a file says, and a turned block of the largest size needs more.
+        # Without validation: the bounds are for what a file says, and the box round a turned block may exceed them.
         return Box.model_construct(name=self.name, center=self.center, size=tuple(size.tolist()), color=self.color)
 
 
-PLUGGED_INTO = "plugged_into"  # in place of a socket's name: the one that the cell names under this key
+PLUGGED_INTO = "plugged_into"  # stands for the name of the socket that the cell names under this key
 
-TAG_DICTIONARY = "DICT_4X4_50"  # of cv2.aruco; choice: the fewest cells, so the largest ones on a small plate
+TAG_DICTIONARY = "DICT_4X4_50"  # of cv2.aruco. Choice: the fewest cells, so they are the largest on a small plate
 
 
 class Tag(Model):
     """An ArUco tag of `TAG_DICTIONARY` in the middle of a square white plate, fixed on a body.
 
-    In the body's frame it faces +y, and its own x points along x. A printed film of a fraction of a gram that gives way
-    to a hand: it is seen and weighs and stops nothing.
+    In the body's frame it faces +y, and its own x axis points along x. It stands for a printed film of a fraction of a
+    gram that gives way to a hand: it is visible, and has neither mass nor a collision shape.
     """
 
     number: Annotated[int, Field(ge=0, le=49)]
@@ -120,29 +104,29 @@ class Tag(Model):
 
     @property
     def body_from_tag(self) -> RigidTransform:
-        """Pose of the tag (x to its right, y to its top, z towards who looks at it) in the body's frame."""
+        """Pose of the tag in the body's frame: x to its right, y to its top, z out of its face towards the viewer."""
         return RigidTransform.from_components(self.center, Rotation.from_matrix([[1, 0, 0], [0, 0, 1], [0, -1, 0]]))
 
 
 class Clip(Model):
-    """A snap-in clip that takes the connector's tip half: seat pose of the connector in it, and what it does."""
+    """A snap-in clip that holds the connector by its tip half."""
 
-    seat: Vector  # the connector's centre when stowed
-    axis: Direction  # the connector's x axis when stowed
-    capture_distance: Length
-    capture_angle_deg: Annotated[float, Field(ge=0.1, le=180)]
+    seat: Vector  # centre of a stowed connector
+    axis: Direction  # x axis of a stowed connector
+    capture_distance: Length  # from the seat, within which the clip takes a connector and outside of which it lets go
+    capture_angle_deg: Annotated[float, Field(ge=0.1, le=180)]  # largest angle between the axes at which it takes one
     hold_force: Force
     bracket: tuple[Box, ...]
     tag: Tag | None = None  # in the seat's frame
 
     @property
     def world_from_seat(self) -> RigidTransform:
-        """Pose of the stowed connector."""
+        """Pose world_from_connector of a stowed connector."""
         return pose_along(self.seat, self.axis)
 
 
 class Connector(Model):
-    """The cable's loose end: a cylinder; its frame is at its centre, x from cable to tip."""
+    """The connector at the cable's free end, a cylinder. Its frame is at its centre, x points from cable to tip."""
 
     length: Length
     radius: Length
@@ -151,23 +135,23 @@ class Connector(Model):
 
 
 class ArmSpec(Model):
-    """A ViperX 300 S on the world plane."""
+    """A ViperX 300 S."""
 
-    name: Literal["left", "right"]
-    base: Vector
+    name: ArmName
+    base: Vector  # position of its base link
     sleep: tuple[JointAngle, JointAngle, JointAngle, JointAngle, JointAngle, JointAngle]
 
 
 class FixedMount(Model):
-    """A camera that stands still: it looks along +x, turned left by `yaw_deg` and down by `pitch_down_deg`."""
+    """A camera that does not move: it looks along +x, turned left by `yaw_deg` and down by `pitch_down_deg`."""
 
     position: Vector
-    pitch_down_deg: Degrees
-    yaw_deg: Degrees = 0.0
+    pitch_down_deg: SignedDegrees
+    yaw_deg: SignedDegrees = 0.0
 
     @property
     def world_from_camera(self) -> RigidTransform:
-        """Pose of the optical frame (x right, y down, z forward)."""
+        """Pose of the optical frame (x right, y down, z forward) in the world."""
         turn = Rotation.from_euler("ZY", [self.yaw_deg, self.pitch_down_deg], degrees=True)
         return RigidTransform.from_components(self.position, turn * OPTICAL)
 
@@ -175,8 +159,8 @@ class FixedMount(Model):
 class WristMount(Model):
     """A camera on an arm's wrist link (before the last joint), looking along the link's x axis."""
 
-    arm: Literal["left", "right"]
-    offset: tuple[Near, Near, Near]  # metres, in the wrist link's frame
+    arm: ArmName
+    offset: tuple[MountOffset, MountOffset, MountOffset]
 
     @property
     def wrist_from_camera(self) -> RigidTransform:
@@ -184,7 +168,7 @@ class WristMount(Model):
         return RigidTransform.from_components(self.offset, OPTICAL)
 
 
-# An optical frame (x right, y down, z forward) in a body frame (x forward, y left, z up).
+# Rotation body_from_optical: an optical frame (x right, y down, z forward) in a body frame (x forward, y left, z up).
 OPTICAL = Rotation.from_matrix([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 
 
@@ -194,10 +178,12 @@ class CameraSpec(Model):
     name: Literal["rear", "wrist"]
     width: Annotated[int, Field(ge=16, le=4096)]
     height: Annotated[int, Field(ge=16, le=4096)]
-    rate: Annotated[int, Field(ge=1, le=120)]  # frames a second
+    rate: Annotated[int, Field(ge=1, le=120)]  # Hz
     horizontal_fov_deg: Annotated[float, Field(gt=1, lt=170)]  # of the colour image, to which depth is aligned
-    depth_fov_deg: Annotated[float, Field(gt=1, lt=170)]  # of the depth imager, which sets its noise
-    baseline: Length
+    depth_fov_deg: Annotated[
+        float, Field(gt=1, lt=170)
+    ]  # horizontal, of the depth imager; the depth noise depends on it
+    baseline: Length  # between the two depth imagers
     mount: FixedMount | WristMount
 
     @property
@@ -207,10 +193,10 @@ class CameraSpec(Model):
 
 
 class Latencies(Model):
-    """Seconds charged on the simulated clock."""
+    """Simulated seconds that sensing and planning cost."""
 
-    image: Seconds  # exposure to estimate
-    plan: Seconds
+    image: Seconds  # from an exposure until its frame can be read
+    plan: Seconds  # for a motion plan
 
 
 class KnownCell(Model):
@@ -218,30 +204,30 @@ class KnownCell(Model):
 
     boxes: tuple[Box, ...]  # floor, panels
     sockets: tuple[Socket, ...]
-    plugged_into: str  # the socket that holds the connector at the start
+    plugged_into: str  # name of the socket that holds the connector at the start
     clip: Clip
     connector: Connector
-    cable_length: Length  # metres of the flexible part
+    cable_length: Length  # of the flexible part
     arms: tuple[ArmSpec, ...]
     cameras: tuple[CameraSpec, ...]
     latencies: Latencies
 
     def solids(self) -> list[Box]:
-        """All that stands fast and is known: floor, panels, clip bracket, and the sockets' blocks in upright boxes."""
+        """All fixed and known obstacles: floor, panels, clip bracket, and the bounding boxes of the sockets' blocks."""
         return [*self.boxes, *self.clip.bracket, *(socket.upright_box() for socket in self.sockets)]
 
     @property
-    def cable_anchor(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Where the cable leaves its other end's socket, the last one's mouth, (3,) m, and its direction there."""
+    def cable_anchor(self) -> tuple[FloatArray, FloatArray]:
+        """Where the cable's fixed end leaves the last socket: position (3,) m and unit direction (3,) of the cable."""
         socket = self.sockets[-1]
         axis = np.asarray(socket.axis) / np.linalg.norm(socket.axis)
         return np.asarray(socket.center) - 0.5 * socket.size[1] * axis, -axis
 
     def socket(self, name: str) -> Socket:
-        """The socket of that name; `PLUGGED_INTO` is the one that holds the connector at the start.
+        """The socket of that name; `PLUGGED_INTO` means the one that holds the connector at the start.
 
         Raises:
-            KeyError: there is none; the message lists those that exist.
+            KeyError: no socket has that name; the message lists those that exist.
         """
         name = self.plugged_into if name == PLUGGED_INTO else name
         for socket in self.sockets:
@@ -250,84 +236,16 @@ class KnownCell(Model):
         raise KeyError(f"no socket {name!r}; there are {', '.join(s.name for s in self.sockets)}")
 
     def arm(self, name: str) -> ArmSpec:
-        """The arm of that name."""
+        """The arm of that name. Raises StopIteration if there is none."""
         return next(a for a in self.arms if a.name == name)
 
     def camera(self, name: str) -> CameraSpec:
-        """The camera of that name."""
+        """The camera of that name. Raises StopIteration if there is none."""
         return next(c for c in self.cameras if c.name == name)
 
 
-class Stiffness(Model):
-    """Bending stiffness EI in N m2 for each gravity: the cable is stiffened for tests on Earth, as in the thesis."""
-
-    zero: Annotated[float, Field(ge=1e-4, le=10)]
-    earth: Annotated[float, Field(ge=1e-4, le=10)]
-
-
-class Cable(Model):
-    """The flexible part of the cable, clamped at `anchor`, at rest straight along `anchor_axis`."""
-
-    length: Length
-    radius: Annotated[float, Field(ge=1e-4, le=0.03)]
-    mass_per_length: Mass  # kg/m
-    links: Annotated[int, Field(ge=4, le=30)]  # PyBullet reads at most 31 spherical joints
-    stiffness: Stiffness
-    damping_ratio: Annotated[float, Field(ge=0, le=10)]
-    anchor: Vector
-    anchor_axis: Direction
-    color: Color
-
-
-class Errors(Model):
-    """How wrong the cell is; one draw a seed unless said otherwise."""
-
-    camera_position: Deviation  # standard deviation, each axis
-    camera_angle_deg: Angle
-    depth_scale: Annotated[float, Field(ge=0, le=0.5)]
-    arm_tool: Deviation  # size of the tool's position error that the joint offsets make
-    finger_noise: Deviation  # standard deviation of every reading
-    finger_backlash: Deviation
-    finger_resolution: Annotated[float, Field(ge=1e-9, le=0.1)]  # metres
-    finger_rate: Annotated[int, Field(ge=1, le=480)]
-    depth_subpixel: Annotated[float, Field(ge=0, le=10)]  # disparity noise in pixels
-    depth_fixed_share: Fraction  # share of the depth noise's variance that stays while the scene is still
-
-
-class Light(Model):
-    """One far light with shadow, and ambient light."""
-
-    direction: Direction  # from the scene to the light
-    ambient: Fraction
-    diffuse: Fraction
-    direction_jitter_deg: Angle
-    brightness_jitter: Fraction  # standard deviation of the factor on ambient and diffuse, one draw a seed
-
-
-class GripperSpec(Model):
-    """The jaw: pads on the fingers, and how hard it presses."""
-
-    pad_thickness: Annotated[float, Field(ge=1e-4, le=0.02)]
-    max_force: Force  # newtons a finger
-    speed: Annotated[float, Field(ge=1e-3, le=10)]  # m/s a finger
-    friction: Friction
-
-
-class HiddenWorld(Model):
-    """What only the world knows."""
-
-    step_rate: Annotated[int, Field(ge=240, le=4800, multiple_of=240)]  # physics steps a second
-    solver_iterations: Annotated[int, Field(ge=10, le=500)]
-    cable: Cable
-    connector_mass: Mass
-    connector_friction: Friction
-    gripper: GripperSpec
-    errors: Errors
-    light: Light
-
-
 class Cell(Model):
-    """A cell file."""
+    """Contents of a cell file."""
 
     known: KnownCell
     hidden: HiddenWorld

@@ -1,4 +1,4 @@
-"""What a robot cell offers to the software above it. `sim` fulfils these; a real cell would too."""
+"""Devices of a robot cell as protocols. `sim` implements them; drivers of a real cell would do so in its place."""
 
 from typing import Protocol
 
@@ -10,7 +10,7 @@ TICK = 0.05  # simulated s between two ticks of a behaviour tree
 
 
 class Clock(Protocol):
-    """The one clock."""
+    """The clock of a run; all stamps and timeouts are in its seconds."""
 
     def now(self) -> float:
         """Seconds since the run began."""
@@ -18,7 +18,7 @@ class Clock(Protocol):
 
 
 class Arm(Protocol):
-    """A six-joint arm with position servos."""
+    """An arm with six position-controlled joints."""
 
     name: str
 
@@ -27,7 +27,7 @@ class Arm(Protocol):
         ...
 
     def follow(self, trajectory: Trajectory) -> None:
-        """Start to follow a trajectory now; it replaces one under way. It must begin where the arm is."""
+        """Start to follow `trajectory` now, in place of one under way. It must begin at the arm's present position."""
         ...
 
     def stop(self) -> None:
@@ -35,7 +35,7 @@ class Arm(Protocol):
         ...
 
     def is_moving(self) -> bool:
-        """Whether a trajectory or a braking is under way (commanded, not measured)."""
+        """Whether the arm still executes a trajectory or brakes, by what was commanded, not by measurement."""
         ...
 
 
@@ -43,15 +43,15 @@ class Gripper(Protocol):
     """A two-finger parallel gripper."""
 
     def open(self, gap: float) -> None:
-        """Drive the pads to a distance of `gap` metres."""
+        """Move the pads until they are `gap` metres apart."""
         ...
 
     def close(self, force: float) -> None:
-        """Drive the pads together and press with `force` newtons a finger until told otherwise."""
+        """Close, and press with `force` newtons on each finger until the next command."""
         ...
 
     def reading(self) -> GripperReading:
-        """The newest finger reading."""
+        """The newest reading of the finger encoder."""
         ...
 
 
@@ -61,5 +61,5 @@ class Camera(Protocol):
     name: str
 
     def latest(self) -> RgbdFrame | None:
-        """The newest frame whose latency has passed, the same however often it is asked for; None before the first."""
+        """The newest frame whose latency has passed, None before the first. Reading it changes nothing."""
         ...

@@ -1,6 +1,6 @@
-"""What may go wrong in a run, as a scenario file says it: when it begins, how long it lasts, and its numbers.
+"""The faults that a scenario file may ask for: when each begins, how long it lasts, and its numbers. SI units.
 
-The file gives ranges for the moment; `drawn` picks one, after which a range holds one value twice. SI units.
+The file gives ranges for the beginning. `When.drawn` picks a value from each; a drawn range holds that value twice.
 """
 
 from typing import Annotated, Literal, Self
@@ -8,10 +8,10 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import AfterValidator, Field, model_validator
 
-from regrasp.interfaces.cell import Direction, Fraction, Model, Vector
+from regrasp.interfaces.cell import ArmName
+from regrasp.interfaces.fields import Direction, Fraction, Model, Vector
 
 Phase = Literal["unplugged", "carried", "lost", "settled", "regrasped"]
-ArmName = Literal["left", "right"]
 JointName = Literal["waist", "shoulder", "elbow", "forearm_roll", "wrist_angle", "wrist_rotate"]
 JOINT_NAMES: tuple[JointName, ...] = ("waist", "shoulder", "elbow", "forearm_roll", "wrist_angle", "wrist_rotate")
 
@@ -22,33 +22,38 @@ def _in_order(span: tuple[float, float]) -> tuple[float, float]:
     return span
 
 
-Second = Annotated[float, Field(ge=0, le=3600)]
-Seconds = Annotated[tuple[Second, Second], AfterValidator(_in_order)]
-Shares = Annotated[tuple[Fraction, Fraction], AfterValidator(_in_order)]
-Some = Annotated[float, Field(gt=0, le=1)]  # a share that is not nothing
+SimTime = Annotated[float, Field(ge=0, le=3600)]  # seconds
+TimeRange = Annotated[tuple[SimTime, SimTime], AfterValidator(_in_order)]
+FractionRange = Annotated[tuple[Fraction, Fraction], AfterValidator(_in_order)]
+PositiveFraction = Annotated[float, Field(gt=0, le=1)]
 
 
 class When(Model):
     """When a fault begins: exactly one of `at`, `carried`, `node` and `phase`. Each fault begins once."""
 
-    at: Seconds | None = Field(
-        default=None, description="Simulated seconds; drawn between the two.", examples=[[5.0, 8.0]]
+    at: TimeRange | None = Field(
+        default=None, description="Simulated seconds; drawn from this range.", examples=[[5.0, 8.0]]
     )
-    carried: Shares | None = Field(
+    carried: FractionRange | None = Field(
         default=None,
-        description="Share of the straight way from socket to clip that the held connector has come; drawn between.",
+        description="Share of the straight line from socket to clip that the held connector has moved along; "
+        "drawn from this range.",
         examples=[[0.3, 0.6]],
     )
     node: str | None = Field(
-        default=None, description="A node of the tree is entered: its path or the last name of it.", examples=["insert"]
+        default=None,
+        description="A node of the tree is entered: its path, or the end of its path.",
+        examples=["insert"],
     )
-    after: Seconds | None = Field(
-        default=None, description="With `node`: seconds from its entering; drawn between.", examples=[[0.5, 1.5]]
+    after: TimeRange | None = Field(
+        default=None,
+        description="With `node`: seconds after it is entered; drawn from this range.",
+        examples=[[0.5, 1.5]],
     )
     phase: Phase | None = Field(
         default=None,
-        description="By the world's truth: the plug is out; the held end is 0.1 m from its socket; no pad has touched "
-        "it for 0.2 s; it rests then; both pads hold it again.",
+        description="By ground truth: the plug is out; the held connector is 0.1 m from its socket; no pad has touched "
+        "it for 0.2 s; after that it is at rest; both pads hold it again.",
         examples=["settled"],
     )
 
@@ -64,44 +69,44 @@ class When(Model):
         return self
 
     def drawn(self, rng: np.random.Generator) -> "When":
-        """This, with each range shrunk to a value drawn from it."""
+        """A copy in which each range is one value, drawn uniformly from it, twice."""
         spans = {name: getattr(self, name) for name in ("at", "carried", "after")}
         values = {name: float(rng.uniform(*span)) for name, span in spans.items() if span is not None}
         return self.model_copy(update={name: (value, value) for name, value in values.items()})
 
 
 class Fault(Model):
-    """What all faults share."""
+    """Base of all faults."""
 
     when: When = Field(description="When it begins.", examples=[{"at": [5.0, 8.0]}])
 
 
 class Lasting(Fault):
-    """A fault that may end."""
+    """A fault that may end before the run does."""
 
     seconds: Annotated[float, Field(gt=0, le=600)] | None = Field(
-        default=None, description="Seconds that it lasts; without it, to the run's end.", examples=[2.0]
+        default=None, description="How long it lasts, in seconds; without it, to the end of the run.", examples=[2.0]
     )
 
 
 class JawOpens(Lasting):
-    """The right jaw drives open, whatever it is told."""
+    """The right gripper drives open, whatever it is commanded."""
 
     type: Literal["jaw_opens"] = Field(description="This fault.", examples=["jaw_opens"])
     seconds: Annotated[float, Field(gt=0, le=600)] | None = Field(
-        default=1.0, description="Seconds that it lasts; null for to the run's end.", examples=[1.0]
+        default=1.0, description="How long it lasts, in seconds; null means to the end of the run.", examples=[1.0]
     )
 
 
 class JawWeakens(Lasting):
-    """The right jaw presses with a share of the force that it is told."""
+    """The right gripper presses with only a share of the force that it is commanded."""
 
     type: Literal["jaw_weakens"] = Field(description="This fault.", examples=["jaw_weakens"])
     force_share: Fraction = Field(description="Share of the force, 0 to 1.", examples=[0.05])
 
 
 class JawStuck(Lasting):
-    """The right jaw goes on with its last command and takes no new one, as with a broken bus."""
+    """The right gripper keeps its last command and takes no new one, as with a broken bus."""
 
     type: Literal["jaw_stuck"] = Field(description="This fault.", examples=["jaw_stuck"])
 
@@ -113,35 +118,35 @@ class CameraFault(Lasting):
 
 
 class CameraDrops(CameraFault):
-    """Frames get lost: nothing new comes in their place. With a share of 1 the stream stands still."""
+    """Frames get lost, and none comes in their place. With a share of 1 the stream stops."""
 
     type: Literal["camera_drops"] = Field(description="This fault.", examples=["camera_drops"])
-    share: Some = Field(description="Share of the frames that get lost, drawn frame by frame.", examples=[0.7])
+    share: PositiveFraction = Field(description="Share of the frames that get lost; each is drawn.", examples=[0.7])
 
 
 class CameraFreezes(CameraFault):
-    """The same picture comes again and again, with fresh stamps and numbers, as from a driver that reuses a buffer.
+    """The same picture is repeated with new stamps and numbers, as by a driver that reuses a buffer.
 
-    A stream whose stamps stand still too is `camera_drops` with a share of 1.
+    For a stream whose stamps stop too, use `camera_drops` with a share of 1.
     """
 
     type: Literal["camera_freezes"] = Field(description="This fault.", examples=["camera_freezes"])
 
 
 class CameraDark(CameraFault):
-    """The lens is covered: 2 % of the light comes through, and no depth is measured."""
+    """The lens is covered: 2 % of the light passes, and no depth is measured."""
 
     type: Literal["camera_dark"] = Field(description="This fault.", examples=["camera_dark"])
 
 
 class CameraLosesDepth(CameraFault):
-    """The depth image holds no reading; the colour image is as ever."""
+    """The depth image has no readings; the colour image is as before."""
 
     type: Literal["camera_loses_depth"] = Field(description="This fault.", examples=["camera_loses_depth"])
 
 
 class LightChanges(Lasting):
-    """The cell's light gets brighter or darker, or comes from elsewhere."""
+    """The cell's light becomes brighter or darker, or comes from another direction."""
 
     type: Literal["light_changes"] = Field(description="This fault.", examples=["light_changes"])
     factor: Annotated[float, Field(ge=0.02, le=3)] = Field(
@@ -149,7 +154,7 @@ class LightChanges(Lasting):
     )
     direction: Direction | None = Field(
         default=None,
-        description="From the scene to the light, any length; without it, as before.",
+        description="From the scene to the light, of any length; without it, as before.",
         examples=[[0.5, -1.0, 1.0]],
     )
 
@@ -162,45 +167,45 @@ class JointFault(Fault):
 
 
 class JointStalls(JointFault, Lasting):
-    """The joint's drive jams: it holds where it is, the encoder reads on."""
+    """The joint's drive jams: the joint stays where it is, and its encoder goes on reading."""
 
     type: Literal["joint_stalls"] = Field(description="This fault.", examples=["joint_stalls"])
 
 
 class JointLags(JointFault, Lasting):
-    """The joint's drive is weak: it turns no faster than a share of the maker's pi rad/s."""
+    """The joint's drive is weak: it turns no faster than a share of its rated speed, pi rad/s."""
 
     type: Literal["joint_lags"] = Field(description="This fault.", examples=["joint_lags"])
-    speed_share: Some = Field(description="Share of pi rad/s.", examples=[0.15])
+    speed_share: PositiveFraction = Field(description="Share of pi rad/s.", examples=[0.15])
 
 
 class EncoderJumps(JointFault):
-    """The encoder slips on its shaft: readings are off from then on. The drive's own sensor does not notice."""
+    """The encoder slips on its shaft: its readings are off from then on. The drive's own sensor stays right."""
 
     type: Literal["encoder_jumps"] = Field(description="This fault.", examples=["encoder_jumps"])
     angle: Annotated[float, Field(ge=-3.2, le=3.2)] = Field(
-        description="Rad by which it reads more from then on.", examples=[0.3]
+        description="Radians by which its readings are too large from then on.", examples=[0.3]
     )
 
 
 class ObstacleMovesIn(Fault):
-    """One of the scenario's obstacles slides, with its stand, along a line; it does not yield to what it meets."""
+    """One of the scenario's obstacles slides along a line, with its stand. Contacts do not stop it."""
 
     type: Literal["obstacle_moves_in"] = Field(description="This fault.", examples=["obstacle_moves_in"])
     obstacle: str = Field(description="Name of one of the scenario's obstacles.", examples=["short"])
-    by: Vector = Field(description="Metres along x, y and z from where it stands.", examples=[[0.0, -0.5, 0.0]])
+    by: Vector = Field(description="Displacement along x, y and z in metres.", examples=[[0.0, -0.5, 0.0]])
     speed: Annotated[float, Field(gt=0, le=2)] = Field(default=0.25, description="Metres a second.", examples=[0.25])
 
 
 class ConnectorKnocked(Fault):
-    """A push on the connector's centre, shared evenly over 20 ms."""
+    """A push on the connector's centre: a constant force for 20 ms."""
 
     type: Literal["connector_knocked"] = Field(description="This fault.", examples=["connector_knocked"])
     impulse: Vector = Field(description="Newton seconds along x, y and z, each at most 5.", examples=[[0.0, 0.1, 0.05]])
 
 
 class CableSnags(Lasting):
-    """The cable catches on something: a soft spring ties one of its links to where that link was."""
+    """The cable catches on something: a soft spring ties one of its links to the place where it was."""
 
     type: Literal["cable_snags"] = Field(description="This fault.", examples=["cable_snags"])
     along: Fraction = Field(
@@ -210,20 +215,20 @@ class CableSnags(Lasting):
         default=100.0, description="Newtons a metre.", examples=[100.0]
     )
     max_force: Annotated[float, Field(gt=0, le=200)] = Field(
-        default=20.0, description="Newtons that the spring never exceeds.", examples=[20.0]
+        default=20.0, description="Largest force of the spring in newtons.", examples=[20.0]
     )
 
 
 class ServiceFault(Lasting):
-    """A fault of the robot's software: nothing in the world changes."""
+    """A fault of the robot's software; the world does not change."""
 
     calls: Annotated[int, Field(ge=1, le=1000)] | None = Field(
-        default=None, description="Ends after so many calls, if its seconds are not over before.", examples=[1]
+        default=None, description="Ends after so many calls, or when its seconds are over.", examples=[1]
     )
 
 
 class ServiceRaises(ServiceFault):
-    """A service that the leaves call breaks off with an error."""
+    """A service that the leaves call raises an error."""
 
     type: Literal["service_raises"] = Field(description="This fault.", examples=["service_raises"])
     service: Literal[
@@ -238,7 +243,7 @@ class ServiceRaises(ServiceFault):
 
 
 class PlanningFindsNothing(ServiceFault):
-    """The planner finds no way."""
+    """The motion planner finds no path."""
 
     type: Literal["planning_finds_nothing"] = Field(description="This fault.", examples=["planning_finds_nothing"])
 

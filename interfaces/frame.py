@@ -1,14 +1,21 @@
-"""Camera images as they cross rooms."""
+"""Images of an RGB-D camera, and its intrinsics."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from regrasp.interfaces.arrays import FloatArray
+
 
 @dataclass(frozen=True)
 class Intrinsics:
-    """A pinhole camera without distortion. Lengths in pixels; pixel (0, 0) is the centre of the top left pixel."""
+    r"""A pinhole camera without lens distortion. Lengths are in pixels; (0, 0) is the centre of the top left pixel.
+
+    A point (x, y, z) of the optical frame (x right, y down, z forward) is projected to
+
+    .. math:: u = f_x x / z + c_x, \quad v = f_y y / z + c_y
+    """
 
     width: int
     height: int
@@ -19,19 +26,26 @@ class Intrinsics:
 
     @classmethod
     def from_fov(cls, width: int, height: int, horizontal_fov: float) -> "Intrinsics":
-        """Square pixels, principal point in the middle; `horizontal_fov` in radians."""
+        """Intrinsics with square pixels and the principal point in the middle; `horizontal_fov` in radians."""
         f = 0.5 * width / float(np.tan(0.5 * horizontal_fov))
         return cls(width, height, f, f, (width - 1) / 2, (height - 1) / 2)
 
 
 @dataclass(frozen=True, eq=False)
 class RgbdFrame:
-    """One exposure of an RGB-D camera, depth aligned to colour.
+    """One exposure of an RGB-D camera, with depth aligned to colour.
 
-    `rgb` is (H, W, 3) uint8; `depth` is (H, W) float32 metres along the optical axis, 0 where there is no reading;
-    `stamp` is the simulated second of the exposure; `number` counts exposures of this camera since the start.
-    `joints` are the encoder readings (6,) rad, at the exposure, of the arm that carries the camera; None for a fixed
-    one. Raises ValueError for images of another shape or type.
+    Attributes:
+        camera: The camera's name.
+        number: Counts the exposures of this camera since the start.
+        stamp: Simulated second of the exposure.
+        rgb: (H, W, 3) uint8.
+        depth: (H, W) float32, metres along the optical axis, 0 where there is no reading.
+        intrinsics: Of both images.
+        joints: Encoder readings (6,) rad at the exposure, of the arm that carries the camera; None for a fixed camera.
+
+    Raises:
+        ValueError: an image has another shape or type than the above.
     """
 
     camera: str
@@ -40,7 +54,7 @@ class RgbdFrame:
     rgb: NDArray[np.uint8]
     depth: NDArray[np.float32]
     intrinsics: Intrinsics
-    joints: NDArray[np.float64] | None = None
+    joints: FloatArray | None = None
 
     def __post_init__(self) -> None:
         shape = (self.intrinsics.height, self.intrinsics.width)

@@ -1,24 +1,23 @@
-"""Joint and finger readings as they cross rooms."""
+"""Readings of an arm's encoders and of a gripper's."""
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
+from regrasp.interfaces.arrays import FloatArray
 
 
 @dataclass(frozen=True, eq=False)
 class JointReading:
-    """What an arm's encoders and motor drivers say: positions (6,) rad, velocities (6,) rad/s, efforts (6,) N m."""
+    """An arm's encoders and drives at `stamp` s: positions (6,) rad, velocities (6,) rad/s, efforts (6,) N m."""
 
     stamp: float
-    positions: NDArray[np.float64]
-    velocities: NDArray[np.float64]
-    efforts: NDArray[np.float64]
+    positions: FloatArray
+    velocities: FloatArray
+    efforts: FloatArray
 
 
 @dataclass(frozen=True)
 class GripperReading:
-    """What the finger encoder says: `gap` is the distance between the pads in metres."""
+    """A gripper's finger encoder at `stamp` s: `gap` is the distance between the pads in metres."""
 
     stamp: float
     gap: float

@@ -1,9 +1,13 @@
-"""What a scenario puts into the cell, already drawn from the seed where it varies."""
+"""What a scenario adds to the cell. Where the scenario varies, the values are already drawn from the seed."""
 
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-from regrasp.interfaces.cell import Box, Color
+from scipy.spatial.transform import RigidTransform
+
+from regrasp.interfaces.cell import Box
+from regrasp.interfaces.fault import AnyFault
+from regrasp.interfaces.fields import Color
 
 Gravity = Literal["zero", "earth"]
 GRAVITIES: tuple[Gravity, ...] = get_args(Gravity)
@@ -12,7 +16,7 @@ EARTH_GRAVITY = 9.81  # m/s2
 
 @dataclass(frozen=True)
 class Obstacle:
-    """A foam piece: a box turned by `yaw` rad about z, and the thin stand under one that is off the floor."""
+    """A piece of foam: a box turned by `yaw` rad about z. One that is off the floor has a thin stand under it."""
 
     box: Box
     yaw: float
@@ -21,11 +25,25 @@ class Obstacle:
 
 @dataclass(frozen=True)
 class Prop:
-    """A thing that is seen and stops nothing. `size` in m: a box's edges; a ball's radius; a rod's length and radius.
+    """A visible object without a collision shape. Its frame is at its centre; a rod lies along x.
 
-    Its frame is at its middle, a rod lies along x.
+    `size` in m: (x, y, z) edges of a box; (radius,) of a ball; (length, radius) of a rod.
     """
 
     kind: Literal["box", "ball", "rod"]
     size: tuple[float, ...]
     color: Color
+
+
+@dataclass(frozen=True)
+class SceneSetup:
+    """What one run adds to the cell.
+
+    `connector_at` is the pose world_from_connector at the start, on a stand; None for the connector in its socket. The
+    props are out of sight until they are placed.
+    """
+
+    obstacles: tuple[Obstacle, ...] = ()
+    faults: tuple[AnyFault, ...] = ()
+    connector_at: RigidTransform | None = None
+    props: tuple[Prop, ...] = ()

@@ -1,16 +1,15 @@
-"""A timed joint path."""
+"""A joint trajectory: a path with times."""
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from regrasp.interfaces.arrays import FloatArray
 
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """Joint samples: `times` (n,) s from 0, strictly increasing; `positions`, `velocities` (n, 6) rad, rad/s."""
+    """Samples: `times` (n,) s, from 0 on and strictly increasing; `positions` (n, 6) rad; `velocities` (n, 6) rad/s."""
 
     times: FloatArray
     positions: FloatArray
@@ -18,11 +17,18 @@ class Trajectory:
 
     @property
     def duration(self) -> float:
-        """Seconds from the first sample to the last."""
+        """Time of the last sample, s."""
         return float(self.times[-1])
 
     def sample(self, t: float) -> tuple[FloatArray, FloatArray]:
-        """Position (6,) rad and velocity (6,) rad/s at second `t`: cubic Hermite pieces, clamped at the ends."""
+        r"""Position (6,) rad and velocity (6,) rad/s at second `t`, clamped to the first and last sample.
+
+        Between two samples, `h` seconds apart, the path is a cubic Hermite spline:
+
+        .. math:: q(s) = (2s^3 - 3s^2 + 1) p_0 + (s^3 - 2s^2 + s) h v_0 + (3s^2 - 2s^3) p_1 + (s^3 - s^2) h v_1
+
+        with :math:`s = (t - t_0) / h`; the velocity is its derivative.
+        """
         if t <= 0.0:
             return self.positions[0], self.velocities[0]
         if t >= self.times[-1]:

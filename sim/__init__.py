@@ -1,11 +1,11 @@
-"""The world: arms, cable, sockets, cameras and their noise, faults, ground truth."""
+"""The simulated world: arms, cable, sockets, cameras and their noise, faults, ground truth."""
 
 import contextlib
 import os
 
 
 def _import_quietly() -> None:
-    """Import PyBullet once without the line that it prints on standard error from below Python."""
+    """Import PyBullet for the first time, without the line that its C code prints on standard error."""
     with contextlib.ExitStack() as stack:
         with contextlib.suppress(OSError):  # standard error may be closed
             kept, null = os.dup(2), os.open(os.devnull, os.O_WRONLY)

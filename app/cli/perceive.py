@@ -15,7 +15,7 @@ from regrasp.app.records import folders
 from regrasp.app.scenario.cell_file import load_cell
 from regrasp.app.scenario.load import load_scenario
 from regrasp.app.scenario.schema import MAX_SEED
-from regrasp.interfaces.cell import Color
+from regrasp.interfaces.fields import Color
 from regrasp.interfaces.quote import nearest, quoted
 
 T = TypeVar("T")

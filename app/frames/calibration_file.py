@@ -11,7 +11,7 @@ from regrasp.app.files.resources import read_text
 from regrasp.app.files.validation import validated
 from regrasp.app.files.whole_file import write_whole
 from regrasp.app.files.yaml_lines import parse
-from regrasp.interfaces.cell import Model, NotNegative, Number, Positive
+from regrasp.interfaces.fields import Model, NotNegative, Number, Positive
 from regrasp.interfaces.frame import Intrinsics
 
 Pixels = Annotated[int, Field(ge=16, le=16384)]

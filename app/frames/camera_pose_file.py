@@ -13,7 +13,7 @@ from regrasp.app.files.resources import read_text
 from regrasp.app.files.validation import validated
 from regrasp.app.files.whole_file import write_whole
 from regrasp.app.files.yaml_lines import parse
-from regrasp.interfaces.cell import Model, Number, Vector
+from regrasp.interfaces.fields import Model, Number, Vector
 
 LENGTH_TOLERANCE = 0.01  # of a quaternion's length against 1; it is then normalized
 

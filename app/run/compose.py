@@ -13,6 +13,7 @@ from regrasp.app.scenario.sampling import draw_faults, draw_obstacles
 from regrasp.app.tasks.cable.judge import Judge
 from regrasp.behaviors import LEAVES
 from regrasp.behaviors.services import Services
+from regrasp.interfaces.scene import SceneSetup
 from regrasp.motion.service import Motion
 from regrasp.perception.service import Perception
 from regrasp.sim.ground_truth import GroundTruth
@@ -37,7 +38,8 @@ def build_world(scenario: Scenario, seed: int, renderer: RendererName = "auto", 
     rng = np.random.default_rng([seed, 0])
     obstacles = draw_obstacles(scenario.file, rng)
     faults = draw_faults(scenario.file, rng)
-    return World(scenario.lit_cell, scenario.file.gravity, seed, obstacles, faults, renderer, gui)
+    setup = SceneSetup(obstacles, faults)
+    return World(scenario.lit_cell, scenario.file.gravity, seed, setup, renderer, gui)
 
 
 def build_services(world: World, seed: int, log: Any) -> Services:

@@ -75,7 +75,7 @@ def run_episode(
             episode = assemble(scenario, world, seed, log)
             observers.assembled(episode)
             ticks = TickLog(episode.tree.root, record.ticks, world.now)
-            faults = [EnteredNodes(episode.tree.root, world.notice), FaultLog(world.faults, log)]
+            faults = [EnteredNodes(episode.tree.root, world.note_entered), FaultLog(world.faults, log)]
             episode.tree.visitors += [ticks, episode.attempts, *faults]
             note_leaf_at_work(episode.tree, lambda node: record.at_work(world.now(), node))
             with Film(out / "video.mp4" if video and out else None, world) as film:

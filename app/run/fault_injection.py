@@ -9,7 +9,7 @@ from regrasp.behaviors.services import Services
 from regrasp.interfaces.cause import CauseCode, ServiceError
 from regrasp.interfaces.fault import PlanningFindsNothing, ServiceFault, ServiceRaises
 from regrasp.motion.failure import PlanningError
-from regrasp.sim.faults.faults import Fault
+from regrasp.sim.faults.faults import ScheduledFault
 from regrasp.trees import node_paths
 
 
@@ -30,7 +30,7 @@ class EnteredNodes(py_trees.visitors.VisitorBase):
 class FaultLog(py_trees.visitors.VisitorBase):
     """A visitor of the tree that logs when each fault begins and ends."""
 
-    def __init__(self, faults: Iterable[Fault], log: Any) -> None:
+    def __init__(self, faults: Iterable[ScheduledFault], log: Any) -> None:
         super().__init__(full=False)
         self._faults, self._log = list(faults), log
         self._told: set[tuple[int, str]] = set()
@@ -44,7 +44,7 @@ class FaultLog(py_trees.visitors.VisitorBase):
                     self._log.info(f"fault {event}", fault=fault.spec.type, at=round(at, 4))
 
 
-def break_services(services: Services, faults: Iterable[Fault], now: Callable[[], float]) -> None:
+def break_services(services: Services, faults: Iterable[ScheduledFault], now: Callable[[], float]) -> None:
     """Wrap the calls that the software faults concern: while a fault is active, its call raises."""
     for fault in faults:
         spec = fault.spec
@@ -61,7 +61,7 @@ def break_services(services: Services, faults: Iterable[Fault], now: Callable[[]
 
 
 def _breaking(
-    call: Callable[..., Any], fault: Fault, spec: ServiceFault, error: Exception, now: Callable[[], float]
+    call: Callable[..., Any], fault: ScheduledFault, spec: ServiceFault, error: Exception, now: Callable[[], float]
 ) -> Callable[..., Any]:
     broken = 0
 

@@ -7,7 +7,7 @@ from scipy.optimize import minimize
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import FloatArray
-from regrasp.interfaces.cell import Cable
+from regrasp.interfaces.hidden_world import Cable
 from regrasp.interfaces.scene import EARTH_GRAVITY, Gravity
 
 

@@ -18,7 +18,8 @@ from regrasp.app.scenario.cable_rest import rest_shape
 from regrasp.app.scenario.sampling import StandParameters
 from regrasp.app.scenario.schema import Jitter, ObstacleSize, Yaw
 from regrasp.interfaces.arrays import FloatArray
-from regrasp.interfaces.cell import PLUGGED_INTO, ArmSpec, Cell, FixedMount, KnownCell, Size, Socket, Vector, pose_along
+from regrasp.interfaces.cell import PLUGGED_INTO, ArmSpec, Cell, FixedMount, KnownCell, Socket, pose_along
+from regrasp.interfaces.fields import Size, Vector
 from regrasp.interfaces.quote import cut, quoted
 from regrasp.interfaces.scene import GRAVITIES, Gravity
 

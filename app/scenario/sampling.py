@@ -5,8 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from regrasp.app.scenario.schema import ScenarioFile
-from regrasp.interfaces.cell import Box, Color
+from regrasp.interfaces.cell import Box
 from regrasp.interfaces.fault import AnyFault
+from regrasp.interfaces.fields import Color
 from regrasp.interfaces.scene import Obstacle
 
 

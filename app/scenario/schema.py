@@ -5,8 +5,8 @@ from typing import Annotated, Any, get_args
 from pydantic import AfterValidator, Field, JsonValue
 
 from regrasp.app.tasks.cable.expectations import Expect
-from regrasp.interfaces.cell import Color, Direction, Fraction, Model, Vector
 from regrasp.interfaces.fault import AnyFault
+from regrasp.interfaces.fields import Color, Direction, Fraction, Model, Vector
 from regrasp.interfaces.scene import Gravity
 
 MAX_SEED = 2**31 - 1

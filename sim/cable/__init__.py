@@ -1,1 +1,1 @@
-"""The cable task's objects: cable, socket, clip, and how far the job is."""
+"""Objects of the cable task: the cable, its socket and clip, and the phases of the task."""

@@ -1,8 +1,17 @@
-"""The cable: one chain of capsules with spherical joints and an explicit spring-damper torque at every step.
+r"""The cable: a chain of capsules with spherical joints, each with an explicit spring-damper.
 
-Discretised rod: bending stiffness k = EI / l between links, 2 k at the clamp. An explicit spring is stable only while
-k dt^2 / I is small, so each link's inertia has a floor, and its joint damping a cap, both from the step (measured:
-without the joint damping the explicit spring gains energy). Material damping is Rayleigh's mass-proportional term.
+The chain is a discretised elastic rod. A joint between links of length l has the bending stiffness
+
+.. math:: k = EI / l,
+
+and the clamp at the fixed end 2 k. Integrated explicitly with the step :math:`\Delta t`, a joint is stable only while
+:math:`4 k \Delta t^2 / I` is below a limit. Therefore the links' inertia I is at least
+
+.. math:: I_{min} = 4 k \Delta t^2 / s^2
+
+with s the stability factor of `CableParameters`. The joint damping :math:`d = c I / (4 \Delta t)`, a share c of what an
+explicit step can bear, is needed too: without it the springs gain energy (measured). The material's damping is
+Rayleigh's mass-proportional term.
 """
 
 from dataclasses import dataclass
@@ -10,25 +19,33 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 import pybullet as p
-from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from regrasp.interfaces.cell import Cable, Connector, pose_along
-from regrasp.sim.render.printed import tag_boxes, visual
+from regrasp.interfaces.arrays import FloatArray
+from regrasp.interfaces.cell import Connector, pose_along
+from regrasp.interfaces.fields import Color
+from regrasp.interfaces.hidden_world import Cable
+from regrasp.sim.render.fiducials import compound_visual, tag_boxes
 
-FloatArray = NDArray[np.float64]
-
-STABILITY = 0.7  # sf: the fastest joint mode turns by sf radians a step
-JOINT_DAMPING = 0.6  # share of the critical step damping
 _IDENTITY = [0.0, 0.0, 0.0, 1.0]
+
+
+@dataclass(frozen=True)
+class CableParameters:
+    """Numerical stability of the chain."""
+
+    stability: float = 0.7  # rad, phase of a joint's fastest mode in a step; an explicit step diverges at 2
+    joint_damping: float = 0.6  # share of the damping at which an explicit step overshoots
 
 
 @numba.njit(cache=True)
 def spring_torques(rotations: FloatArray, rates: FloatArray, stiffness: FloatArray, damping: FloatArray) -> FloatArray:
-    """Joint torques (n, 3) N m of linear springs on the rotation vectors.
+    r"""Joint torques (n, 3) N m of linear spring-dampers on the joints' rotation vectors :math:`\theta`.
 
-    `rotations` (n, 4) are the joints' quaternions x, y, z, w; `rates` (n, 3) rad/s and the result are in the child
-    frames; `stiffness` (n,) N m/rad, `damping` (n,) N m s/rad.
+    .. math:: \tau = -k \theta - d \omega
+
+    `rotations` (n, 4) are the joints' quaternions x, y, z, w; `rates` (n, 3) rad/s. Rates and torques are in the child
+    links' frames. `stiffness` (n,) is in N m/rad, `damping` (n,) in N m s/rad.
     """
     torques = np.empty_like(rates)
     for i in range(rotations.shape[0]):
@@ -44,21 +61,26 @@ def spring_torques(rotations: FloatArray, rates: FloatArray, stiffness: FloatArr
 
 
 def first_frequency(stiffness: float, length: float, mass_per_length: float, tip_mass: float) -> float:
-    """First bending frequency, rad/s, of a cantilever with a tip mass (Rayleigh: 0.243 of the beam's mass joins it)."""
+    r"""First bending frequency, rad/s, of a cantilever with a tip mass, by Rayleigh's method.
+
+    .. math:: \omega_1 = \sqrt{3 EI / ((m_{tip} + 0.243 \mu L) L^3)}
+
+    `stiffness` EI is in N m2, `length` L in m, `mass_per_length` :math:`\mu` in kg/m, `tip_mass` in kg.
+    """
     return float(np.sqrt(3 * stiffness / ((tip_mass + 0.243 * mass_per_length * length) * length**3)))
 
 
 @dataclass(frozen=True)
 class CableBody:
-    """The chain in a PyBullet client. Links 0..n-1 are cable, link n is the connector (its frame at the centre)."""
+    """The chain in a PyBullet client. Links 0 to n - 1 are cable; link n is the connector (frame at its centre)."""
 
     client: int
     body: int
     links: int
-    link_length: float
+    link_length: float  # m
     stiffness: FloatArray  # (n,) N m/rad
     damping: FloatArray  # (n,) N m s/rad
-    connector_inertia: float  # kg m2, across the connector's axis
+    connector_inertia: float  # kg m2, about an axis across the connector
 
     @property
     def connector_link(self) -> int:
@@ -66,7 +88,7 @@ class CableBody:
         return self.links
 
     def apply_springs(self) -> None:
-        """Set the joint torques for the next step from the present bend."""
+        """Set the joint torques for the next step from the present joint rotations and rates."""
         states = p.getJointStatesMultiDof(self.body, range(self.links), physicsClientId=self.client)
         rotations = np.array([s[0] for s in states])
         rates = np.array([s[1] for s in states])
@@ -81,37 +103,24 @@ class CableBody:
         )
 
     def connector_state(self) -> tuple[RigidTransform, FloatArray, FloatArray]:
-        """world_from_connector, its centre's velocity (3,) m/s and its rate of turn (3,) rad/s, in the world."""
+        """Pose world_from_connector, velocity (3,) m/s of its centre, angular velocity (3,) rad/s; all in the world."""
         s = p.getLinkState(self.body, self.connector_link, 1, 1, physicsClientId=self.client)
         return RigidTransform.from_components(s[4], Rotation.from_quat(s[5])), np.array(s[6]), np.array(s[7])
 
-    def energy(self) -> float:
-        """Kinetic plus bending energy in J (without gravity); the links' inertia floor counts, as in the motion."""
-        return self._kinetic_energy() + self._bending_energy()
-
-    def _kinetic_energy(self) -> float:
-        links = range(self.links + 1)
-        energy = 0.0
-        for link, s in zip(links, p.getLinkStates(self.body, links, 1, 1, physicsClientId=self.client), strict=True):
-            mass, _, inertia = p.getDynamicsInfo(self.body, link, physicsClientId=self.client)[:3]
-            turn = np.array(p.getMatrixFromQuaternion(s[1])).reshape(3, 3)
-            rate = turn.T @ np.array(s[7])
-            energy += 0.5 * mass * float(np.dot(s[6], s[6])) + 0.5 * float(np.dot(inertia, rate**2))
-        return energy
-
-    def _bending_energy(self) -> float:
-        states = p.getJointStatesMultiDof(self.body, range(self.links), physicsClientId=self.client)
-        bend = Rotation.from_quat([s[0] for s in states]).magnitude()
-        return 0.5 * float(np.sum(self.stiffness * bend**2))
-
 
 def build_cable(
-    client: int, cable: Cable, connector: Connector, connector_mass: float, stiffness: float, step: float
+    client: int,
+    cable: Cable,
+    connector: Connector,
+    connector_mass: float,
+    stiffness: float,
+    step: float,
+    parameters: CableParameters = CableParameters(),
 ) -> CableBody:
     """Create the chain, straight and at rest. `stiffness` is EI in N m2, `step` the physics step in s."""
     n, length = cable.links, cable.length / cable.links
     bend = stiffness / length
-    inertia = max(4 * bend * step**2 / STABILITY**2, cable.mass_per_length * length**3 / 12)
+    inertia = max(4 * bend * step**2 / parameters.stability**2, cable.mass_per_length * length**3 / 12)
     body = _create_chain(client, cable, connector, connector_mass)
     across = _set_inertias(client, body, n, inertia, connector, connector_mass)
     first = first_frequency(stiffness, cable.length, cable.mass_per_length, connector_mass)
@@ -127,7 +136,7 @@ def build_cable(
     _switch_motors_off(client, body, n)
     springs = np.full(n, bend)
     springs[0] *= 2
-    damping_time = JOINT_DAMPING / (step * 4 * bend / inertia)
+    damping_time = parameters.joint_damping / (step * 4 * bend / inertia)
     return CableBody(client, body, n, length, springs, springs * damping_time, across)
 
 
@@ -137,7 +146,7 @@ def _create_chain(client: int, cable: Cable, connector: Connector, connector_mas
     end = _shapes(client, p.GEOM_CYLINDER, connector.radius, connector.length, 0.0, connector.color)
     if connector.tag is not None:
         body = (connector.radius, connector.length, connector.color)
-        end = end[0], visual(client, tag_boxes(connector.tag), connector.tag.body_from_tag, body)
+        end = end[0], compound_visual(client, tag_boxes(connector.tag), connector.tag.body_from_tag, body)
     collisions, visuals = zip(*[link] * n, end, strict=True)
     origin = pose_along(cable.anchor, cable.anchor_axis)
     return int(
@@ -162,10 +171,8 @@ def _create_chain(client: int, cable: Cable, connector: Connector, connector_mas
     )
 
 
-def _shapes(
-    client: int, kind: int, radius: float, length: float, offset: float, color: tuple[float, float, float]
-) -> tuple[int, int]:
-    """Collision and visual shape of a capsule or cylinder along x, its middle `offset` metres ahead of the frame."""
+def _shapes(client: int, kind: int, radius: float, length: float, offset: float, color: Color) -> tuple[int, int]:
+    """Collision and visual shape of a capsule or cylinder along x, its centre `offset` m along x from its frame."""
     place, turn = [offset, 0, 0], p.getQuaternionFromEuler([0.0, np.pi / 2, 0.0])
     collision = p.createCollisionShape(
         kind,
@@ -190,7 +197,7 @@ def _shapes(
 def _set_inertias(
     client: int, body: int, links: int, link_inertia: float, connector: Connector, connector_mass: float
 ) -> float:
-    """Set the links' inertia (kg m2, about every axis) and the connector's; returns the latter's across its axis."""
+    """Set the inertias in kg m2: every link's (isotropic) and the connector's. Returns the latter across its axis."""
     for link in range(links):
         p.changeDynamics(body, link, localInertiaDiagonal=[link_inertia] * 3, physicsClientId=client)
     r, h = connector.radius, connector.length
@@ -201,7 +208,7 @@ def _set_inertias(
 
 
 def _switch_motors_off(client: int, body: int, links: int) -> None:
-    """Take out the default motors of the spherical joints: they cost forty times a step and hold the joints."""
+    """Switch off PyBullet's default joint motors: they brake the joints and make a step 40 times slower."""
     p.setJointMotorControlMultiDofArray(
         body,
         range(links),

@@ -1,38 +1,58 @@
-"""What holds the connector besides a hand: a socket with a pull-out force, and a snap-in clip.
+"""Holders of the connector in the cell: a socket with a pull-out force, and a snap-in clip.
 
-Both are physical models with stated numbers, not helpers of the robot: neither knows of the gripper.
+Both are physical models with stated numbers. Neither depends on the gripper, so neither helps the robot.
 """
 
 from collections import deque
+from dataclasses import dataclass
 
 import numpy as np
 import pybullet as p
-from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
+from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cell import Clip
 
-FloatArray = NDArray[np.float64]
 
-STAND_FORCE = 3.0  # N that a stand's spring clip holds; choice: a light pull, twice what a slack cable presses with
-STIFF = 1e4  # N: the constraints' own limit, far over what the models release at
-FORCE_WINDOW = 5  # physics steps over which a force is averaged, so that one step's solver spike does not count
-LIP_TRAVEL = 0.010  # m over which the clip's force grows to its full value
-LIP_TORQUE = 0.3  # N m: the clip's largest aligning torque; 15 N on lips 0.02 apart
-CLICK_SPEED = 0.02  # m/s: the clip's lips close on an end that is about at rest in it ...
-CLICK_TIME = 0.2  # s: ... for so long
-REARM = 1.5  # an end that was pulled out must leave by so many capture distances before the clip takes it again
+@dataclass(frozen=True)
+class HoldParameters:
+    """The constraint that fixes a plugged connector."""
+
+    constraint_force: float = 1e4  # N, limit of the constraint itself: far above the forces at which it is released
+    force_window: int = (
+        5  # physics steps over which the force is averaged, so that a solver's spike does not release it
+    )
+
+
+@dataclass(frozen=True)
+class ClipParameters:
+    """The clip's rubber lips; forces and distances that differ between clips are in the cell file."""
+
+    lip_travel: float = 0.010  # m over which the force grows to its full value
+    lip_torque: float = 0.3  # N m, largest aligning torque: 15 N on lips 0.02 m apart
+    click_speed: float = 0.02  # m/s; the lips close on a connector that is slower than this ...
+    click_seconds: float = 0.2  # ... for so long
+    rearm_distance: float = 1.5  # capture distances by which a pulled-out connector must leave before it is taken again
+
+
+@dataclass(frozen=True)
+class BodyLink:
+    """A link of a body in a PyBullet client; -1 is the base."""
+
+    client: int
+    body: int
+    link: int
 
 
 class Hold:
-    """The connector's link fixed to the world until it is pulled too hard."""
+    """A fixed constraint between the world and a link at the pose `at`, world_from_link."""
 
-    def __init__(self, client: int, body: int, link: int, at: RigidTransform) -> None:
-        self._client = client
+    def __init__(self, link: BodyLink, at: RigidTransform, parameters: HoldParameters = HoldParameters()) -> None:
+        self._client, self._max_force = link.client, parameters.constraint_force
         # Child frame in the world; the parent frame is the link's centre.
         self._constraint: int | None = p.createConstraint(
-            body,
-            link,
+            link.body,
+            link.link,
             -1,
             -1,
             p.JOINT_FIXED,
@@ -41,39 +61,39 @@ class Hold:
             at.translation.tolist(),
             [0, 0, 0, 1],
             at.rotation.as_quat().tolist(),
-            physicsClientId=client,
+            physicsClientId=link.client,
         )
-        p.changeConstraint(self._constraint, maxForce=STIFF, physicsClientId=client)
-        self._forces: deque[FloatArray] = deque(maxlen=FORCE_WINDOW)
+        p.changeConstraint(self._constraint, maxForce=self._max_force, physicsClientId=link.client)
+        self._forces: deque[FloatArray] = deque(maxlen=parameters.force_window)
 
     def move(self, to: RigidTransform) -> None:
-        """Drag the held link's target (used only to lay the cable before a run)."""
+        """Move the constraint to the pose `to`, and the link with it; for laying the cable before a run."""
         p.changeConstraint(
             self._constraint,
             to.translation.tolist(),
             jointChildFrameOrientation=to.rotation.as_quat().tolist(),
-            maxForce=STIFF,
+            maxForce=self._max_force,
             physicsClientId=self._client,
         )
 
     def force(self) -> FloatArray:
-        """Mean force (3,) N over the last steps, in the axes that `getConstraintState` uses; zero before the first."""
+        """Add the last step's constraint force, and return the mean (3,) N over the window, in the world frame."""
         self._forces.append(np.array(p.getConstraintState(self._constraint, physicsClientId=self._client)[:3]))
         return np.asarray(np.mean(self._forces, axis=0))
 
     def release(self) -> None:
-        """Let go."""
+        """Remove the constraint."""
         if self._constraint is not None:
             p.removeConstraint(self._constraint, physicsClientId=self._client)
             self._constraint = None
 
 
 class SocketHold:
-    """A plugged end: held stiffly until it is drawn back along `axis` (3,), the plug's way in, with `pull_out_force` N.
+    """A socket with a plug in it. It releases the plug when this is pulled against `axis` (3,) with `pull_out_force` N.
 
-    A force across the axis, as a closing jaw makes, does not free it; without an axis, on a stand, so large a force in
-    any direction does. Measured: `getConstraintState` gives the world force that the constraint answers with, so a pull
-    along -axis reads as a force along +axis.
+    `axis` is the direction in which the plug goes in. A force across it, as a closing gripper makes, does not release
+    the plug. With `axis` None, for a stand, a force of that size in any direction does. `getConstraintState` gives the
+    constraint's reaction in the world frame (measured), so a pull along -axis reads as a force along +axis.
     """
 
     def __init__(self, hold: Hold, axis: FloatArray | None, pull_out_force: float) -> None:
@@ -83,11 +103,11 @@ class SocketHold:
 
     @property
     def holds(self) -> bool:
-        """Whether the end is still plugged in."""
+        """Whether the plug is still in."""
         return self._hold is not None
 
     def step(self) -> None:
-        """Look at the force after a physics step."""
+        """Check the force; call after every physics step."""
         if self._hold is None:
             return
         force = self._hold.force()
@@ -97,28 +117,45 @@ class SocketHold:
 
 
 class ClipHold:
-    """The stow clip: rubber lips that close on an end resting in their mouth and then draw it to the seat.
+    r"""The stow clip: rubber lips that close on a connector at rest between them and pull it to the seat.
 
-    Their force grows to `hold_force` over `LIP_TRAVEL` and stays there; an end drawn out past `capture_distance` is
-    free. They align the end's axis with a torque that grows likewise; turning about the end's own axis is free.
+    The lips are a spring-damper whose spring force is limited, with :math:`\Delta` the vector to the seat and
+    :math:`v` the connector's velocity:
+
+    .. math:: F = \mathrm{limit}(k \Delta, F_{hold}) - \sqrt{k m} \, v, \quad k = F_{hold} / \mathtt{lip\_travel}
+
+    The damping is half of the critical damping of a mass m on the spring. A torque of the same form aligns the
+    connector's axis; rotation about that axis is free. A connector that is pulled past `capture_distance` is released.
+
+    `mass` (kg) and `inertia` (kg m2, across the axis) are the connector's, `step` is the physics step in s.
     """
 
-    def __init__(self, client: int, body: int, link: int, clip: Clip, mass: float, across: float, step: float) -> None:
-        self._client, self._body, self._link, self._clip, self._dt = client, body, link, clip, step
+    def __init__(
+        self,
+        link: BodyLink,
+        clip: Clip,
+        mass: float,
+        inertia: float,
+        step: float,
+        parameters: ClipParameters = ClipParameters(),
+    ) -> None:
+        self._target, self._clip, self._dt, self._parameters = link, clip, step, parameters
         self._seat = clip.world_from_seat
         self._axis = self._seat.rotation.apply([1.0, 0.0, 0.0])
         self._cos = float(np.cos(np.deg2rad(clip.capture_angle_deg)))
-        self._stiffness = clip.hold_force / LIP_TRAVEL
-        self._torsion = LIP_TORQUE / float(np.sin(np.deg2rad(clip.capture_angle_deg)))
-        # Half of critical damping of the end alone on the lips.
+        self._stiffness = clip.hold_force / parameters.lip_travel
+        self._torsion = parameters.lip_torque / float(np.sin(np.deg2rad(clip.capture_angle_deg)))
         self._damping = float(np.sqrt(self._stiffness * mass))
-        self._torsion_damping = float(np.sqrt(self._torsion * across))
+        self._torsion_damping = float(np.sqrt(self._torsion * inertia))
         self._resting = 0.0
         self._armed = True
         self.holds = False
 
     def step(self, connector: RigidTransform, velocity: FloatArray, rate: FloatArray) -> None:
-        """Pull, take or release the end; call before a physics step with its pose, velocity (m/s) and rate (rad/s)."""
+        """Take, pull or release the connector; call before every physics step.
+
+        `connector` is its pose in the world, `velocity` (3,) m/s that of its centre, `rate` (3,) rad/s its rotation.
+        """
         offset = self._seat.translation - connector.translation
         distance = float(np.linalg.norm(offset))
         axis = connector.rotation.apply([1.0, 0.0, 0.0])
@@ -127,11 +164,11 @@ class ClipHold:
         if self.holds:
             self._pull(connector, offset, velocity, axis, rate)
             return
-        self._armed = self._armed or distance > REARM * self._clip.capture_distance
+        self._armed = self._armed or distance > self._parameters.rearm_distance * self._clip.capture_distance
         inside = self._armed and distance < self._clip.capture_distance and float(axis @ self._axis) > self._cos
-        resting = inside and float(np.linalg.norm(velocity)) < CLICK_SPEED
+        resting = inside and float(np.linalg.norm(velocity)) < self._parameters.click_speed
         self._resting = self._resting + self._dt if resting else 0.0
-        if self._resting >= CLICK_TIME:
+        if self._resting >= self._parameters.click_seconds:
             self.holds, self._resting = True, 0.0
 
     def _pull(
@@ -139,10 +176,14 @@ class ClipHold:
     ) -> None:
         force = _limited(self._stiffness * offset, self._clip.hold_force) - self._damping * velocity
         turning = rate - axis * float(rate @ axis)
-        torque = _limited(self._torsion * np.cross(axis, self._axis), LIP_TORQUE) - self._torsion_damping * turning
-        at = connector.translation.tolist()
-        p.applyExternalForce(self._body, self._link, force.tolist(), at, p.WORLD_FRAME, physicsClientId=self._client)
-        p.applyExternalTorque(self._body, self._link, torque.tolist(), p.WORLD_FRAME, physicsClientId=self._client)
+        torque = (
+            _limited(self._torsion * np.cross(axis, self._axis), self._parameters.lip_torque)
+            - self._torsion_damping * turning
+        )
+        at, target = connector.translation.tolist(), self._target
+        client = target.client
+        p.applyExternalForce(target.body, target.link, force.tolist(), at, p.WORLD_FRAME, physicsClientId=client)
+        p.applyExternalTorque(target.body, target.link, torque.tolist(), p.WORLD_FRAME, physicsClientId=client)
 
 
 def _limited(vector: FloatArray, limit: float) -> FloatArray:

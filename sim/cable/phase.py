@@ -1,40 +1,45 @@
-"""Which part of the job has begun, judged by the truth: what faults and the judge go by."""
+"""Phases of the cable task, by ground truth. Faults and the judge depend on them."""
+
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.fault import Phase
 
-AWAY = 0.10  # m from its socket: the held end is carried
-LOST_SECONDS = 0.2  # without any pad's touch, out of clip and socket: the hold is really lost, not regripped
-STILL_SPEED = 0.01  # m/s ...
-STILL_SECONDS = 1.0  # ... for so long: settled
+
+@dataclass(frozen=True)
+class PhaseParameters:
+    """When a phase has begun."""
+
+    carried_distance: float = 0.10  # m from the socket: the held connector counts as carried; about its own length
+    lost_seconds: float = 0.2  # without a touch of any pad, clip or socket: it is really lost, not regripped
+    still_speed: float = 0.01  # m/s; a connector no faster than this ...
+    still_seconds: float = 1.0  # ... for so long has settled
 
 
 class PhaseWatch:
     """Notes in `began` at which simulated second each phase first began. `start` (3,) m is where the plug sits."""
 
-    def __init__(self, start: NDArray[np.float64]) -> None:
-        self._start = start
+    def __init__(self, start: FloatArray, parameters: PhaseParameters = PhaseParameters()) -> None:
+        self._start, self._parameters = start, parameters
         self.began: dict[Phase, float] = {}
         self._held = False
         self._untouched_since: float | None = None
         self._still_since: float | None = None
 
     def step(
-        self,
-        now: float,
-        position: NDArray[np.float64],
-        speed: float,
-        pads: tuple[bool, bool],
-        plugged: bool,
-        stowed: bool,
+        self, now: float, position: FloatArray, speed: float, pads: tuple[bool, bool], plugged: bool, stowed: bool
     ) -> None:
-        """Look at the connector: its centre (3,) m, speed m/s, which pads touch it, whether socket or clip hold it."""
+        """Update with the connector's state at second `now`.
+
+        `position` (3,) m is that of its centre, `speed` is in m/s. `pads` says which pads touch it, `plugged` and
+        `stowed` whether the socket or the clip holds it.
+        """
         if plugged:
             return
         self._begin("unplugged", now)
-        if all(pads) and float(np.linalg.norm(position - self._start)) > AWAY:
+        if all(pads) and float(np.linalg.norm(position - self._start)) > self._parameters.carried_distance:
             self._begin("carried", now)
         if "lost" not in self.began:
             self._held = self._held or all(pads)
@@ -49,15 +54,15 @@ class PhaseWatch:
             self._untouched_since = None
         elif self._untouched_since is None:
             self._untouched_since = now
-        elif now - self._untouched_since >= LOST_SECONDS:
+        elif now - self._untouched_since >= self._parameters.lost_seconds:
             self._begin("lost", now)
 
     def _watch_settling(self, now: float, speed: float) -> None:
-        if speed > STILL_SPEED:
+        if speed > self._parameters.still_speed:
             self._still_since = None
         elif self._still_since is None:
             self._still_since = now
-        elif now - self._still_since >= STILL_SECONDS:
+        elif now - self._still_since >= self._parameters.still_seconds:
             self._begin("settled", now)
 
     def _begin(self, phase: Phase, now: float) -> None:

@@ -1,1 +1,1 @@
-"""Cameras and their errors."""
+"""Simulated cameras, their calibration errors and depth noise."""

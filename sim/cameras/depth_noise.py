@@ -1,75 +1,104 @@
-"""The errors of a stereo depth camera, after RealSense's published figures."""
+"""The errors of a stereo depth camera, after the figures that RealSense publishes."""
 
 import zlib
+from dataclasses import dataclass
 
 import numba
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
-from regrasp.interfaces.cell import CameraSpec, Errors
+from regrasp.interfaces.arrays import Mask
+from regrasp.interfaces.cell import CameraSpec
+from regrasp.interfaces.hidden_world import Errors
 
-MAX_DISPARITY = 126.0  # pixels that a RealSense D4xx searches; it sets the least range
-QUANTUM = 0.001  # metres
-SMOOTHING = (
-    2.0  # pixels: the noise's autocorrelation falls to 1/e at twice this (choice: 4 px, a matching window's half)
-)
-TILE = (512, 1024)  # pixels: size of the periodic noise tiles
-EDGE = 0.03  # share of the depth by which neighbours differ at an edge between two surfaces (choice)
-FLYING_SHARE = 0.5  # share of the pixels on either side of an edge that fly (choice)
+DepthImage = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class DepthNoiseParameters:
+    """The stereo matcher of a depth camera."""
+
+    max_disparity: float = 126.0  # px that a RealSense D4xx searches; it sets the smallest range
+    depth_step: float = 0.001  # m, the sensor's unit of depth
+    # px, standard deviation of the Gaussian filter: the noise's autocorrelation falls to 1/e at twice this.
+    smoothing: float = 2.0  # choice: half of a matching window
+    tile: tuple[int, int] = (512, 1024)  # px, size of the periodic noise tiles; powers of two
+    edge_step: float = 0.03  # share of the depth by which neighbours differ at an edge between two surfaces; choice
+    flying_share: float = 0.5  # share of the pixels beside such an edge that are flying pixels; choice
 
 
 class DepthNoise:
-    """Makes an exact depth image, aligned to colour, look as if a stereo camera had measured it.
+    r"""Makes an exact depth image, aligned to colour, look as if a stereo camera had measured it.
 
-    Disparity noise of `errors.depth_subpixel` pixels gives sigma_z = Z^2 s / (f B), with f in pixels of the depth
-    imager (its own field of view over the image's width); neighbours are correlated. A share of the variance stays from
-    frame to frame, as on a real camera in front of a still scene. Draws are keyed by seed, camera and frame number.
+    Disparity noise with a standard deviation of s pixels (`errors.depth_subpixel`) gives a depth Z the deviation
 
-    The fresh noise is the sum of two periodic tiles of unit-variance smooth Gaussian noise, each shifted by a random
-    offset per frame. Over frames a pixel so samples the whole tiles: mean 0 and variance 1 as with fresh draws, and two
-    frames are independent unless the shifts of a tile come within some 8 pixels of each other (1 pair in 2,000).
+    .. math:: \sigma_Z = Z^2 s / (f B)
+
+    with the baseline B and the focal length f of the depth imager, in pixels (its own field of view over the image's
+    width). The noise of neighbours is correlated, and a share of its variance is the same in all frames, as on a real
+    camera in front of a static scene. Draws are keyed by seed, camera and frame number.
+
+    The rest of the noise is the sum of two periodic tiles of unit-variance smooth Gaussian noise, each shifted by a
+    random offset in each frame. Over the frames a pixel so samples the whole tiles: mean 0 and variance 1 as with
+    independent draws. Two frames are independent unless the shifts of a tile come within some 8 pixels of each other
+    (1 pair in 2,000).
     """
 
-    def __init__(self, spec: CameraSpec, errors: Errors, seed: int) -> None:
+    def __init__(
+        self, spec: CameraSpec, errors: Errors, seed: int, parameters: DepthNoiseParameters = DepthNoiseParameters()
+    ) -> None:
+        self._parameters = parameters
         self._key = (seed, zlib.crc32(spec.name.encode()))
         scale, fixed, tiles = (np.random.default_rng([*self._key, concern]) for concern in range(3))
         self.scale = 1.0 + errors.depth_scale * float(np.clip(scale.standard_normal(), -2.0, 2.0))
-        share = errors.depth_fixed_share
-        self._fixed = smooth_noise((spec.height, spec.width), fixed) * np.float32(np.sqrt(share))
-        self._tiles = np.stack([smooth_noise(TILE, tiles) for _ in range(2)]) * np.float32(np.sqrt((1.0 - share) / 2))
+        share, smoothing = errors.depth_fixed_share, parameters.smoothing
+        self._fixed = smooth_noise((spec.height, spec.width), fixed, smoothing) * np.float32(np.sqrt(share))
+        self._tiles = np.stack([smooth_noise(parameters.tile, tiles, smoothing) for _ in range(2)]) * np.float32(
+            np.sqrt((1.0 - share) / 2)
+        )
         k = spec.intrinsics
         half_view = float(np.tan(np.deg2rad(spec.depth_fov_deg) / 2))
         focal_baseline = 0.5 * spec.width / half_view * spec.baseline
-        figures = (self.scale, errors.depth_subpixel / focal_baseline, focal_baseline / MAX_DISPARITY)
-        self._figures = np.array(figures, np.float32)
-        # columns where the depth imager's view begins and ends, in the colour image
+        self._figures = np.array(
+            (
+                self.scale,
+                errors.depth_subpixel / focal_baseline,
+                focal_baseline / parameters.max_disparity,
+                parameters.depth_step,
+                1.0 / parameters.depth_step,
+                parameters.edge_step,
+                parameters.flying_share,
+            ),
+            np.float32,
+        )
+        # Columns of the colour image where the depth imager's view begins and ends.
         self._view = (np.float32(k.cx - half_view * k.fx), np.float32(k.cx + half_view * k.fx))
         self._shift = np.float32(k.fx * spec.baseline)
 
-    def apply(self, depth: NDArray[np.float32], number: int) -> NDArray[np.float32]:
-        """The measured image (H, W) for the exact one (H, W), both metres with 0 for none, at frame `number`."""
+    def apply(self, depth: DepthImage, number: int) -> DepthImage:
+        """The measured image (H, W) for the exact one (H, W) in frame `number`; both in metres, 0 for no reading."""
         rng = np.random.default_rng([*self._key, 3, number])
-        shifts = rng.integers(0, [TILE, TILE])
+        shifts = rng.integers(0, [self._parameters.tile, self._parameters.tile])
         key = np.uint32(rng.integers(2**32))
         seen = _seen(depth, self._shift, *self._view)
         return _measure(depth, seen, self._fixed, self._tiles, shifts, key, self._figures)
 
 
-def smooth_noise(shape: tuple[int, int], rng: np.random.Generator) -> NDArray[np.float32]:
-    """A periodic field of smooth Gaussian noise with mean 0 and variance 1."""
-    field = gaussian_filter(rng.standard_normal(shape, np.float32), SMOOTHING, mode="wrap")
+def smooth_noise(shape: tuple[int, int], rng: np.random.Generator, smoothing: float) -> NDArray[np.float32]:
+    """A periodic field of Gaussian noise, smoothed by a Gaussian filter of `smoothing` px, with mean 0, variance 1."""
+    field = gaussian_filter(rng.standard_normal(shape, np.float32), smoothing, mode="wrap")
     field -= field.mean()
     smooth: NDArray[np.float32] = field / field.std()
     return smooth
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _seen(depth: NDArray[np.float32], shift: np.float32, begin: np.float32, end: np.float32) -> NDArray[np.bool_]:
+def _seen(depth: DepthImage, shift: np.float32, begin: np.float32, end: np.float32) -> Mask:
     """Pixels that both imagers see.
 
     The right imager, B to the right, sees the point of column u at u - shift / Z. There a nearer surface, which shifts
-    farther to the left, hides what lies beside its left edge: B f (1/Znear - 1/Zfar) pixels; and what lands left of the
+    farther to the left, occludes what lies beside its left edge: B f (1/Znear - 1/Zfar) pixels. What lands left of the
     image's begin (B f / Z pixels) is not seen at all.
     """
     height, width = depth.shape
@@ -87,53 +116,60 @@ def _seen(depth: NDArray[np.float32], shift: np.float32, begin: np.float32, end:
 
 @numba.njit(cache=True, error_model="numpy")
 def _measure(
-    depth: NDArray[np.float32],
-    seen: NDArray[np.bool_],
+    depth: DepthImage,
+    seen: Mask,
     fixed: NDArray[np.float32],
     tiles: NDArray[np.float32],
     shifts: NDArray[np.int64],
     key: np.uint32,
     figures: NDArray[np.float32],
-) -> NDArray[np.float32]:
-    """Measured depth of the pixels seen; `figures`: scale, standard deviation of 1/Z (1/m), least range (m)."""
+) -> DepthImage:
+    """Measured depth of the pixels in `seen`.
+
+    `figures` (7,): scale, standard deviation of 1/Z (1/m), smallest range (m), depth step (m), its inverse (1/m), edge
+    step, share of flying pixels.
+    """
     height, width = depth.shape
-    scale, noise, least = figures
+    scale, noise, smallest, step, steps_per_metre, edge_step, flying_share = figures
+    rows, columns = tiles.shape[1] - 1, tiles.shape[2] - 1
     out = np.zeros((height, width), np.float32)
     for v in range(height):
-        first = tiles[0, (v + shifts[0, 0]) & (TILE[0] - 1)]
-        second = tiles[1, (v + shifts[1, 0]) & (TILE[0] - 1)]
+        first = tiles[0, (v + shifts[0, 0]) & rows]
+        second = tiles[1, (v + shifts[1, 0]) & rows]
         for u in range(width):
             if not seen[v, u]:
                 continue
-            z = _flying(depth, v, u, key)
+            z = _flying(depth, v, u, key, edge_step, flying_share)
             jitter = fixed[v, u]
-            jitter += first[(u + shifts[0, 1]) & (TILE[1] - 1)] + second[(u + shifts[1, 1]) & (TILE[1] - 1)]
+            jitter += first[(u + shifts[0, 1]) & columns] + second[(u + shifts[1, 1]) & columns]
             z = scale * z / (np.float32(1.0) + noise * jitter * z)
-            if z >= least:
-                out[v, u] = np.float32(np.rint(z * np.float32(1.0 / QUANTUM))) * np.float32(QUANTUM)
+            if z >= smallest:
+                out[v, u] = np.float32(np.rint(z * steps_per_metre)) * step
     return out
 
 
 @numba.njit(cache=True, inline="always", error_model="numpy")
-def _flying(depth: NDArray[np.float32], v: int, u: int, key: np.uint32) -> np.float32:
-    """The pixel's depth; beside an edge, now and then one between the two surfaces."""
+def _flying(
+    depth: DepthImage, v: int, u: int, key: np.uint32, edge_step: np.float32, flying_share: np.float32
+) -> np.float32:
+    """The pixel's depth; beside an edge, for a share of the pixels, a random depth between the two surfaces."""
     z = depth[v, u]
     near = far = z
     for dv, du in ((0, -1), (0, 1), (-1, 0), (1, 0)):
         if 0 <= v + dv < depth.shape[0] and 0 <= u + du < depth.shape[1] and depth[v + dv, u + du] > 0:
             near = min(near, depth[v + dv, u + du])
             far = max(far, depth[v + dv, u + du])
-    if max(far - z, z - near) < np.float32(EDGE) * near:
+    if max(far - z, z - near) < edge_step * near:
         return z
     chance = _hash(key, v * depth.shape[1] + u)
-    if chance >= np.float32(FLYING_SHARE):
+    if chance >= flying_share:
         return z
-    return near + (far - near) * chance / np.float32(FLYING_SHARE)
+    return near + (far - near) * chance / flying_share
 
 
 @numba.njit(cache=True, inline="always")
 def _hash(key: np.uint32, index: int) -> np.float32:
-    """A number in [0, 1) from a frame's key and a pixel: the finaliser of MurmurHash3 (Appleby, public domain)."""
+    """A number in [0, 1) from a frame's key and a pixel's index: the finaliser of MurmurHash3 (Appleby)."""
     h = np.uint32(key ^ np.uint32(index))
     h = np.uint32((h ^ (h >> np.uint32(16))) * np.uint32(0x85EBCA6B))
     h = np.uint32((h ^ (h >> np.uint32(13))) * np.uint32(0xC2B2AE35))

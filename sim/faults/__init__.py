@@ -1,1 +1,1 @@
-"""Faults: when they begin, and what they do."""
+"""Faults: when they begin, and their effects."""

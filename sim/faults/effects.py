@@ -1,4 +1,4 @@
-"""What each fault does to the world's parts. The parts themselves hold the models: jaw, camera, arm."""
+"""Effects of the faults on the world's parts. The models of faulty grippers, cameras and arms are in those parts."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -9,16 +9,23 @@ import pybullet as p
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces import fault as f
+from regrasp.interfaces.arrays import FloatArray
 from regrasp.sim.cable.cable import CableBody
 from regrasp.sim.cameras.camera import SimCamera
 from regrasp.sim.render.renderer import LightState
 from regrasp.sim.robot.arm import SimArm
 
-KNOCK_SECONDS = 0.02  # s over which a knock's impulse is shared
+
+@dataclass(frozen=True)
+class FaultParameters:
+    """Numbers of faults that the scenario file does not give."""
+
+    knock_seconds: float = 0.02  # s over which a knock's impulse is spread
+    cover_transmission: float = 0.02  # share of the light that passes a covered lens; the fault's description quotes it
 
 
-class Breakable(Protocol):
-    """What faults need of a world."""
+class FaultTarget(Protocol):
+    """The parts of a world that faults act on."""
 
     client: int
     step_seconds: float
@@ -32,7 +39,7 @@ class Breakable(Protocol):
         """Change the light."""
 
     def connector_pose(self) -> RigidTransform:
-        """World_from_connector."""
+        """True pose world_from_connector."""
 
 
 def _nothing(*_: float) -> None:
@@ -41,9 +48,10 @@ def _nothing(*_: float) -> None:
 
 @dataclass
 class Effect:
-    """`begin` and `end` switch a fault on and off; `step` acts before each physics step with the seconds since.
+    """A fault's actions: `begin` and `end` switch it on and off, `step` acts before each physics step.
 
-    `seconds` is how long it takes when that is its own nature, None when the scenario says so.
+    `step` takes the seconds since the beginning. `seconds` is the duration of a fault that has one of its own; it is
+    None where the scenario gives the duration.
     """
 
     begin: Callable[[], None] = _nothing
@@ -52,8 +60,16 @@ class Effect:
     seconds: float | None = None
 
 
-def effect_of(fault: f.AnyFault, world: Breakable, rng: np.random.Generator) -> Effect:
-    """The effect of a drawn fault on a world; none for a fault of the robot's software. `rng` is the fault's own."""
+def effect_of(
+    fault: f.AnyFault,
+    world: FaultTarget,
+    rng: np.random.Generator,
+    parameters: FaultParameters = FaultParameters(),
+) -> Effect:
+    """The effect on the world of a fault whose ranges are drawn; no effect for a fault of the robot's software.
+
+    `rng` belongs to this fault alone.
+    """
     jaw = world.arms["right"].gripper
     match fault:
         case f.JawOpens():
@@ -64,7 +80,7 @@ def effect_of(fault: f.AnyFault, world: Breakable, rng: np.random.Generator) -> 
         case f.JawStuck():
             return Effect(lambda: jaw.set_fault(stuck=True), lambda: jaw.set_fault(stuck=False))
         case f.CameraFault():
-            return _camera(fault, world, rng)
+            return _camera(fault, world, rng, parameters.cover_transmission)
         case f.LightChanges():
             return _light(fault, world)
         case f.JointFault():
@@ -72,13 +88,13 @@ def effect_of(fault: f.AnyFault, world: Breakable, rng: np.random.Generator) -> 
         case f.ObstacleMovesIn():
             return _obstacle(fault, world)
         case f.ConnectorKnocked():
-            return _knock(fault, world)
+            return _knock(fault, world, parameters.knock_seconds)
         case f.CableSnags():
             return _snag(fault, world)
     return Effect()
 
 
-def _camera(fault: f.CameraFault, world: Breakable, rng: np.random.Generator) -> Effect:
+def _camera(fault: f.CameraFault, world: FaultTarget, rng: np.random.Generator, cover_transmission: float) -> Effect:
     camera = world.cameras[fault.camera]
 
     def switch(name: str, on: object, off: object) -> Effect:
@@ -91,18 +107,18 @@ def _camera(fault: f.CameraFault, world: Breakable, rng: np.random.Generator) ->
         case f.CameraFreezes():
             return switch("frozen", True, False)
         case f.CameraDark():
-            return switch("covered", True, False)
-    return switch("depthless", True, False)
+            return switch("transmission", cover_transmission, 1.0)
+    return switch("without_depth", True, False)
 
 
-def _light(fault: f.LightChanges, world: Breakable) -> Effect:
+def _light(fault: f.LightChanges, world: FaultTarget) -> Effect:
     before = world.light
     direction = before.direction if fault.direction is None else fault.direction
     after = LightState(direction, before.ambient * fault.factor, before.diffuse * fault.factor)
     return Effect(lambda: world.set_light(after), lambda: world.set_light(before))
 
 
-def _joint(fault: f.JointFault, world: Breakable) -> Effect:
+def _joint(fault: f.JointFault, world: FaultTarget) -> Effect:
     arm, joint = world.arms[fault.arm], f.JOINT_NAMES.index(fault.joint)
     if isinstance(fault, f.EncoderJumps):
         angle = fault.angle
@@ -111,7 +127,7 @@ def _joint(fault: f.JointFault, world: Breakable) -> Effect:
     return Effect(lambda: arm.set_speed_share(joint, share), lambda: arm.set_speed_share(joint, 1.0))
 
 
-def _obstacle(fault: f.ObstacleMovesIn, world: Breakable) -> Effect:
+def _obstacle(fault: f.ObstacleMovesIn, world: FaultTarget) -> Effect:
     names = (f"obstacle {fault.obstacle}", f"obstacle {fault.obstacle} stand")
     bodies = [world.boxes[name] for name in names if name in world.boxes]
     poses = [p.getBasePositionAndOrientation(body, physicsClientId=world.client) for body in bodies]
@@ -128,23 +144,23 @@ def _obstacle(fault: f.ObstacleMovesIn, world: Breakable) -> Effect:
     return Effect(end=lambda: place(seconds, moving=False), step=place, seconds=seconds)
 
 
-def _knock(fault: f.ConnectorKnocked, world: Breakable) -> Effect:
-    force = (np.array(fault.impulse) / KNOCK_SECONDS).tolist()
+def _knock(fault: f.ConnectorKnocked, world: FaultTarget, seconds: float) -> Effect:
+    force = (np.array(fault.impulse) / seconds).tolist()
     cable = world.cable
 
     def push(_: float) -> None:
         at = world.connector_pose().translation.tolist()
         p.applyExternalForce(cable.body, cable.connector_link, force, at, p.WORLD_FRAME, physicsClientId=world.client)
 
-    return Effect(step=push, seconds=KNOCK_SECONDS)
+    return Effect(step=push, seconds=seconds)
 
 
-def _snag(fault: f.CableSnags, world: Breakable) -> Effect:
+def _snag(fault: f.CableSnags, world: FaultTarget) -> Effect:
     cable, client = world.cable, world.client
     link = round(fault.along * (cable.links - 1))
-    caught: list[np.ndarray] = []
+    caught: list[FloatArray] = []
 
-    def position() -> np.ndarray:
+    def position() -> FloatArray:
         return np.array(p.getLinkState(cable.body, link, 0, 1, physicsClientId=client)[0])
 
     def pull(_: float) -> None:

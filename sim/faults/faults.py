@@ -1,27 +1,23 @@
-"""What goes wrong, caused by the world: each fault waits for its moment, takes effect, and may end."""
+"""Faults of a run: each waits for its trigger, takes effect, and may end."""
 
 from dataclasses import dataclass, field
-
-import numpy as np
-from numpy.typing import NDArray
 
 from regrasp.interfaces.fault import AnyFault, Lasting, Phase, When
 from regrasp.sim.faults.effects import Effect
 
-FloatArray = NDArray[np.float64]
-
 
 @dataclass
-class Moments:
-    """What triggers go by: the second, the held connector's share of the way, phases and nodes with their seconds."""
+class TriggerState:
+    """The state of a run on which the beginning of faults depends."""
 
-    now: float = 0.0
-    carried: float | None = None  # None while it is plugged in or not held by both pads
-    phases: dict[Phase, float] = field(default_factory=dict)
-    nodes: dict[str, float] = field(default_factory=dict)
+    now: float = 0.0  # simulated second
+    # Share of the straight line from socket to clip; None while the connector is plugged in or not held by both pads.
+    carried: float | None = None
+    phases: dict[Phase, float] = field(default_factory=dict)  # seconds at which phases began
+    nodes: dict[str, float] = field(default_factory=dict)  # seconds at which nodes, by tree path, were first entered
 
-    def has_come(self, when: When) -> bool:
-        """Whether the moment, drawn, has come."""
+    def triggers(self, when: When) -> bool:
+        """Whether a fault with this `when`, its ranges drawn, is due."""
         if when.at is not None:
             return self.now >= when.at[0] - 1e-9
         if when.carried is not None:
@@ -29,17 +25,17 @@ class Moments:
         if when.phase is not None:
             return when.phase in self.phases
         delay = when.after[0] if when.after else 0.0
-        entered = (second for path, second in self.nodes.items() if names(path, when.node or ""))
+        entered = (second for path, second in self.nodes.items() if ends_with_node(path, when.node or ""))
         return any(self.now >= second + delay - 1e-9 for second in entered)
 
 
-def names(path: str, node: str) -> bool:
-    """Whether `node` is a tree path or the last names of it."""
+def ends_with_node(path: str, node: str) -> bool:
+    """Whether `node` is the tree path `path` or its end, from a node's name on."""
     return f"/{path}".endswith(f"/{node}")
 
 
-class Fault:
-    """A fault of one run. `began_at` and `ended_at` are simulated seconds, None before."""
+class ScheduledFault:
+    """A fault of one run. `began_at` and `ended_at` are simulated seconds, None until then."""
 
     def __init__(self, spec: AnyFault, effect: Effect) -> None:
         self.spec, self._effect = spec, effect
@@ -48,31 +44,31 @@ class Fault:
 
     @property
     def active(self) -> bool:
-        """Whether it is in force now."""
+        """Whether it has begun and not ended."""
         return self.began_at is not None and self.ended_at is None
 
     @property
     def waiting(self) -> bool:
-        """Whether it is still to come."""
+        """Whether it has not begun."""
         return self.began_at is None
 
-    def watch(self, moments: Moments) -> None:
-        """Begin when the moment has come, end when the time is over."""
-        if self.waiting and moments.has_come(self.spec.when):
-            self.began_at = moments.now
+    def watch(self, state: TriggerState) -> None:
+        """Begin the fault when its trigger fires, end it when its time is over."""
+        if self.waiting and state.triggers(self.spec.when):
+            self.began_at = state.now
             self._effect.begin()
         if not self.active or self.began_at is None:
             return
         seconds = self.spec.seconds if isinstance(self.spec, Lasting) else self._effect.seconds
-        if seconds is not None and moments.now >= self.began_at + seconds - 1e-9:
-            self.end(moments.now)
+        if seconds is not None and state.now >= self.began_at + seconds - 1e-9:
+            self.end(state.now)
 
     def end(self, now: float) -> None:
-        """Take the effect back."""
+        """End the fault at second `now`."""
         self.ended_at = now
         self._effect.end()
 
     def step(self, now: float) -> None:
-        """Act, before a physics step that begins at second `now`."""
+        """Apply the effect; call before every physics step, which begins at second `now`."""
         if self.active and self.began_at is not None:
             self._effect.step(now - self.began_at)

@@ -1,1 +1,1 @@
-"""Random pictures for the detector."""
+"""Random scenes, whose pictures train and test the detector."""

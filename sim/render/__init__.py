@@ -1,1 +1,1 @@
-"""What the cameras see: shapes, and the two renderers."""
+"""Visual shapes, and the two renderers that draw them."""

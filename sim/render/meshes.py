@@ -1,5 +1,6 @@
-"""Triangles of visual items, for the renderer."""
+"""Triangle meshes of visual shapes, for the renderers."""
 
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -7,54 +8,66 @@ import pybullet as p
 import trimesh
 from numpy.typing import NDArray
 
+from regrasp.interfaces.arrays import FloatArray
 from regrasp.sim.render.visuals import VisualItem
 
-FloatArray = NDArray[np.float64]
-CELL = 0.002  # metres: details of mesh files finer than this are merged; a pixel covers 1.4 mm at 0.9 m
-SMOOTH = np.cos(np.deg2rad(40.0))  # faces that meet at a smaller angle share a normal
+
+@dataclass(frozen=True)
+class MeshParameters:
+    """How fine the meshes are."""
+
+    merge_cell: float = 0.002  # m; finer details of mesh files are merged: a pixel covers 1.4 mm at 0.9 m
+    smooth_angle_deg: float = 40.0  # faces that meet at a smaller angle share a vertex normal
+    thin_radius: float = 0.006  # m; a round shape below this radius ...
+    thin_sides: int = 12  # ... has so many sides ...
+    round_sides: int = 24  # ... and a thicker one so many
 
 
-def corners(item: VisualItem) -> NDArray[np.float32]:
-    """Positions and unit normals of the item's triangle corners in its visual frame: (3 n, 6), metres."""
+def triangle_corners(item: VisualItem, parameters: MeshParameters = MeshParameters()) -> NDArray[np.float32]:
+    """Positions (m) and unit normals of the corners of n triangles, in the item's visual frame: (3 n, 6).
+
+    Raises:
+        ValueError: the item is of a PyBullet geometry that has no mesh here.
+    """
     kind, size = item.kind, item.size
     if kind == p.GEOM_MESH:
-        return _from_file(item.file, size)
+        return _from_file(item.file, size, parameters)
     if kind == p.GEOM_BOX:
         box = trimesh.creation.box(size)
         return _rows(box.triangles, np.repeat(box.face_normals[:, None], 3, axis=1))
     if kind == p.GEOM_SPHERE:
-        return _lathe(*_arc(size[0], 0.0, np.linspace(-90, 90, 13)))
+        return _revolve(*_arc(size[0], 0.0, np.linspace(-90, 90, 13)), parameters)
     length, radius = size[0], size[1]
     if kind == p.GEOM_CYLINDER:
         side = np.array([[radius, -length / 2], [radius, length / 2]])
-        outline = np.array([[0, -length / 2], side[0], side[0], side[1], side[1], [0, length / 2]])
-        return _lathe(outline, np.array([[0, -1], [0, -1], [1, 0], [1, 0], [0, 1], [0, 1]], float))
+        profile = np.array([[0, -length / 2], side[0], side[0], side[1], side[1], [0, length / 2]])
+        return _revolve(profile, np.array([[0, -1], [0, -1], [1, 0], [1, 0], [0, 1], [0, 1]], float), parameters)
     if kind == p.GEOM_CAPSULE:
         halves = [_arc(radius, h * length / 2, np.linspace(min(0, h * 90), max(0, h * 90), 4)) for h in (-1, 1)]
-        return _lathe(np.vstack([o for o, _ in halves]), np.vstack([n for _, n in halves]))
+        return _revolve(np.vstack([o for o, _ in halves]), np.vstack([n for _, n in halves]), parameters)
     raise ValueError(f"body {item.body} link {item.link}: no way to draw PyBullet geometry {kind}")
 
 
 def _arc(radius: float, height: float, angles_deg: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Outline (m, 2) in (r, z) of a circle's arc about (0, height), and its normals."""
+    """Profile (m, 2) in (r, z) of a circular arc about (0, height), and its normals (m, 2)."""
     angles = np.deg2rad(angles_deg)
     normals = np.column_stack([np.cos(angles), np.sin(angles)])
     return radius * normals + [0.0, height], normals
 
 
-def _lathe(outline: FloatArray, normals: FloatArray) -> NDArray[np.float32]:
-    """Corners of the surface that an outline (m, 2) in (r, z), bottom to top, sweeps about z."""
-    sides = 12 if outline[:, 0].max() < 0.006 else 24
+def _revolve(profile: FloatArray, normals: FloatArray, parameters: MeshParameters) -> NDArray[np.float32]:
+    """Corners of the surface of revolution about z of a profile (m, 2) in (r, z), from bottom to top."""
+    sides = parameters.thin_sides if profile[:, 0].max() < parameters.thin_radius else parameters.round_sides
     turns = np.arange(sides + 1) * (2 * np.pi / sides)
-    # between the circles inside and around the polygon, so that its mean width is right
-    outline = outline * [2 / (1 + np.cos(np.pi / sides)), 1.0]
+    # The circle lies between the polygon's inscribed and circumscribed circles, so that its mean width is right.
+    profile = profile * [2 / (1 + np.cos(np.pi / sides)), 1.0]
     around = np.stack([np.cos(turns), np.sin(turns)], axis=-1)
 
-    def ring(profile: FloatArray) -> FloatArray:
-        flat = profile[:, None, :1] * around[None]
-        return np.concatenate([flat, np.broadcast_to(profile[:, None, 1:], (*flat.shape[:2], 1))], axis=-1)
+    def ring(rz: FloatArray) -> FloatArray:
+        flat = rz[:, None, :1] * around[None]
+        return np.concatenate([flat, np.broadcast_to(rz[:, None, 1:], (*flat.shape[:2], 1))], axis=-1)
 
-    both = np.concatenate([ring(outline), ring(normals)], axis=-1)
+    both = np.concatenate([ring(profile), ring(normals)], axis=-1)
     a, b, c, d = both[:-1, :-1], both[:-1, 1:], both[1:, 1:], both[1:, :-1]
     triangles = np.stack([a, b, c, a, c, d], axis=2).reshape(-1, 3, 6)
     area = np.cross(triangles[:, 1, :3] - triangles[:, 0, :3], triangles[:, 2, :3] - triangles[:, 0, :3])
@@ -62,18 +75,19 @@ def _lathe(outline: FloatArray, normals: FloatArray) -> NDArray[np.float32]:
     return np.ascontiguousarray(kept.reshape(-1, 6), np.float32)
 
 
-@lru_cache(maxsize=64)  # both arms' files; smoothing them takes most of a renderer's making
-def _from_file(file: str, scale: tuple[float, float, float]) -> NDArray[np.float32]:
+@lru_cache(maxsize=64)  # both arms' files; smoothing them takes most of the time to make a renderer
+def _from_file(file: str, scale: tuple[float, float, float], parameters: MeshParameters) -> NDArray[np.float32]:
     mesh = trimesh.load(file, force="mesh")
-    vertices, faces = _merge(np.asarray(mesh.vertices) * np.array(scale), np.asarray(mesh.faces))
+    vertices, faces = _merge(np.asarray(mesh.vertices) * np.array(scale), np.asarray(mesh.faces), parameters.merge_cell)
     merged = trimesh.Trimesh(vertices, faces, process=False)
-    faces_normals = np.asarray(merged.face_normals)
-    return _rows(vertices[faces], _smooth(faces, faces_normals, np.asarray(merged.area_faces)))
+    face_normals = np.asarray(merged.face_normals)
+    cosine = np.cos(np.deg2rad(parameters.smooth_angle_deg))
+    return _rows(vertices[faces], _vertex_normals(faces, face_normals, np.asarray(merged.area_faces), cosine))
 
 
-def _merge(vertices: FloatArray, faces: NDArray[np.int64]) -> tuple[FloatArray, NDArray[np.int64]]:
-    """Vertices within one cell of a grid become one, at their mean; faces without area go."""
-    _, inverse = np.unique(np.rint(vertices / CELL).astype(np.int64), axis=0, return_inverse=True)
+def _merge(vertices: FloatArray, faces: NDArray[np.int64], cell: float) -> tuple[FloatArray, NDArray[np.int64]]:
+    """Merge the vertices in each cell of a grid, `cell` m wide, into their mean; drop faces that have no area left."""
+    _, inverse = np.unique(np.rint(vertices / cell).astype(np.int64), axis=0, return_inverse=True)
     count = np.bincount(inverse)
     means = np.column_stack([np.bincount(inverse, vertices[:, i]) / count for i in range(3)])
     merged = inverse[faces]
@@ -81,8 +95,11 @@ def _merge(vertices: FloatArray, faces: NDArray[np.int64]) -> tuple[FloatArray, 
     return means, merged[np.linalg.norm(np.cross(b - a, c - a), axis=1) > 1e-10]
 
 
-def _smooth(faces: NDArray[np.int64], normals: FloatArray, area: FloatArray) -> FloatArray:
-    """Normals (n, 3, 3) of corners: the mean over the faces about the vertex that are not too steep to this face."""
+def _vertex_normals(faces: NDArray[np.int64], normals: FloatArray, area: FloatArray, cosine: float) -> FloatArray:
+    """Normals (n, 3, 3) of the faces' corners.
+
+    Each is the mean, weighted by area, over the vertex's faces whose normals have at least `cosine` with this face's.
+    """
     around: list[list[int]] = [[] for _ in range(int(faces.max()) + 1)]
     for face, corner in enumerate(faces):
         for vertex in corner:
@@ -91,7 +108,7 @@ def _smooth(faces: NDArray[np.int64], normals: FloatArray, area: FloatArray) -> 
     for face, corner in enumerate(faces):
         for k, vertex in enumerate(corner):
             near = np.array(around[vertex])
-            near = near[normals[near] @ normals[face] > SMOOTH]
+            near = near[normals[near] @ normals[face] > cosine]
             out[face, k] = area[near] @ normals[near] if len(near) else normals[face]
     return out / np.linalg.norm(out, axis=2, keepdims=True)
 

@@ -1,4 +1,4 @@
-"""The fast renderer: OpenGL without a window, on a graphics card or on Mesa's software rasteriser."""
+"""The fast renderer: OpenGL without a window, on a graphics card or with Mesa's software rasteriser."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
+from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.frame import Intrinsics
-from regrasp.sim.render.meshes import corners
-from regrasp.sim.render.picture import BACKGROUND, FAR, NEAR, Image, LightState
+from regrasp.sim.render.meshes import triangle_corners
+from regrasp.sim.render.picture import BACKGROUND, Z_FAR, Z_NEAR, Image, LightState
 from regrasp.sim.render.shaders import (
     BACKDROP_FRAGMENT,
     BACKDROP_VERTEX,
@@ -22,16 +23,13 @@ from regrasp.sim.render.shaders import (
 )
 from regrasp.sim.render.visuals import Visuals
 
-FloatArray = NDArray[np.float64]
-SHADOW_SIZE = 1024  # texels a side of the shadow map
-CASTER = 1.0  # metres: items of a larger radius (the floor) take shadows but throw none
 _ROWS = ("row0", "row1", "row2")
-INSTANCE = np.dtype([("pose", "f4", (3, 4)), ("color", "f4", 3), ("id", "i4")])
+_INSTANCE = np.dtype([("pose", "f4", (3, 4)), ("color", "f4", 3), ("id", "i4")])
 
 
 @dataclass(frozen=True)
 class _Group:
-    """Items that share a mesh: their rows, the mesh's radius about its origin, their records here and on the card."""
+    """Items that share a mesh: their rows, its radius about its origin (m), their records here and on the card."""
 
     rows: NDArray[np.int64]
     radius: float
@@ -41,17 +39,31 @@ class _Group:
     cast: Any
 
 
+@dataclass(frozen=True)
+class ShadowParameters:
+    """The shadow map."""
+
+    size: int = 1024  # texels a side; a texel covers about 2 mm of the cell
+    largest_caster: float = 1.0  # m; items of a larger radius, such as the floor, receive shadows but cast none
+
+
 class GlRenderer:
-    """Draws through moderngl over EGL. One thread owns it. Raises what moderngl raises if there is no EGL."""
+    """A `Renderer` that draws with moderngl over EGL, in the thread that made it.
+
+    Raises whatever moderngl raises where no EGL context can be made.
+    """
 
     name = "moderngl"
 
-    def __init__(self, visuals: Visuals, reason: str = "") -> None:
+    def __init__(
+        self, visuals: Visuals, reason: str = "", shadow_parameters: ShadowParameters = ShadowParameters()
+    ) -> None:
+        self.visuals, self._parameters = visuals, shadow_parameters
         backend: Any = {"backend": "egl"}
         self._gl: Any = moderngl.create_context(standalone=True, require=330, **backend)
         self.reason = f"{reason}: {self._gl.info['GL_RENDERER']}"
         self._gl.enable(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
-        self._gl.front_face = "cw"  # image rows run downwards, so the picture is GL's in a mirror
+        self._gl.front_face = "cw"  # image rows run downwards, which mirrors GL's picture
         self._gl.depth_func = "<="
         self._draw = self._gl.program(vertex_shader=VERTEX, fragment_shader=FRAGMENT)
         self._cast = self._gl.program(vertex_shader=SHADOW_VERTEX, fragment_shader=SHADOW_FRAGMENT)
@@ -59,7 +71,7 @@ class GlRenderer:
         _set(behind, color=BACKGROUND)
         self._backdrop = self._gl.vertex_array(behind, [])
         self._groups = self._make_groups(visuals)
-        self._shadows = self._gl.depth_texture((SHADOW_SIZE, SHADOW_SIZE))
+        self._shadows = self._gl.depth_texture((shadow_parameters.size, shadow_parameters.size))
         self._shadows.compare_func = "<="
         self._shadows.repeat_x = self._shadows.repeat_y = False
         self._shadow_target = self._gl.framebuffer(depth_attachment=self._shadows)
@@ -69,7 +81,7 @@ class GlRenderer:
     def render(
         self, poses: NDArray[np.float32], world_from_camera: RigidTransform, intrinsics: Intrinsics, light: LightState
     ) -> Image:
-        """See `Renderer.render`. The very same read-only poses, for a second camera, cost no second shadow pass."""
+        """See `Renderer.render`. A second camera with the same read-only array of poses needs no second shadow pass."""
         placed = self._placed
         if placed is None or placed[0] is not poses or placed[1] is not light or poses.flags.writeable:
             self._place(poses, light)
@@ -89,7 +101,7 @@ class GlRenderer:
         self._gl.release()
 
     def _make_groups(self, visuals: Visuals) -> list[_Group]:
-        """Small ones first: what lies behind them, mostly floor and panels, is then not shaded in vain."""
+        """Groups of items, small ones first: floor and panels are then not shaded where something hides them."""
         rows: dict[tuple[Any, ...], list[int]] = {}
         for row, item in enumerate(visuals.items):
             rows.setdefault((item.kind, item.size, item.file), []).append(row)
@@ -97,8 +109,8 @@ class GlRenderer:
         return sorted(groups, key=lambda group: group.radius)
 
     def _make_group(self, visuals: Visuals, rows: NDArray[np.int64]) -> _Group:
-        vertices, index = np.unique(corners(visuals.items[rows[0]]), axis=0, return_inverse=True)
-        records = np.zeros(len(rows), INSTANCE)
+        vertices, index = np.unique(triangle_corners(visuals.items[rows[0]]), axis=0, return_inverse=True)
+        records = np.zeros(len(rows), _INSTANCE)
         records["color"] = [visuals.items[row].color for row in rows]
         records["id"] = visuals.ids[rows]
         mesh, order = self._gl.buffer(vertices.tobytes()), self._gl.buffer(index.astype("i4").tobytes())
@@ -110,16 +122,16 @@ class GlRenderer:
         return _Group(rows, float(np.linalg.norm(vertices[:, :3], axis=1).max()), records, buffer, draw, cast)
 
     def _place(self, poses: NDArray[np.float32], light: LightState) -> None:
-        """Send the poses, and draw the shadow map."""
+        """Send the poses to the card and draw the shadow map."""
         for group in self._groups:
             group.records["pose"] = poses[group.rows]
             group.buffer.write(group.records.tobytes())
-        casters = [group for group in self._groups if group.radius < CASTER]
+        casters = [group for group in self._groups if group.radius < self._parameters.largest_caster]
         to_light = np.asarray(light.direction, float) / np.linalg.norm(light.direction)
         matrix, radius = _light_from_world(casters, poses, to_light)
         _write(self._cast, "world_to_light", matrix)
         _write(self._draw, "world_to_light", matrix)
-        texel = 2 * radius / SHADOW_SIZE
+        texel = 2 * radius / self._parameters.size
         _set(self._draw, texel=texel, to_light=tuple(to_light), ambient=light.ambient, diffuse=light.diffuse)
         self._shadow_target.use()
         self._shadow_target.clear()
@@ -127,7 +139,7 @@ class GlRenderer:
             group.cast.render(instances=len(group.rows))
 
     def _target(self, width: int, height: int) -> Any:
-        """The frame buffer of that size: colour, depth, ids."""
+        """The frame buffer of that size, with planes for colour, depth and ids."""
         size = (width, height)
         if size not in self._targets:
             planes = [
@@ -149,12 +161,20 @@ def _write(program: Any, name: str, matrix: FloatArray) -> None:
 
 
 def _clip_from_camera(k: Intrinsics) -> FloatArray:
-    """Projection (4, 4) with image rows downwards: the centre of pixel u lies half a pixel into GL's column u."""
+    """OpenGL's projection matrix (4, 4) for intrinsics `k`, with image rows downwards.
+
+    GL measures from a pixel's edge, `k` from its centre: the half pixel between them makes the 1 in the third column.
+    """
     return np.array(
         [
             [2 * k.fx / k.width, 0.0, (2 * k.cx + 1) / k.width - 1, 0.0],
             [0.0, 2 * k.fy / k.height, (2 * k.cy + 1) / k.height - 1, 0.0],
-            [0.0, 0.0, (FAR + NEAR) / (FAR - NEAR), -2 * FAR * NEAR / (FAR - NEAR)],
+            [
+                0.0,
+                0.0,
+                (Z_FAR + Z_NEAR) / (Z_FAR - Z_NEAR),
+                -2 * Z_FAR * Z_NEAR / (Z_FAR - Z_NEAR),
+            ],
             [0.0, 0.0, 1.0, 0.0],
         ]
     )
@@ -163,9 +183,10 @@ def _clip_from_camera(k: Intrinsics) -> FloatArray:
 def _light_from_world(
     casters: list[_Group], poses: NDArray[np.float32], to_light: FloatArray
 ) -> tuple[FloatArray, float]:
-    """Matrix (4, 4) that takes the casters' bounding ball to 0..1 as the light sees it, and the ball's radius (m).
+    """Matrix (4, 4) from the world to the light's view, and the radius (m) of the casters' bounding sphere.
 
-    Its rows run downwards too, so that the same sides of triangles are drawn as in the picture.
+    The light's view maps the sphere to 0..1. Its rows run downwards as the picture's do, so that the same sides of
+    triangles are drawn.
     """
     low = np.min([poses[g.rows, :, 3].min(axis=0) - g.radius for g in casters], axis=0) if casters else -np.ones(3)
     high = np.max([poses[g.rows, :, 3].max(axis=0) + g.radius for g in casters], axis=0) if casters else np.ones(3)

@@ -1,17 +1,17 @@
-"""What a renderer is given and gives back."""
+"""A renderer's light and its picture."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-NEAR, FAR = 0.02, 10.0  # metres along the optical axis; nothing outside is drawn
-BACKGROUND = (0.72, 0.74, 0.78)  # RGB, 0 to 1: the wall of the lab, far away
+Z_NEAR, Z_FAR = 0.02, 10.0  # m along the optical axis: clip planes, nothing outside them is drawn
+BACKGROUND = (0.72, 0.74, 0.78)  # RGB: the lab's distant wall
 
 
 @dataclass(frozen=True, eq=False)
 class LightState:
-    """A far light: `direction` (3,) from the scene to the light in the world frame, any length; strengths 0 to 1."""
+    """A directional light: `direction` (3,) from the scene to the light in the world, any length; strengths 0 to 1."""
 
     direction: ArrayLike
     ambient: float
@@ -20,10 +20,10 @@ class LightState:
 
 @dataclass(frozen=True, eq=False)
 class Image:
-    """An exact picture.
+    """A picture without noise.
 
-    `rgb` (H, W, 3) uint8; `depth` (H, W) float32 metres along the optical axis, 0 where nothing was hit; `ids` (H, W)
-    int32 of the item seen (`VisualItem.id`), -1 for none.
+    `rgb` (H, W, 3) uint8; `depth` (H, W) float32, m along the optical axis, 0 where nothing is; `ids` (H, W) int32,
+    the `VisualItem.id` that each pixel shows, -1 for none.
     """
 
     rgb: NDArray[np.uint8]

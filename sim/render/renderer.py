@@ -1,4 +1,4 @@
-"""The renderers' common face, and the choice between them."""
+"""The renderers' common protocol, and the choice between them."""
 
 from typing import Literal, Protocol
 
@@ -18,26 +18,27 @@ RendererName = Literal["auto", "moderngl", "tiny"]
 
 
 class Renderer(Protocol):
-    """Draws the items of one `Visuals`. `reason` says in words why this one was chosen."""
+    """Draws the items of `visuals`. `reason` says in words why this renderer was chosen."""
 
+    visuals: Visuals
     name: str
     reason: str
 
     def render(
         self, poses: NDArray[np.float32], world_from_camera: RigidTransform, intrinsics: Intrinsics, light: LightState
     ) -> Image:
-        """What an OpenCV optical frame sees of the items at `poses` (n, 3, 4), as from `Visuals.snapshot`."""
+        """The picture of the items at `poses`, a `Visuals.snapshot`, from an optical frame (x right, y down)."""
         ...
 
     def close(self) -> None:
-        """Free what the renderer holds."""
+        """Free the renderer's context or client."""
         ...
 
 
 def make_renderer(visuals: Visuals, choice: RendererName = "auto") -> Renderer:
-    """The renderer asked for; "auto" takes moderngl where a GL context can be made, else TinyRenderer.
+    """The chosen renderer; "auto" takes moderngl where an EGL context can be made, else TinyRenderer.
 
-    Raises whatever moderngl raises if it is asked for by name and no context can be made.
+    Raises whatever moderngl raises if it is chosen by name and no context can be made.
     """
     if choice == "tiny":
         return TinyRenderer(visuals, "asked for")

@@ -1,4 +1,4 @@
-"""The renderer that needs nothing but PyBullet: ten times slower than OpenGL, and there when no EGL is."""
+"""PyBullet's software renderer, for machines without EGL. It is ten times slower than OpenGL."""
 
 import numpy as np
 import pybullet as p
@@ -6,21 +6,21 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from regrasp.interfaces.frame import Intrinsics
-from regrasp.sim.render.meshes import corners
-from regrasp.sim.render.picture import BACKGROUND, FAR, NEAR, Image, LightState
+from regrasp.sim.render.meshes import triangle_corners
+from regrasp.sim.render.picture import BACKGROUND, Z_FAR, Z_NEAR, Image, LightState
 from regrasp.sim.render.visuals import VisualItem, Visuals
 
 
 class TinyRenderer:
-    """Holds one visual body per item in a PyBullet client of its own, and moves them to the poses given."""
+    """A `Renderer` with its own PyBullet client, in which one visual body for each item is moved to the given poses."""
 
     name = "tiny"
 
     def __init__(self, visuals: Visuals, reason: str = "") -> None:
-        self.reason = reason
+        self.visuals, self.reason = visuals, reason
         self._client = p.connect(p.DIRECT)
         self._bodies = [_body(self._client, item) for item in visuals.items]
-        # from the body seen, or -1, to the item's id
+        # Item ids by body number + 1; the first is for no body, -1.
         self._ids = np.full(max(self._bodies, default=0) + 2, -1, np.int32)
         self._ids[np.array(self._bodies, int) + 1] = visuals.ids
 
@@ -49,18 +49,18 @@ class TinyRenderer:
         )
         ids = self._ids[np.asarray(seen).reshape(k.height, k.width) + 1]
         buffer = np.asarray(depth, float).reshape(k.height, k.width)
-        metres = np.where(ids == -1, 0.0, FAR * NEAR / (FAR - (FAR - NEAR) * buffer)).astype(np.float32)
+        metres = np.where(ids == -1, 0.0, Z_FAR * Z_NEAR / (Z_FAR - (Z_FAR - Z_NEAR) * buffer)).astype(np.float32)
         rgb = np.ascontiguousarray(np.asarray(rgba, np.uint8).reshape(k.height, k.width, 4)[:, :, :3])
         rgb[ids == -1] = np.rint(255 * np.array(BACKGROUND)).astype(np.uint8)
         return Image(rgb, metres, ids)
 
     def close(self) -> None:
-        """Leave the PyBullet client."""
+        """Disconnect the PyBullet client."""
         p.disconnect(physicsClientId=self._client)
 
 
 def _body(client: int, item: VisualItem) -> int:
-    rows = corners(item)
+    rows = triangle_corners(item)
     shape = p.createVisualShape(
         p.GEOM_MESH,
         vertices=rows[:, :3].tolist(),
@@ -74,7 +74,7 @@ def _body(client: int, item: VisualItem) -> int:
 
 
 def _view(world_from_camera: RigidTransform) -> list[float]:
-    """OpenGL's view matrix, column by column: y up and z backwards."""
+    """OpenGL's view matrix (y up, z backwards), column by column."""
     flip = np.diag([1.0, -1.0, -1.0, 1.0])
     return list((flip @ world_from_camera.inv().as_matrix()).T.ravel())
 
@@ -84,6 +84,11 @@ def _projection(k: Intrinsics) -> list[float]:
     return [
         *(2 * k.fx / k.width, 0.0, 0.0, 0.0),
         *(0.0, 2 * k.fy / k.height, 0.0, 0.0),
-        *(1 - 2 * k.cx / k.width, 2 * (k.cy + 1) / k.height - 1, -(FAR + NEAR) / (FAR - NEAR), -1.0),
-        *(0.0, 0.0, -2 * FAR * NEAR / (FAR - NEAR), 0.0),
+        *(
+            1 - 2 * k.cx / k.width,
+            2 * (k.cy + 1) / k.height - 1,
+            -(Z_FAR + Z_NEAR) / (Z_FAR - Z_NEAR),
+            -1.0,
+        ),
+        *(0.0, 0.0, -2 * Z_FAR * Z_NEAR / (Z_FAR - Z_NEAR), 0.0),
     ]

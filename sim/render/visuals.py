@@ -1,4 +1,4 @@
-"""What the bodies of a PyBullet client look like, and where each part is now."""
+"""The visual shapes of the bodies in a PyBullet client, and their poses."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -8,14 +8,23 @@ import pybullet as p
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
+from regrasp.interfaces.arrays import FloatArray
+from regrasp.interfaces.fields import Color
+
 
 @dataclass(frozen=True)
 class VisualItem:
     """One visual shape.
 
-    `kind` is a PyBullet GEOM_ constant. `size` in metres: box: full edges; sphere: (radius, -, -); capsule and
-    cylinder, along z: (length, radius, -); mesh: the scale of the file's units. `file` is the mesh file, else ''.
-    `color` is RGB, 0 to 1.
+    Attributes:
+        body: PyBullet's number of its body.
+        link: Its link, -1 for the base.
+        kind: A PyBullet GEOM_ constant.
+        size: In metres. Box: full edges; sphere: (radius, -, -); capsule and cylinder, which lie along z:
+            (length, radius, -). Mesh: scale factors of the file's units.
+        file: The mesh file, '' for other kinds.
+        color: RGB, 0 to 1.
+        link_from_visual: Pose of the shape in its link.
     """
 
     body: int
@@ -23,17 +32,22 @@ class VisualItem:
     kind: int
     size: tuple[float, float, float]
     file: str
-    color: tuple[float, float, float]
+    color: Color
     link_from_visual: RigidTransform
 
     @property
     def id(self) -> int:
-        """Body and link as PyBullet packs them in its segmentation masks; -1 is the link of a base."""
-        return self.body + ((self.link + 1) << 24)
+        """The item's `segmentation_id`; items of one link share it."""
+        return segmentation_id(self.body, self.link)
+
+
+def segmentation_id(body: int, link: int) -> int:
+    """Body and link as PyBullet packs them in its segmentation masks; the base is link -1."""
+    return body + ((link + 1) << 24)
 
 
 class Visuals:
-    """The visual shapes of all bodies that the client holds when this is made; fully transparent ones are left out."""
+    """The visual shapes of all bodies in the client at construction, without fully transparent ones."""
 
     def __init__(self, client: int) -> None:
         self._client = client
@@ -45,10 +59,10 @@ class Visuals:
         rows = {key: row for row, key in enumerate((b, link) for b, links in self._links.items() for link in links)}
         self._rows = np.array([rows[i.body, i.link] for i in self.items], int)
         local = [i.link_from_visual.as_matrix()[:3] for i in self.items]
-        self._local: NDArray[np.float64] = np.array(local).reshape(-1, 3, 4)
+        self._local: FloatArray = np.array(local).reshape(-1, 3, 4)
 
     def snapshot(self) -> NDArray[np.float32]:
-        """World poses of all items now: (n, 3, 4), rows of world_from_visual. Read-only: cameras may share it."""
+        """Present poses world_from_visual of all items, (n, 3, 4) float32. Read-only, so that cameras may share it."""
         frames = [frame for body, links in self._links.items() for frame in self._frames(body, links)]
         if not frames:
             return np.zeros((0, 3, 4), np.float32)
@@ -61,7 +75,7 @@ class Visuals:
         return poses
 
     def _frames(self, body: int, links: list[int]) -> list[tuple[Any, Any]]:
-        """Position and quaternion in the world of the links' URDF frames; for the base, -1, of its inertial frame."""
+        """Position and quaternion of the links' URDF frames in the world; for the base, -1, of its inertial frame."""
         frames = []
         if links and links[0] == -1:
             frames.append(p.getBasePositionAndOrientation(body, physicsClientId=self._client))
@@ -74,7 +88,7 @@ class Visuals:
     def _item(self, shape: tuple[Any, ...]) -> VisualItem:
         body, link, kind, size, file, position, quaternion, color = shape[:8]
         local = RigidTransform.from_components(position, Rotation.from_quat(quaternion))
-        if link == -1:  # a base's pose is that of its inertial frame, its visual frame is told in the URDF frame
+        if link == -1:  # PyBullet gives a base's pose for its inertial frame, but its visual frame in its URDF frame
             info = p.getDynamicsInfo(body, -1, physicsClientId=self._client)
             local = RigidTransform.from_components(info[3], Rotation.from_quat(info[4])).inv() * local
         return VisualItem(body, link, kind, tuple(size), file.decode(), tuple(color[:3]), local)

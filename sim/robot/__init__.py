@@ -1,1 +1,1 @@
-"""The arms: their model, servos and jaws."""
+"""The arms: robot model, servos and grippers."""

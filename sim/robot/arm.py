@@ -1,81 +1,101 @@
-"""A ViperX 300 S: joint servos, constant joint offsets, encoders.
+"""A simulated ViperX 300 S: position servos, constant joint offsets, encoders.
 
-It speaks the maker's present joint signs (all other rooms do); the URDF's elbow and wrist run the other way.
+Its interface uses the maker's present joint signs, as all other packages do. In the URDF the elbow and the wrist angle
+have the opposite sign.
 """
 
 import tempfile
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pybullet as p
-from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from regrasp.interfaces.cell import ArmSpec, Errors, GripperSpec
+from regrasp.interfaces.arrays import FloatArray, Mask
+from regrasp.interfaces.cell import ArmName, ArmSpec, Cell, WristMount
 from regrasp.interfaces.reading import JointReading
 from regrasp.interfaces.trajectory import Trajectory
-from regrasp.sim.robot.gripper import SimGripper
-from regrasp.sim.robot.model import NAME, robot_urdf
-
-FloatArray = NDArray[np.float64]
+from regrasp.sim.robot.gripper import GripperParameters, SimGripper
+from regrasp.sim.robot.model import ROBOT_NAME, robot_urdf
 
 # The URDF's links that the six joints move.
-JOINTS = ("shoulder_link", "upper_arm_link", "upper_forearm_link", "lower_forearm_link", "wrist_link", "gripper_link")
-SIGN = np.array([1.0, 1.0, -1.0, 1.0, -1.0, 1.0])
+JOINT_LINKS = (
+    "shoulder_link",
+    "upper_arm_link",
+    "upper_forearm_link",
+    "lower_forearm_link",
+    "wrist_link",
+    "gripper_link",
+)
+JOINT_SIGNS = np.array([1.0, 1.0, -1.0, 1.0, -1.0, 1.0])
 # Stall torques at 12 V of the maker's servos: XM540-W270 10.6 N m (two at shoulder and elbow), XM430-W350 4.1 N m.
-TORQUE = np.array([10.6, 21.2, 21.2, 10.6, 10.6, 4.1])
-SPEED = np.pi  # rad/s, the maker's limit of every joint
-ENCODER_STEP = 2 * np.pi / 4096
-# Where the tool error that the joint offsets make is set: out forward, and two poses of the work.
+STALL_TORQUES = np.array([10.6, 21.2, 21.2, 10.6, 10.6, 4.1])
+MAX_JOINT_SPEED = np.pi  # rad/s, the maker's limit of every joint
+ENCODER_STEP = 2 * np.pi / 4096  # rad
+# Joint positions at which the joint offsets make the stated tool error: stretched forward, and two poses of the task.
 REFERENCE_POSES = np.array([[0, 0, 0, 0, 0, 0], [0.4, -0.3, 0.4, 0.5, 0.3, 0.2], [0.8, 0.3, -0.2, -0.6, 0.6, 0.0]])
-BRAKE = 12.0  # rad/s2: from full speed (0.85 of pi rad/s) to rest in 0.22 s
 _WRIST_FROM_URDF = Rotation.from_rotvec([np.pi, 0, 0])
 
 
-class SimArm:
-    """One arm in a PyBullet client; fulfils `regrasp.interfaces.devices.Arm`, its `gripper` fulfils `Gripper`.
+@dataclass(frozen=True)
+class ArmParameters:
+    """The joint servos."""
 
-    `offsets` (6,) rad: what each encoder reads too little. The world calls `step()` before every physics step.
+    braking: float = 12.0  # rad/s2: from full speed (0.85 of pi rad/s) to rest in 0.22 s
+    braking_samples: int = 12  # of the trajectory that brakes
+    position_gain: float = 0.3  # PyBullet's position control, share of the error that is corrected in a step
+    velocity_gain: float = 1.0
+
+
+class SimArm:
+    """One arm in a PyBullet client; implements `regrasp.interfaces.devices.Arm`, and its `gripper` `Gripper`.
+
+    `offsets` (6,) rad are the joint offsets: each encoder reads that much less than the truth. The world calls `step()`
+    before every physics step.
     """
 
     def __init__(
         self,
         client: int,
-        spec: ArmSpec,
-        gripper: GripperSpec,
-        errors: Errors,
-        step: float,
-        camera_offset: tuple[float, float, float] | None,
+        cell: Cell,
+        name: ArmName,
         rng: np.random.Generator,
+        parameters: ArmParameters = ArmParameters(),
+        gripper_parameters: GripperParameters | None = None,
     ) -> None:
+        spec, hidden = cell.known.arm(name), cell.hidden
         self.name: str = spec.name
         self.client = client
-        self._dt = step
+        self._parameters = parameters
+        self._dt = 1.0 / hidden.step_rate
         self._steps = 0
-        self.body = _load(client, spec, robot_urdf(gripper.pad_thickness, camera_offset))
+        self.body = _load(client, spec, robot_urdf(hidden.gripper.pad_thickness, _camera_offset(cell, name)))
         self.links = {
-            p.getJointInfo(self.body, j, physicsClientId=client)[12].decode().removeprefix(f"{NAME}/"): j
+            p.getJointInfo(self.body, j, physicsClientId=client)[12].decode().removeprefix(f"{ROBOT_NAME}/"): j
             for j in range(p.getNumJoints(self.body, physicsClientId=client))
         }
-        self.joints = [self.links[name] for name in JOINTS]
-        self.offsets = self._draw_offsets(errors.arm_tool, rng)
-        self._speed_share = np.ones(6)  # of `SPEED`, joint by joint; less by a fault
-        self._slip = np.zeros(6)  # rad that the encoders read too much, by a fault
+        self.joints = [self.links[name] for name in JOINT_LINKS]
+        self.offsets = self._draw_offsets(hidden.errors.arm_tool, rng)
+        self._speed_share = np.ones(6)  # of `MAX_JOINT_SPEED`, for each joint; less by a fault
+        self._encoder_slip = np.zeros(6)  # rad that the encoders read too much, by a fault
         self._trajectory: Trajectory | None = None
         self._started = 0.0
         self._servo: FloatArray = np.array(spec.sleep, float)
         self.place(self._servo)
-        self.gripper = SimGripper(client, self.body, self.links, self.now, gripper, errors, rng)
+        self.gripper = SimGripper(
+            client, self.body, self.links, self.now, hidden, rng, gripper_parameters or GripperParameters()
+        )
 
     def reading(self) -> JointReading:
-        """Encoder positions, quantised and short of the truth by the offsets; servo torques."""
+        """Quantised encoder positions, which are less than the truth by the offsets; velocities; servo torques."""
         states = p.getJointStates(self.body, self.joints, physicsClientId=self.client)
-        positions = SIGN * np.array([s[0] for s in states]) - self.offsets + self._slip
+        positions = JOINT_SIGNS * np.array([s[0] for s in states]) - self.offsets + self._encoder_slip
         return JointReading(
             self.now(),
             np.round(positions / ENCODER_STEP) * ENCODER_STEP,
-            SIGN * np.array([s[1] for s in states]),
-            SIGN * np.array([s[3] for s in states]),
+            JOINT_SIGNS * np.array([s[1] for s in states]),
+            JOINT_SIGNS * np.array([s[3] for s in states]),
         )
 
     def now(self) -> float:
@@ -83,7 +103,7 @@ class SimArm:
         return self._steps * self._dt
 
     def restart_clock(self) -> None:
-        """Call the present instant zero."""
+        """Set the clock to zero."""
         self._steps = 0
         self.gripper.restart_clock()
 
@@ -92,18 +112,18 @@ class SimArm:
         self._trajectory, self._started = trajectory, self.now()
 
     def stop(self) -> None:
-        """See `regrasp.interfaces.devices.Arm`: all joints brake to rest together, at most `BRAKE`."""
+        """See `regrasp.interfaces.devices.Arm`: all joints come to rest together, none brakes harder than `braking`."""
         if self._trajectory is None:
             return
         q, v = self._trajectory.sample(self.now() - self._started)
         late = self._late(q)
         q, v = np.where(late, self._servo, q), np.where(late, 0.0, v)
-        seconds = float(np.max(np.abs(v))) / BRAKE
+        seconds = float(np.max(np.abs(v))) / self._parameters.braking
         if seconds < self._dt:
             self._trajectory = None
             self._drive(q, np.zeros(6))
             return
-        times = np.linspace(0.0, seconds, 12)
+        times = np.linspace(0.0, seconds, self._parameters.braking_samples)
         share = times - times**2 / (2 * seconds)
         self.follow(Trajectory(times, q + share[:, None] * v, (1 - times / seconds)[:, None] * v))
 
@@ -112,12 +132,12 @@ class SimArm:
         return self._trajectory is not None
 
     def wrist_pose(self) -> RigidTransform:
-        """True world_from_wrist (link before the last joint; x along the gripper, z up at the zero pose)."""
+        """True world_from_wrist (link before the last joint): x along the gripper, z up when all joints are zero."""
         s = p.getLinkState(self.body, self.links["wrist_link"], 0, 1, physicsClientId=self.client)
         return RigidTransform.from_components(s[4], Rotation.from_quat(s[5]) * _WRIST_FROM_URDF.inv())
 
     def tool_pose(self) -> RigidTransform:
-        """True world_from_tool: x along the fingers, y the closing direction, origin between the pads."""
+        """True world_from_tool: x along the fingers, y along the closing direction, origin midway between the pads."""
         left = p.getLinkState(self.body, self.links["left_pad"], 0, 1, physicsClientId=self.client)
         right = p.getLinkState(self.body, self.links["right_pad"], 0, 1, physicsClientId=self.client)
         middle = (np.array(left[4]) + np.array(right[4])) / 2
@@ -125,23 +145,23 @@ class SimArm:
         return RigidTransform.from_components(middle, Rotation.from_quat(bar[5]))
 
     def set_speed_share(self, joint: int, share: float) -> None:
-        """A fault: a joint, 0 to 5, that turns no faster than a share of `SPEED`; with 0 it stands."""
+        """A fault: joint 0 to 5 turns no faster than `share` of `MAX_JOINT_SPEED`; with 0 it does not turn."""
         self._speed_share[joint] = share
 
     def slip_encoder(self, joint: int, angle: float) -> None:
-        """A fault: a joint's encoder reads `angle` rad more from now on; its servo has a sensor of its own."""
-        self._slip[joint] += angle
+        """A fault: the encoder of joint 0 to 5 reads `angle` rad more from now on. The servo has its own sensor."""
+        self._encoder_slip[joint] += angle
 
     def step(self) -> None:
         """Set the servos for the next physics step."""
         if self._trajectory is not None:
             t = self.now() + self._dt - self._started
             q, v = self._trajectory.sample(t)
-            if t >= self._trajectory.duration and float(np.max(np.abs(q - self._target))) <= SPEED * self._dt:
+            if t >= self._trajectory.duration and float(np.max(np.abs(q - self._target))) <= MAX_JOINT_SPEED * self._dt:
                 self._trajectory, v = None, np.zeros(6)
-            # A servo turns no faster than its maker lets it: a hasty trajectory is followed late.
+            # A servo turns no faster than its rated speed; it follows a faster trajectory late.
             wanted = q - self._target
-            step = np.clip(wanted, -SPEED * self._dt, SPEED * self._dt)
+            step = np.clip(wanted, -MAX_JOINT_SPEED * self._dt, MAX_JOINT_SPEED * self._dt)
             self._drive(self._target + step, np.where(step == wanted, v, step / self._dt))
         elif self._late(self._target).any():
             self._drive(self._target, np.zeros(6))
@@ -151,7 +171,7 @@ class SimArm:
     def _drive(self, q: FloatArray, v: FloatArray) -> None:
         late = self._late(q)
         if late.any():
-            reach = self._speed_share * SPEED * self._dt
+            reach = self._speed_share * MAX_JOINT_SPEED * self._dt
             self._servo = np.where(late, self._servo + np.clip(q - self._servo, -reach, reach), q)
             v = np.where(late, 0.0, v)
         else:
@@ -161,30 +181,30 @@ class SimArm:
             self.body,
             self.joints,
             p.POSITION_CONTROL,
-            targetPositions=(SIGN * (self._servo + self.offsets)).tolist(),
-            targetVelocities=(SIGN * v).tolist(),
-            positionGains=[0.3] * 6,
-            velocityGains=[1.0] * 6,
-            forces=TORQUE.tolist(),
+            targetPositions=(JOINT_SIGNS * (self._servo + self.offsets)).tolist(),
+            targetVelocities=(JOINT_SIGNS * v).tolist(),
+            positionGains=[self._parameters.position_gain] * 6,
+            velocityGains=[self._parameters.velocity_gain] * 6,
+            forces=STALL_TORQUES.tolist(),
             physicsClientId=self.client,
         )
 
-    def _late(self, q: FloatArray) -> NDArray[np.bool_]:
-        """Which servos (6,) cannot be at `q` (6,) rad within a step: none, but by a fault."""
-        return np.abs(q - self._servo) > self._speed_share * SPEED * self._dt + 1e-9
+    def _late(self, q: FloatArray) -> Mask:
+        """Which servos (6,) cannot reach `q` (6,) rad within a step; without a fault, none."""
+        return np.abs(q - self._servo) > self._speed_share * MAX_JOINT_SPEED * self._dt + 1e-9
 
     def place(self, q: FloatArray) -> None:
-        """Put the joints at `q` (6,) rad at once: where a run begins, and for pictures without physics."""
+        """Set the joints to `q` (6,) rad at once, for the start of a run and for pictures without physics."""
         self._reset_joints(q + self.offsets)
         self._servo = q
         self._drive(q, np.zeros(6))
 
     def _reset_joints(self, q: FloatArray) -> None:
-        for joint, value in zip(self.joints, SIGN * q, strict=True):
+        for joint, value in zip(self.joints, JOINT_SIGNS * q, strict=True):
             p.resetJointState(self.body, joint, value, physicsClientId=self.client)
 
     def _draw_offsets(self, tool_error: float, rng: np.random.Generator) -> FloatArray:
-        """Joint offsets (6,) rad whose mean tool error over reference poses is `tool_error` metres."""
+        """Random joint offsets (6,) rad; their mean tool error over the reference poses is `tool_error` m."""
         draw = rng.normal(size=6)
         if tool_error == 0.0:
             return np.zeros(6)
@@ -193,9 +213,15 @@ class SimArm:
         return small * tool_error / float(np.mean(moved))
 
     def _tool_at(self, q: FloatArray) -> FloatArray:
-        """Tool position (3,) m with the joints put at `q`."""
+        """Tool position (3,) m in the world with the joints set to `q` (6,) rad."""
         self._reset_joints(q)
         return self.tool_pose().translation
+
+
+def _camera_offset(cell: Cell, arm: ArmName) -> tuple[float, float, float] | None:
+    """Offset (m, in the wrist link) of the camera on that arm; None if it carries none."""
+    offsets = {c.mount.arm: c.mount.offset for c in cell.known.cameras if isinstance(c.mount, WristMount)}
+    return offsets.get(arm)
 
 
 def _load(client: int, spec: ArmSpec, urdf: str) -> int:

@@ -1,20 +1,31 @@
-"""The ViperX's jaw: two coupled fingers that hold by friction only, and their noisy encoder."""
+"""The ViperX's gripper: two coupled fingers that hold by friction alone, and their noisy encoder."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 import pybullet as p
 
-from regrasp.interfaces.cell import Errors, GripperSpec
+from regrasp.interfaces.hidden_world import HiddenWorld
 from regrasp.interfaces.reading import GripperReading
 from regrasp.sim.robot.model import finger_position, pad_gap
 
-OPEN_FORCE = 40.0  # N a finger while opening or holding a gap
-CLOSED_GAP = 0.003  # m between the pads of a closed jaw: the jaw's lower stop
+
+@dataclass(frozen=True)
+class GripperParameters:
+    """The fingers' drive and their coupling."""
+
+    open_force: float = 40.0  # N on each finger while opening or holding a gap
+    closed_gap: float = 0.003  # m between the pads at the lower stop
+    position_gain: float = 0.1  # PyBullet's position control while opening or holding a gap
+    velocity_gain: float = 1.0
+    spinning_friction: float = 0.005  # of the pads, against rotation about a contact's normal (PyBullet's unit)
+    gear_force: float = 500.0  # N, limit of the constraint that couples the fingers
+    gear_error_reduction: float = 0.3  # share of the coupling's error that is corrected in a step
 
 
 class SimGripper:
-    """Fulfils `regrasp.interfaces.devices.Gripper` on the fingers and pads among the `links` of an arm's `body`.
+    """Implements `regrasp.interfaces.devices.Gripper` with the fingers and pads among the `links` of an arm's `body`.
 
     `now` gives the arm's simulated seconds. The arm calls `step()` before every physics step.
     """
@@ -25,20 +36,20 @@ class SimGripper:
         body: int,
         links: Mapping[str, int],
         now: Callable[[], float],
-        spec: GripperSpec,
-        errors: Errors,
+        hidden: HiddenWorld,
         rng: np.random.Generator,
+        parameters: GripperParameters = GripperParameters(),
     ) -> None:
         self._client, self._body, self._now = client, body, now
-        self._spec, self._errors = spec, errors
+        self._spec, self._errors, self._parameters = hidden.gripper, hidden.errors, parameters
         self._fingers = (links["left_finger_link"], links["right_finger_link"])
         self.pads = (links["left_pad"], links["right_pad"])
         self._noise_key = int(rng.integers(2**31))
         self._build(links["gripper_prop_link"])
-        self._gap_command = CLOSED_GAP
+        self._gap_command = parameters.closed_gap
         self._force: float | None = None
         self._forced_open, self._stuck, self._force_share = False, False, 1.0
-        self._play = self.true_gap()
+        self._backlash_gap = self.true_gap()
         self._samples = 0
         self._reading = self._sample(0)
         self._drive()
@@ -49,7 +60,7 @@ class SimGripper:
         self._drive()
 
     def close(self, force: float) -> None:
-        """See `regrasp.interfaces.devices.Gripper`; `force` is capped at the jaw's maximum."""
+        """See `regrasp.interfaces.devices.Gripper`; `force` is limited to the gripper's maximum."""
         self._force = min(force, self._spec.max_force)
         self._drive()
 
@@ -60,10 +71,10 @@ class SimGripper:
     def set_fault(
         self, *, forced_open: bool | None = None, stuck: bool | None = None, force_share: float | None = None
     ) -> None:
-        """Switch faults on and off; those that are not given stay.
+        """Switch faults on and off; those that are None stay as they are.
 
-        `forced_open`: it drives open whatever it is told. `stuck`: it goes on with what it was told last and takes no
-        new command. `force_share`: the share of the closing force that it still makes.
+        `forced_open`: it drives open whatever it is commanded. `stuck`: it keeps its last command and takes no new one.
+        `force_share`: the share of the closing force that is left.
         """
         self._forced_open = self._forced_open if forced_open is None else forced_open
         self._stuck = self._stuck if stuck is None else stuck
@@ -76,12 +87,12 @@ class SimGripper:
         return pad_gap(states[0][0], states[1][0], self._spec.pad_thickness)
 
     def restart_clock(self) -> None:
-        """Call the present instant zero."""
+        """Set the count of samples to zero; the arm's clock is zero now."""
         self._samples = 0
         self._reading = self._sample(0)
 
     def step(self) -> None:
-        """Sample the encoder when due."""
+        """Sample the encoder if it is time."""
         due = int(self._now() * self._errors.finger_rate + 1e-6)
         if due > self._samples:
             self._samples = due
@@ -90,26 +101,36 @@ class SimGripper:
     def _sample(self, number: int) -> GripperReading:
         half = self._errors.finger_backlash / 2
         gap = self.true_gap()
-        self._play = min(max(self._play, gap - half), gap + half)
+        self._backlash_gap = min(max(self._backlash_gap, gap - half), gap + half)
         noise = np.random.default_rng([self._noise_key, number]).normal(0.0, self._errors.finger_noise)
         step = self._errors.finger_resolution
-        return GripperReading(self._now(), max(0.0, round((self._play + noise) / step) * step))
+        return GripperReading(self._now(), max(0.0, round((self._backlash_gap + noise) / step) * step))
 
     def _build(self, prop: int) -> None:
-        """Couple the fingers, give the pads their friction, still the propeller, and close the jaw."""
+        """Couple the fingers, set the pads' friction, stop the URDF's propeller joint, and close the gripper."""
         body, client = self._body, self._client
         for pad in self.pads:
             p.changeDynamics(
-                body, pad, lateralFriction=self._spec.friction, spinningFriction=0.005, physicsClientId=client
+                body,
+                pad,
+                lateralFriction=self._spec.friction,
+                spinningFriction=self._parameters.spinning_friction,
+                physicsClientId=client,
             )
         left, right = self._fingers
         gear = p.createConstraint(
             body, left, body, right, p.JOINT_GEAR, [0, 1, 0], [0, 0, 0], [0, 0, 0], physicsClientId=client
         )
-        # One servo moves both fingers: the URDF's right finger runs the other way.
-        p.changeConstraint(gear, gearRatio=1, maxForce=500, erp=0.3, physicsClientId=client)
+        # One servo moves both fingers; the URDF's right finger has the opposite sign.
+        p.changeConstraint(
+            gear,
+            gearRatio=1,
+            maxForce=self._parameters.gear_force,
+            erp=self._parameters.gear_error_reduction,
+            physicsClientId=client,
+        )
         p.setJointMotorControl2(body, prop, p.VELOCITY_CONTROL, targetVelocity=0, force=1, physicsClientId=client)
-        closed = finger_position(CLOSED_GAP, self._spec.pad_thickness)
+        closed = finger_position(self._parameters.closed_gap, self._spec.pad_thickness)
         p.resetJointState(body, left, closed, physicsClientId=client)
         p.resetJointState(body, right, -closed, physicsClientId=client)
 
@@ -124,7 +145,7 @@ class SimGripper:
             self._drive_to(finger_position(self._gap_command, self._spec.pad_thickness))
 
     def _drive_at(self, speed: float, force: float) -> None:
-        """Open (speed > 0) or close at `speed` m/s a finger, with at most `force` N a finger."""
+        """Open (speed > 0) or close; each finger moves at `speed` m/s with at most `force` N."""
         for finger, side in zip(self._fingers, (1, -1), strict=True):
             p.setJointMotorControl2(
                 self._body,
@@ -136,16 +157,16 @@ class SimGripper:
             )
 
     def _drive_to(self, position: float) -> None:
-        """Bring the finger joints to `position` metres and hold them there."""
+        """Move the finger joints to `position` m and hold them there."""
         for finger, side in zip(self._fingers, (1, -1), strict=True):
             p.setJointMotorControl2(
                 self._body,
                 finger,
                 p.POSITION_CONTROL,
                 targetPosition=side * position,
-                positionGain=0.1,
-                velocityGain=1.0,
-                force=OPEN_FORCE,
+                positionGain=self._parameters.position_gain,
+                velocityGain=self._parameters.velocity_gain,
+                force=self._parameters.open_force,
                 maxVelocity=self._spec.speed,
                 physicsClientId=self._client,
             )

@@ -1,29 +1,35 @@
-"""The ViperX 300 S as a URDF, made from the `rtb-data` package: rubber pads on the fingers, a camera on the wrist."""
+"""URDF of the ViperX 300 S, made from the `rtb-data` package, with rubber pads on the fingers and a wrist camera."""
 
 import xml.etree.ElementTree as ET
 from importlib.resources import files
 
 import xacro
 
+from regrasp.interfaces.fields import Color
+
 PACKAGE = "package://trossen_descriptions/"
-NAME = "vx300s"
-# Measured on rtb-data's finger meshes: a finger's inner face stands this far behind its joint's position. The pads sit
-# at the tips: their centre, which is our tool centre, lies PAD_AHEAD of the fingers' link (the maker's ee_gripper_link
-# is 0.018 behind it), so that a finger ends 0.012 past what it holds and can hold a plug close to a panel.
-FINGER_FACE = 0.0135
-PAD_AHEAD = 0.0565
-PAD_LENGTH = 0.024  # along the fingers, metres
-PAD_HEIGHT = 0.034  # of the finger's 0.061: gripped over such a length a cylinder resists the cable's bending moment
-CAMERA_SIZE = (0.025, 0.090, 0.025)  # D435i's body
-BRACKET = (0.008, 0.030)  # m, thickness and width of what carries the camera from the wrist's axis up: seen, never felt
-# The real arms are black. Choice: grey enough that in light no part of them is as dark as the cable.
+ROBOT_NAME = "vx300s"
+# Dimensions of this robot, in metres.
+FINGER_FACE = 0.0135  # measured on rtb-data's meshes: a finger's inner face lies this far behind its joint's position
+# The pads sit at the finger tips. Their centre, which is our tool centre, lies this far in front of the fingers' link,
+# 0.018 in front of the maker's ee_gripper_link. A finger so ends 0.012 past what it holds, to hold a plug near a panel.
+PAD_CENTER_X = 0.0565
+PAD_LENGTH = 0.024  # along the fingers
+PAD_HEIGHT = 0.034  # of the finger's 0.061; a cylinder gripped over such a length resists the cable's bending moment
+CAMERA_SIZE = (0.025, 0.090, 0.025)  # body of the D435i
+BRACKET = (0.008, 0.030)  # thickness and width of the camera's bracket, which is visible and has no collision shape
+# The real arms are black. Choice: grey, so that no lit part of them is as dark as the cable.
 ARM_COLOR = (0.30, 0.30, 0.31)
 
 
 def robot_urdf(pad_thickness: float, camera_offset: tuple[float, float, float] | None) -> str:
-    """The URDF text. Pads are links `left_pad`, `right_pad`; `camera_offset` (m, in our wrist link) adds a camera."""
+    """The URDF text.
+
+    The pads, `pad_thickness` m thick, are the links `left_pad` and `right_pad`. `camera_offset` (m, in our wrist link)
+    adds a camera; None leaves it out.
+    """
     root = files("rtbdata") / "xacro" / "trossen_descriptions"
-    document = xacro.process_file(str(root / "urdf" / "vx300s.urdf.xacro"), mappings={"robot_name": NAME})
+    document = xacro.process_file(str(root / "urdf" / "vx300s.urdf.xacro"), mappings={"robot_name": ROBOT_NAME})
     # PyBullet cannot parse a one-line URDF.
     text = document.toprettyxml(indent=" ").replace(PACKAGE, f"{root}/")
     robot = ET.fromstring(text)
@@ -34,15 +40,15 @@ def robot_urdf(pad_thickness: float, camera_offset: tuple[float, float, float] |
         _add_box(
             robot,
             f"{finger}_pad",
-            f"{NAME}/{finger}_finger_link",
-            (PAD_AHEAD, y, 0.0),
+            f"{ROBOT_NAME}/{finger}_finger_link",
+            (PAD_CENTER_X, y, 0.0),
             (PAD_LENGTH, pad_thickness, PAD_HEIGHT),
             (0.12, 0.12, 0.12),
         )
     if camera_offset is not None:
-        # The optical centre sits at the front of the body; the URDF's wrist link is ours turned by pi about x.
+        # The optical centre is at the front of the body. The URDF's wrist link is ours rotated by pi about x.
         behind = (camera_offset[0] - CAMERA_SIZE[0] / 2 - 0.004, -camera_offset[1], -camera_offset[2])
-        body = _add_box(robot, "camera_body", f"{NAME}/wrist_link", behind, CAMERA_SIZE, (0.75, 0.75, 0.75))
+        body = _add_box(robot, "camera_body", f"{ROBOT_NAME}/wrist_link", behind, CAMERA_SIZE, (0.75, 0.75, 0.75))
         span = camera_offset[2]
         _add_visual(body, (*BRACKET, span), ARM_COLOR, (0.0, 0.0, span / 2))
     ET.indent(robot)
@@ -50,12 +56,12 @@ def robot_urdf(pad_thickness: float, camera_offset: tuple[float, float, float] |
 
 
 def pad_gap(left: float, right: float, pad_thickness: float) -> float:
-    """Distance between the pads in metres from the finger joints' positions."""
+    """Distance between the pads in m; `left` and `right` are the finger joints' positions in m."""
     return left - right - 2 * (FINGER_FACE + pad_thickness)
 
 
 def finger_position(gap: float, pad_thickness: float) -> float:
-    """The left finger joint's position in metres at which the pads stand `gap` apart."""
+    """Position of the left finger joint in m at which the pads are `gap` m apart; the right one's is its negative."""
     return gap / 2 + FINGER_FACE + pad_thickness
 
 
@@ -65,9 +71,9 @@ def _add_box(
     parent: str,
     position: tuple[float, float, float],
     size: tuple[float, float, float],
-    color: tuple[float, float, float],
+    color: Color,
 ) -> ET.Element:
-    """A box fixed on the link `parent`; returns its own link."""
+    """Add a box, as a link of its own, fixed on the link `parent`; return its link."""
     link = ET.SubElement(robot, "link", name=name)
     _add_visual(link, size, color, (0.0, 0.0, 0.0))
     ET.SubElement(ET.SubElement(ET.SubElement(link, "collision"), "geometry"), "box", size=_numbers(size))
@@ -84,10 +90,10 @@ def _add_box(
 def _add_visual(
     link: ET.Element,
     size: tuple[float, float, float],
-    color: tuple[float, float, float],
+    color: Color,
     position: tuple[float, float, float],
 ) -> None:
-    """A box that is seen, at `position` in the link."""
+    """Add a visual box at `position` in the link."""
     visual = ET.SubElement(link, "visual")
     ET.SubElement(visual, "origin", xyz=_numbers(position), rpy="0 0 0")
     ET.SubElement(ET.SubElement(visual, "geometry"), "box", size=_numbers(size))
@@ -96,9 +102,9 @@ def _add_visual(
 
 
 def _set_color(material: ET.Element | None) -> None:
-    """Put the arms' colour in the place of the texture of rtb-data's only material."""
+    """Replace the texture of rtb-data's only material by the arms' colour."""
     if material is None:
-        raise ValueError("rtb-data's ViperX model names no material")
+        raise ValueError("rtb-data's ViperX model has no material")
     material.clear()
     material.set("name", "interbotix_black")
     ET.SubElement(material, "color", rgba=_numbers((*ARM_COLOR, 1.0)))

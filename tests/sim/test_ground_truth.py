@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from regrasp.interfaces.cell import Box, Cell, FixedMount
-from regrasp.interfaces.scene import Obstacle
+from regrasp.interfaces.scene import Obstacle, SceneSetup
 from regrasp.sim.ground_truth import GroundTruth
 from regrasp.sim.world import World
 
@@ -49,14 +49,14 @@ def test_behind_an_obstacle_no_pixels(cell: Cell, world: World) -> None:
     assert isinstance(camera, FixedMount)
     middle = connector + 0.3 * (np.asarray(camera.position) - connector)
     box = Box(name="wall", center=(middle[0], middle[1], middle[2]), size=(0.01, 0.2, 0.2))
-    hidden = World(cell, "zero", seed=1, obstacles=(Obstacle(box, 0.0, None),), renderer="tiny")
+    hidden = World(cell, "zero", seed=1, setup=SceneSetup((Obstacle(box, 0.0, None),)), renderer="tiny")
     hidden.advance(0.2)
     assert GroundTruth(hidden).connector_pixels("rear") == 0
-    assert GroundTruth(hidden).hidden_share("rear") == 1.0
+    assert GroundTruth(hidden).occluded_share("rear") == 1.0
     shares = []
     for aside in np.linspace(0.0, 0.14, 8):  # the wall's left edge passes the connector
         hidden.place_obstacle("wall", middle - [0.0, aside, 0.0])
-        shares.append(GroundTruth(hidden).hidden_share("rear"))
+        shares.append(GroundTruth(hidden).occluded_share("rear"))
     assert shares == sorted(shares, reverse=True)
     assert any(0.2 < share < 0.8 for share in shares)
     assert shares[-1] == 0.0

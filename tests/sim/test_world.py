@@ -16,7 +16,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from regrasp.interfaces.cell import Box, Cell
 from regrasp.interfaces.devices import Clock
-from regrasp.interfaces.scene import Obstacle, Prop
+from regrasp.interfaces.scene import Obstacle, Prop, SceneSetup
 from regrasp.sim.ground_truth import GroundTruth
 from regrasp.sim.world import World
 
@@ -171,7 +171,7 @@ def test_an_arm_against_the_panel_is_counted_with_its_force(cell: Cell) -> None:
 def test_obstacles_stand_where_they_were_put(cell: Cell) -> None:
     box = Box(name="tall", center=(0.3, 0.2, 0.18), size=(0.12, 0.08, 0.36))
     stand = Box(name="leg", center=(0.3, 0.2, 0.05), size=(0.02, 0.02, 0.1))
-    world = World(cell, "zero", seed=1, obstacles=(Obstacle(box, np.pi / 2, stand),), renderer="tiny")
+    world = World(cell, "zero", seed=1, setup=SceneSetup((Obstacle(box, np.pi / 2, stand),)), renderer="tiny")
     lower, upper = p.getAABB(world.boxes["obstacle tall"], physicsClientId=world.client)
     np.testing.assert_allclose(np.subtract(upper, lower), [0.08, 0.12, 0.36], atol=5e-3)
     np.testing.assert_allclose(np.add(upper, lower) / 2, box.center, atol=1e-6)
@@ -181,7 +181,7 @@ def test_obstacles_stand_where_they_were_put(cell: Cell) -> None:
 
 def test_a_connector_may_start_on_a_stand(cell: Cell) -> None:
     asked = RigidTransform.from_components([0.38, 0.06, 0.29], Rotation.from_euler("zy", [100.0, -20.0], degrees=True))
-    world = World(cell, "zero", seed=1, renderer="tiny", connector_at=asked)
+    world = World(cell, "zero", seed=1, setup=SceneSetup(connector_at=asked), renderer="tiny")
     off = asked.inv() * world.connector_pose()
     assert world.socket.holds
     assert float(np.linalg.norm(off.translation)) < 1e-3
@@ -193,11 +193,11 @@ def test_a_connector_may_start_on_a_stand(cell: Cell) -> None:
 
 def test_props_are_seen_where_they_are_placed_and_stop_nothing(cell: Cell) -> None:
     props = (Prop("ball", (0.03,), (0.0, 1.0, 0.0)), Prop("rod", (0.2, 0.02), (0.0, 1.0, 0.0)))
-    world = World(cell, "zero", seed=1, renderer="tiny", props=props)
+    world = World(cell, "zero", seed=1, setup=SceneSetup(props=props), renderer="tiny")
     rear = world.cameras["rear"]
 
     def green() -> NDArray[np.intp]:
-        rgb = next(rear.still(1)).rgb
+        rgb = next(rear.static_frames(1)).rgb
         return np.argwhere((rgb[..., 1] > 60) & (rgb[..., 0] < 30) & (rgb[..., 2] < 30))
 
     assert len(green()) == 0
@@ -224,7 +224,7 @@ def test_under_gravity_a_loose_end_hangs(cell: Cell) -> None:
 
 
 def test_two_processes_agree_bit_for_bit_whoever_looks() -> None:
-    script = str(Path(__file__).with_name("world_digest.py"))
+    script = str(Path(__file__).parents[1] / "support" / "world_digest.py")
     runs = [
         subprocess.Popen([sys.executable, script, *more], stdout=subprocess.PIPE, text=True)
         for more in ([], [], ["second reader"])

@@ -12,7 +12,7 @@ from regrasp.app.scenario.cell_file import load_cell
 from regrasp.interfaces.cell import Tag
 from regrasp.interfaces.frame import RgbdFrame
 from regrasp.sim.cameras.depth_noise import DepthNoise
-from regrasp.sim.render.printed import tag_boxes, visual
+from regrasp.sim.render.fiducials import compound_visual, tag_boxes
 from regrasp.sim.render.renderer import LightState, RendererName, make_renderer
 from regrasp.sim.render.visuals import Visuals
 
@@ -35,7 +35,7 @@ class TagScene:
         )
         p.createMultiBody(0, -1, wall, [0, 0, WALL + 0.01], physicsClientId=self._client)
         body = (CONNECTOR.radius, CONNECTOR.length, CONNECTOR.color)
-        shapes = [visual(self._client, tag_boxes(tag), tag.body_from_tag, body) for tag in tags]
+        shapes = [compound_visual(self._client, tag_boxes(tag), tag.body_from_tag, body) for tag in tags]
         self._bodies = [p.createMultiBody(0, -1, shape, physicsClientId=self._client) for shape in shapes]
         self._visuals = Visuals(self._client)
         self._renderer = make_renderer(self._visuals, renderer)

@@ -8,9 +8,10 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from regrasp.app.studies.pose.scenes import CAMERA
 from regrasp.app.studies.pose.trial import Setup
-from regrasp.interfaces.cell import Cell, Color, FixedMount
+from regrasp.interfaces.cell import Cell, FixedMount
+from regrasp.interfaces.fields import Color
 from regrasp.interfaces.frame import RgbdFrame
-from regrasp.interfaces.scene import Prop
+from regrasp.interfaces.scene import Prop, SceneSetup
 from regrasp.perception.pose.estimate import Estimate
 from regrasp.sim.render.renderer import RendererName
 from regrasp.sim.world import World
@@ -65,7 +66,7 @@ def negative_frames(
     black = cell.known.connector.model_copy(update={"color": cell.hidden.cable.color, "tag": None})
     props = look_alikes(cell, rng)
     without = cell.model_copy(update={"known": cell.known.model_copy(update={"connector": black})})
-    world = World(without, "zero", seed, renderer=renderer, props=props)
+    world = World(without, "zero", seed, SceneSetup(props=props), renderer)
     try:
         panel = next(box for box in cell.known.boxes if box.name == "back_panel")
         face = panel.center[0] - 0.5 * panel.size[0]
@@ -77,7 +78,7 @@ def negative_frames(
                 shown = rng.random() < parameters.shown_share
                 world.place_prop(number, RigidTransform.from_components(place, turn) if shown else None)
             world.advance(1.0 / world.cameras[CAMERA].spec.rate)
-            yield next(world.cameras[CAMERA].still(1))
+            yield next(world.cameras[CAMERA].static_frames(1))
     finally:
         world.close()
 

@@ -20,7 +20,7 @@ from regrasp.app.files.resources import resolve
 from regrasp.app.scenario.cell_file import load_cell
 from regrasp.interfaces.cell import Box, Cell, FixedMount
 from regrasp.interfaces.frame import RgbdFrame
-from regrasp.interfaces.scene import Obstacle
+from regrasp.interfaces.scene import Obstacle, SceneSetup
 from regrasp.sim.ground_truth import GroundTruth
 from regrasp.sim.render.renderer import RendererName
 from regrasp.sim.world import World
@@ -119,14 +119,14 @@ class StudyScene:
         self.world_from_camera = mount.world_from_camera
         pose = connector_pose(self.configuration, self.world_from_camera.translation, seed, parameters)
         pieces = (_foam_piece(pose, parameters),) if self.configuration.hidden else ()
-        self.world = World(cell, "zero", seed, pieces, renderer=renderer, connector_at=pose)
+        self.world = World(cell, "zero", seed, SceneSetup(pieces, connector_at=pose), renderer)
         self.truth = GroundTruth(self.world)
         if self.configuration.hidden:
             self._hide()
 
     def frames(self, count: int, camera: str = CAMERA) -> Iterator[RgbdFrame]:
         """The first `count` frames of a camera, the same at every call: nothing moves."""
-        return self.world.cameras[camera].still(count)
+        return self.world.cameras[camera].static_frames(count)
 
     def close(self) -> None:
         """Free the world."""
@@ -150,7 +150,7 @@ class StudyScene:
         for _ in range(self._parameters.bisection_steps):
             middle = (outside + inside) / 2
             self.world.place_obstacle("tall", _foam_center(pose, middle, self._parameters))
-            share = self.truth.hidden_share(CAMERA)
+            share = self.truth.occluded_share(CAMERA)
             if abs(share - self.configuration.hidden) < self._parameters.share_tolerance:
                 return
             outside, inside = (middle, inside) if share < self.configuration.hidden else (outside, middle)

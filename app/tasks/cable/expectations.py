@@ -5,7 +5,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from regrasp.interfaces.cause import CauseCode
-from regrasp.interfaces.cell import Model, NotNegative
+from regrasp.interfaces.fields import Model, NotNegative
 
 
 class PoseError(Model):

@@ -11,7 +11,7 @@ from regrasp.app.records.result import Expectation, Slip
 from regrasp.app.tasks.cable.expectations import Expect
 from regrasp.behaviors.services import Belief
 from regrasp.interfaces.arrays import FloatArray
-from regrasp.sim.cable.phase import LOST_SECONDS, STILL_SECONDS, STILL_SPEED
+from regrasp.sim.cable.phase import PhaseParameters
 from regrasp.sim.ground_truth import GroundTruth
 
 
@@ -75,7 +75,7 @@ class Judge:
                 self._untouched_at = None
             else:
                 self._untouched_at = now if self._untouched_at is None else self._untouched_at
-                if now - self._untouched_at >= LOST_SECONDS:
+                if now - self._untouched_at >= PhaseParameters.lost_seconds:
                     self.losses.append(self._unheld_at)
                     self._was_held, self._grip = False, GripWatch(self._parameters)
         if self.losses and not self._was_held and self.settled_pixels is None:
@@ -136,11 +136,11 @@ class Judge:
         return max(known, default=0.0) if len(known) == len(delays) else None
 
     def _watch_settling(self, now: float) -> None:
-        if self._truth.connector_speed() > STILL_SPEED:
+        if self._truth.connector_speed() > PhaseParameters.still_speed:
             self._still_since = None
         elif self._still_since is None:
             self._still_since = now
-        elif now - self._still_since >= STILL_SECONDS:
+        elif now - self._still_since >= PhaseParameters.still_seconds:
             self.settled_pixels = self._truth.connector_pixels("rear")
 
 

@@ -10,7 +10,7 @@ from regrasp.interfaces.cause import CauseCode, ServiceError
 from regrasp.interfaces.fault import PlanningFindsNothing, ServiceRaises, When
 from regrasp.motion.failure import PlanningError
 from regrasp.sim.faults.effects import Effect
-from regrasp.sim.faults.faults import Fault, Moments
+from regrasp.sim.faults.faults import ScheduledFault, TriggerState
 
 AT_ONE = When(at=(1.0, 1.0))
 
@@ -23,11 +23,13 @@ def services() -> Any:
 
 
 def test_a_service_raises_for_so_many_calls_from_its_moment_on() -> None:
-    fault = Fault(ServiceRaises(type="service_raises", when=AT_ONE, service="perception.look", calls=2), Effect())
+    fault = ScheduledFault(
+        ServiceRaises(type="service_raises", when=AT_ONE, service="perception.look", calls=2), Effect()
+    )
     made = services()
     break_services(made, [fault], lambda: 1.5)
     assert made.perception.look("rear") == 42
-    fault.watch(Moments(1.0))
+    fault.watch(TriggerState(1.0))
     for _ in range(2):
         with pytest.raises(ServiceError, match=r"perception.look broke off"):
             made.perception.look("rear")
@@ -36,14 +38,14 @@ def test_a_service_raises_for_so_many_calls_from_its_moment_on() -> None:
 
 
 def test_a_planner_finds_nothing_for_so_long() -> None:
-    fault = Fault(PlanningFindsNothing(type="planning_finds_nothing", when=AT_ONE, seconds=2.0), Effect())
+    fault = ScheduledFault(PlanningFindsNothing(type="planning_finds_nothing", when=AT_ONE, seconds=2.0), Effect())
     made = services()
     break_services(made, [fault], lambda: 0.0)
-    fault.watch(Moments(1.0))
+    fault.watch(TriggerState(1.0))
     with pytest.raises(PlanningError) as error:
         made.motion.planner()
     assert error.value.code is CauseCode.PLANNING_FAILED
-    fault.watch(Moments(3.0))
+    fault.watch(TriggerState(3.0))
     assert made.motion.planner() == 42
 
 
@@ -64,10 +66,10 @@ def test_the_world_is_told_of_each_node_once_when_it_is_first_entered() -> None:
 def test_the_log_has_each_beginning_and_end_once() -> None:
     lines: list[tuple[str, dict[str, object]]] = []
     log = SimpleNamespace(info=lambda event, **values: lines.append((event, values)))
-    fault = Fault(PlanningFindsNothing(type="planning_finds_nothing", when=AT_ONE, seconds=2.0), Effect())
+    fault = ScheduledFault(PlanningFindsNothing(type="planning_finds_nothing", when=AT_ONE, seconds=2.0), Effect())
     watch = FaultLog([fault], cast(Any, log))
     for now in (0.0, 1.0, 2.0, 3.0, 4.0):
-        fault.watch(Moments(now))
+        fault.watch(TriggerState(now))
         watch.finalise()
     assert lines == [
         ("fault began", {"fault": "planning_finds_nothing", "at": 1.0}),

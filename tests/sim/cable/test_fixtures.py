@@ -9,8 +9,10 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from regrasp.interfaces.cell import Cell
-from regrasp.sim.cable.fixtures import LIP_TRAVEL, STAND_FORCE, ClipHold, Hold, SocketHold
+from regrasp.sim.cable.fixtures import BodyLink, ClipHold, ClipParameters, Hold, SocketHold
+from regrasp.sim.world import WorldParameters
 
+STAND_FORCE = WorldParameters().stand_force
 RAMP = 2.0  # N/s
 LET_GO = 1.0  # N around the stated force
 SEATED = 0.0005  # m
@@ -24,6 +26,10 @@ class Plug:
     client: int
     body: int
     step: float
+
+    @property
+    def link(self) -> BodyLink:
+        return BodyLink(self.client, self.body, -1)
 
     def state(self) -> tuple[RigidTransform, FloatArray, FloatArray]:
         position, turn = p.getBasePositionAndOrientation(self.body, physicsClientId=self.client)
@@ -62,7 +68,7 @@ def plug(cell: Cell, client: int) -> Plug:
 def clip(cell: Cell, plug: Plug) -> ClipHold:
     mass, length, radius = cell.hidden.connector_mass, cell.known.connector.length, cell.known.connector.radius
     across = mass * (3 * radius**2 + length**2) / 12
-    return ClipHold(plug.client, plug.body, -1, cell.known.clip, mass, across, plug.step)
+    return ClipHold(plug.link, cell.known.clip, mass, across, plug.step)
 
 
 def near_seat(cell: Cell, distance: float, angle_deg: float) -> RigidTransform:
@@ -130,7 +136,9 @@ def test_it_holds_ten_newtons(cell: Cell, plug: Plug, clip: ClipHold, direction:
     plug.advance(3.0, clip, 10.0 * np.asarray(direction))
     off = plug.state()[0].translation - cell.known.clip.world_from_seat.translation
     assert clip.holds
-    np.testing.assert_allclose(off, 10.0 / cell.known.clip.hold_force * LIP_TRAVEL * np.asarray(direction), atol=2e-4)
+    np.testing.assert_allclose(
+        off, 10.0 / cell.known.clip.hold_force * ClipParameters().lip_travel * np.asarray(direction), atol=2e-4
+    )
 
 
 @pytest.mark.parametrize("direction", DIRECTIONS)
@@ -162,7 +170,7 @@ def test_what_was_pulled_out_is_taken_again_only_after_it_left(cell: Cell, plug:
 
 @pytest.mark.parametrize(("force", "stays"), [(5.0, True), (9.5, True), (10.5, False), (15.0, False)])
 def test_a_socket_lets_go_at_its_pull_out_force(plug: Plug, force: float, stays: bool) -> None:
-    socket = SocketHold(Hold(plug.client, plug.body, -1, RigidTransform.identity()), np.array([0.0, 1.0, 0.0]), 10.0)
+    socket = SocketHold(Hold(plug.link, RigidTransform.identity()), np.array([0.0, 1.0, 0.0]), 10.0)
     for _ in range(480):
         plug.advance(plug.step, force=np.array([0.0, -force, 0.0]))
         socket.step()
@@ -172,7 +180,7 @@ def test_a_socket_lets_go_at_its_pull_out_force(plug: Plug, force: float, stays:
 
 
 def test_a_single_steps_spike_does_not_unplug(plug: Plug) -> None:
-    socket = SocketHold(Hold(plug.client, plug.body, -1, RigidTransform.identity()), np.array([0.0, 1.0, 0.0]), 10.0)
+    socket = SocketHold(Hold(plug.link, RigidTransform.identity()), np.array([0.0, 1.0, 0.0]), 10.0)
     for i in range(100):
         plug.advance(plug.step, force=np.array([40.0 if i == 50 else 0.0, 0.0, 0.0]))
         socket.step()
@@ -184,7 +192,7 @@ def test_a_single_steps_spike_does_not_unplug(plug: Plug) -> None:
 def test_a_stand_lets_go_at_its_force_whichever_way(
     plug: Plug, direction: tuple[float, float, float], share: float, stays: bool
 ) -> None:
-    stand = SocketHold(Hold(plug.client, plug.body, -1, RigidTransform.identity()), None, STAND_FORCE)
+    stand = SocketHold(Hold(plug.link, RigidTransform.identity()), None, STAND_FORCE)
     for _ in range(480):
         plug.advance(plug.step, force=share * STAND_FORCE * np.asarray(direction))
         stand.step()

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from regrasp.sim.cable.phase import PhaseWatch
+from regrasp.sim.cable.phase import PhaseParameters, PhaseWatch
 
 START = np.array([0.4, 0.1, 0.4])
 DT = 0.05
@@ -11,8 +11,8 @@ BOTH, NONE = (True, True), (False, False)
 class Told:
     """A watch that is told for so long what is true."""
 
-    def __init__(self) -> None:
-        self.watch, self.now = PhaseWatch(START), 0.0
+    def __init__(self, parameters: PhaseParameters = PhaseParameters()) -> None:  # noqa: B008
+        self.watch, self.now = PhaseWatch(START, parameters), 0.0
 
     def go(
         self, seconds: float, *, away: float, pads: tuple[bool, bool] = BOTH, speed: float = 0.1, plugged: bool = False,
@@ -48,3 +48,9 @@ def test_what_no_hand_held_is_not_lost() -> None:
 
 def test_what_is_stowed_is_not_lost() -> None:
     assert "lost" not in Told().go(1.0, away=0.2).go(2.0, away=0.3, pads=NONE, stowed=True).watch.began
+
+
+def test_its_parameters_say_when_an_end_is_lost() -> None:
+    patient = Told(PhaseParameters(lost_seconds=2.0))
+    assert "lost" not in patient.go(0.5, away=0.2).go(1.5, away=0.3, pads=NONE).watch.began
+    assert patient.go(1.0, away=0.3, pads=NONE).watch.began["lost"] == pytest.approx(2.5, abs=DT + 1e-9)

@@ -5,9 +5,10 @@ import pybullet as p
 import pytest
 from scipy.spatial.transform import RigidTransform
 
-from regrasp.interfaces.cell import CameraSpec, Errors, FixedMount
+from regrasp.interfaces.cell import CameraSpec, FixedMount
 from regrasp.interfaces.devices import Camera
-from regrasp.sim.cameras.camera import SimCamera, camera_error
+from regrasp.interfaces.hidden_world import Errors
+from regrasp.sim.cameras.camera import CameraMounting, SimCamera, camera_error
 from regrasp.sim.cameras.depth_noise import DepthNoise
 from regrasp.sim.render.renderer import LightState, make_renderer
 from regrasp.sim.render.visuals import Visuals
@@ -54,9 +55,8 @@ class Rig:
         renderer, light = make_renderer(self.visuals), LightState((-0.5, 0.3, 1.0), 0.45, 0.55)
         noise = DepthNoise(SPEC, ERRORS, seed=1)
         joints = lambda: self.joints  # noqa: E731
-        return SimCamera(
-            SPEC, self.visuals, renderer, light, noise, lambda: self.pose, joints, lambda: self.time, LATENCY
-        )
+        mounting = CameraMounting(lambda: self.pose, joints)
+        return SimCamera(SPEC, renderer, light, noise, mounting, lambda: self.time, LATENCY)
 
     def move(self, left: float) -> None:
         p.resetBasePositionAndOrientation(self.ball, [0, left, 0], [0, 0, 0, 1], physicsClientId=self.client)

@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from regrasp.interfaces.cell import CameraSpec, Errors, FixedMount
+from regrasp.interfaces.cell import CameraSpec, FixedMount
+from regrasp.interfaces.hidden_world import Errors
 from regrasp.sim.cameras.depth_noise import DepthNoise, smooth_noise
 
 REAR = CameraSpec(
@@ -195,7 +196,7 @@ def test_the_exact_image_is_left_as_it_was() -> None:
 
 
 def test_smooth_noise_has_unit_variance_and_joins_at_its_edges() -> None:
-    field = smooth_noise((256, 512), np.random.default_rng(2))
+    field = smooth_noise((256, 512), np.random.default_rng(2), 2.0)
     assert field.std() == pytest.approx(1.0, abs=1e-3)
     inner = np.abs(np.diff(field, axis=1)).mean()
     assert np.abs(field[:, 0] - field[:, -1]).mean() == pytest.approx(inner, rel=0.2)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from regrasp.app.scenario.schema import FAULT_TYPES
 from regrasp.interfaces.cell import Box, Cell
 from regrasp.interfaces.frame import RgbdFrame
-from regrasp.interfaces.scene import Obstacle
+from regrasp.interfaces.scene import Obstacle, SceneSetup
 from regrasp.interfaces.trajectory import Trajectory
 from regrasp.sim.world import World
 
@@ -31,7 +31,7 @@ def make(cell: Cell) -> Iterator[Make]:
             values["seconds"] = seconds
         data = {"type": kind, "when": {"at": (on, on)}, **values}
         fault = FAULT_TYPES[kind].model_validate(data)  # type: ignore[attr-defined]
-        made.append(World(cell, "zero", seed, (BLOCK,), (fault,), renderer="tiny"))
+        made.append(World(cell, "zero", seed, SceneSetup((BLOCK,), (fault,)), renderer="tiny"))
         return made[-1]
 
     yield world

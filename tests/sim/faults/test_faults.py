@@ -7,8 +7,9 @@ from numpy.typing import NDArray
 
 from regrasp.interfaces.cell import Cell
 from regrasp.interfaces.fault import AnyFault, JawOpens, PlanningFindsNothing, When
+from regrasp.interfaces.scene import SceneSetup
 from regrasp.sim.faults.effects import Effect
-from regrasp.sim.faults.faults import Fault, Moments
+from regrasp.sim.faults.faults import ScheduledFault, TriggerState
 from regrasp.sim.world import World
 
 FloatArray = NDArray[np.float64]
@@ -23,32 +24,34 @@ def opens(seconds: float | None = OPEN_FOR, **when: object) -> JawOpens:
 @pytest.mark.parametrize(
     ("when", "moments", "come"),
     [
-        ({"at": (2.0, 2.0)}, Moments(1.99), False),
-        ({"at": (2.0, 2.0)}, Moments(2.0), True),
-        ({"carried": (0.5, 0.5)}, Moments(carried=0.49), False),
-        ({"carried": (0.5, 0.5)}, Moments(carried=0.51), True),
-        ({"carried": (0.0, 0.0)}, Moments(carried=None), False),
-        ({"phase": "lost"}, Moments(phases={"carried": 1.0}), False),
-        ({"phase": "lost"}, Moments(phases={"carried": 1.0, "lost": 3.0}), True),
-        ({"node": "carry"}, Moments(nodes={"root/bring/carry": 0.0}), True),
-        ({"node": "bring/carry"}, Moments(nodes={"root/bring/carry": 0.0}), True),
-        ({"node": "root/bring/carry"}, Moments(nodes={"root/bring/carry": 0.0}), True),
-        ({"node": "arry"}, Moments(nodes={"root/bring/carry": 0.0}), False),
-        ({"node": "carry", "after": (1.0, 1.0)}, Moments(3.9, nodes={"root/carry": 3.0}), False),
-        ({"node": "carry", "after": (1.0, 1.0)}, Moments(4.0, nodes={"root/carry": 3.0}), True),
+        ({"at": (2.0, 2.0)}, TriggerState(1.99), False),
+        ({"at": (2.0, 2.0)}, TriggerState(2.0), True),
+        ({"carried": (0.5, 0.5)}, TriggerState(carried=0.49), False),
+        ({"carried": (0.5, 0.5)}, TriggerState(carried=0.51), True),
+        ({"carried": (0.0, 0.0)}, TriggerState(carried=None), False),
+        ({"phase": "lost"}, TriggerState(phases={"carried": 1.0}), False),
+        ({"phase": "lost"}, TriggerState(phases={"carried": 1.0, "lost": 3.0}), True),
+        ({"node": "carry"}, TriggerState(nodes={"root/bring/carry": 0.0}), True),
+        ({"node": "bring/carry"}, TriggerState(nodes={"root/bring/carry": 0.0}), True),
+        ({"node": "root/bring/carry"}, TriggerState(nodes={"root/bring/carry": 0.0}), True),
+        ({"node": "arry"}, TriggerState(nodes={"root/bring/carry": 0.0}), False),
+        ({"node": "carry", "after": (1.0, 1.0)}, TriggerState(3.9, nodes={"root/carry": 3.0}), False),
+        ({"node": "carry", "after": (1.0, 1.0)}, TriggerState(4.0, nodes={"root/carry": 3.0}), True),
     ],
 )
-def test_a_moment_comes(when: dict[str, object], moments: Moments, come: bool) -> None:
-    assert moments.has_come(When.model_validate(when)) == come
+def test_a_moment_comes(when: dict[str, object], moments: TriggerState, come: bool) -> None:
+    assert moments.triggers(When.model_validate(when)) == come
 
 
 @pytest.mark.parametrize(("seconds", "ended"), [(1.0, 3.0), (None, None)])
 def test_it_begins_once_and_lasts_so_long(seconds: float | None, ended: float | None) -> None:
     switched: list[str] = []
-    fault = Fault(opens(seconds, at=(2.0, 2.0)), Effect(lambda: switched.append("on"), lambda: switched.append("off")))
+    fault = ScheduledFault(
+        opens(seconds, at=(2.0, 2.0)), Effect(lambda: switched.append("on"), lambda: switched.append("off"))
+    )
     active = []
     for now in np.arange(0.0, 5.0, 0.5):
-        fault.watch(Moments(float(now)))
+        fault.watch(TriggerState(float(now)))
         active.append(fault.active)
     assert (fault.began_at, fault.ended_at) == (2.0, ended)
     assert switched == (["on", "off"] if seconds else ["on"])
@@ -66,7 +69,7 @@ def test_phases_begin_faults_and_the_connector_is_really_lost(cell: Cell) -> Non
         for phase in ("unplugged", "carried", "lost", "settled")
     ]
     faults: tuple[AnyFault, ...] = (opens(carried=(0.5, 0.5)), *noted)
-    world = World(cell, "zero", seed=3, faults=faults, renderer="tiny")
+    world = World(cell, "zero", seed=3, setup=SceneSetup(faults=faults), renderer="tiny")
     hand, start = world.arms["right"], world.connector_pose().translation
     way = cell.known.clip.world_from_seat.translation - start
     take_hold(world)
@@ -97,10 +100,12 @@ def test_phases_begin_faults_and_the_connector_is_really_lost(cell: Cell) -> Non
 
 
 def test_a_node_begins_a_fault_when_the_world_is_told_of_it(cell: Cell) -> None:
-    world = World(cell, "zero", seed=3, faults=(opens(node="grip", after=(0.1, 0.1)),), renderer="tiny")
+    world = World(
+        cell, "zero", seed=3, setup=SceneSetup(faults=(opens(node="grip", after=(0.1, 0.1)),)), renderer="tiny"
+    )
     world.advance(0.5)
-    world.notice("root/work/grip")
-    world.notice("root/work/grip")
+    world.note_entered("root/work/grip")
+    world.note_entered("root/work/grip")
     world.advance(0.08)
     assert world.faults[0].waiting
     world.advance(0.05)

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from regrasp.interfaces.cell import Cell
+from regrasp.sim.random_scenes.clutter import rearranged
 from regrasp.sim.random_scenes.scene import RandomScene, Shot
-from regrasp.sim.random_scenes.things import rearranged
 from regrasp.sim.render.renderer import RendererName
 
 RENDERERS: tuple[RendererName, ...] = ("moderngl", "tiny")

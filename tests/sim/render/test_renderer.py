@@ -11,7 +11,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from regrasp.interfaces.cell import OPTICAL
 from regrasp.interfaces.frame import Intrinsics
-from regrasp.sim.render.meshes import corners
+from regrasp.sim.render.meshes import triangle_corners
 from regrasp.sim.render.opengl import GlRenderer
 from regrasp.sim.render.renderer import Image, LightState, Renderer, make_renderer
 from regrasp.sim.render.tiny import TinyRenderer
@@ -191,7 +191,7 @@ def test_a_ball_and_a_cable_are_as_wide_as_they_should_be(client: int) -> None:
 
 def test_every_mesh_is_turned_outwards(scene: Visuals) -> None:
     for item in scene.items:
-        rows = corners(item).astype(float)
+        rows = triangle_corners(item).astype(float)
         triangle, normal = rows[:, :3].reshape(-1, 3, 3), rows[:, 3:].reshape(-1, 3, 3)
         area = np.cross(triangle[:, 1] - triangle[:, 0], triangle[:, 2] - triangle[:, 0])
         assert np.einsum("ij,ij->", triangle[:, 0], area) > 0

@@ -10,7 +10,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from regrasp.interfaces.frame import Intrinsics
 from regrasp.sim.render import tiny
-from regrasp.sim.render.picture import FAR, NEAR, LightState
+from regrasp.sim.render.picture import Z_FAR, Z_NEAR, LightState
 from regrasp.sim.render.tiny import TinyRenderer
 from regrasp.sim.render.visuals import Visuals
 
@@ -54,7 +54,7 @@ def test_offset_inertial_frames_look_as_bullet_itself_draws_them(client: int, tm
         flags=p.ER_SEGMENTATION_MASK_OBJECT_AND_LINKINDEX,
         physicsClientId=client,
     )
-    truth = FAR * NEAR / (FAR - (FAR - NEAR) * np.asarray(buffer, float).reshape(k.height, k.width))
+    truth = Z_FAR * Z_NEAR / (Z_FAR - (Z_FAR - Z_NEAR) * np.asarray(buffer, float).reshape(k.height, k.width))
     mine = TinyRenderer(visuals).render(visuals.snapshot(), camera, k, LightState((0, 0, 1), 0.5, 0.5))
     ids = np.asarray(seen).reshape(k.height, k.width)
     assert set(np.unique(ids)) == {-1, body, body + (1 << 24)}

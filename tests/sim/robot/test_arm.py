@@ -6,12 +6,13 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
-from regrasp.interfaces.cell import Cell, Errors
+from regrasp.interfaces.cell import Cell
 from regrasp.interfaces.devices import Arm
+from regrasp.interfaces.hidden_world import Errors
 from regrasp.interfaces.scene import EARTH_GRAVITY
 from regrasp.interfaces.trajectory import Trajectory
 from regrasp.motion.robots.kinematics import LOWER, UPPER, ArmKinematics
-from regrasp.sim.robot.arm import BRAKE, ENCODER_STEP, SIGN, SPEED, SimArm
+from regrasp.sim.robot.arm import ENCODER_STEP, JOINT_SIGNS, MAX_JOINT_SPEED, ArmParameters, SimArm
 
 TRACKING = 0.01  # rad
 STOP_TIME = 0.3  # s
@@ -25,14 +26,15 @@ FloatArray = NDArray[np.float64]
 
 def make(cell: Cell, client: int, tool_error: float = 0.0, seed: int = 0) -> SimArm:
     errors: Errors = cell.hidden.errors.model_copy(update={"arm_tool": tool_error})
-    rng = np.random.default_rng(seed)
-    spec = cell.known.arm("right")
-    return SimArm(client, spec, cell.hidden.gripper, errors, 1 / cell.hidden.step_rate, None, rng)
+    without_camera = cell.known.model_copy(update={"cameras": ()})
+    hidden = cell.hidden.model_copy(update={"errors": errors})
+    inexact = cell.model_copy(update={"known": without_camera, "hidden": hidden})
+    return SimArm(client, inexact, "right", np.random.default_rng(seed))
 
 
 def true_joints(arm: SimArm) -> FloatArray:
     states = p.getJointStates(arm.body, arm.joints, physicsClientId=arm.client)
-    return np.asarray(SIGN * [s[0] for s in states])
+    return np.asarray(JOINT_SIGNS * [s[0] for s in states])
 
 
 def ease(start: FloatArray, goal: FloatArray, seconds: float) -> Trajectory:
@@ -96,7 +98,7 @@ def test_it_stops_within_its_time_from_full_speed(arm: SimArm) -> None:
     assert float(np.abs(rates).max()) < AT_REST
     assert not arm.is_moving()
     reach = float(np.abs(path[-1] - at).max())
-    assert reach == pytest.approx(float(full.max()) ** 2 / (2 * BRAKE), abs=3 * TRACKING)
+    assert reach == pytest.approx(float(full.max()) ** 2 / (2 * ArmParameters().braking), abs=3 * TRACKING)
     later = run(arm, 0.5)
     np.testing.assert_allclose(later[-1], path[-1], atol=1e-3)
 
@@ -111,7 +113,9 @@ def test_a_stop_at_rest_changes_nothing(arm: SimArm) -> None:
 @pytest.mark.parametrize("side", [1.0, -1.0])
 @pytest.mark.parametrize("joint", range(6))
 def test_a_joint_driven_on_stops_at_the_models_limit(arm: SimArm, joint: int, side: float) -> None:
-    limits = SIGN[joint] * np.array(p.getJointInfo(arm.body, arm.joints[joint], physicsClientId=arm.client)[8:10])
+    limits = JOINT_SIGNS[joint] * np.array(
+        p.getJointInfo(arm.body, arm.joints[joint], physicsClientId=arm.client)[8:10]
+    )
     limit = side * float(np.max(side * limits))
     goal = HOME.copy()
     goal[joint] = limit + side * 0.5
@@ -195,6 +199,6 @@ def test_a_servo_turns_no_faster_than_its_maker_lets_it(arm: SimArm) -> None:
     arm.follow(Trajectory(np.array([0.0, 0.02]), np.array([start, goal]), np.zeros((2, 6))))  # 25 rad/s asked for
     path = run(arm, 1.0)
     # over a tenth of a second, and a tenth more than that: a servo catches up with its target
-    assert float(np.abs(np.array(path)[48:] - np.array(path)[:-48]).max() * 10) < 1.15 * SPEED
+    assert float(np.abs(np.array(path)[48:] - np.array(path)[:-48]).max() * 10) < 1.15 * MAX_JOINT_SPEED
     assert float(np.abs(path[-1] - goal).max()) < TRACKING
     assert not arm.is_moving()

@@ -7,16 +7,15 @@ import pytest
 from regrasp.interfaces.cell import Cell
 from regrasp.interfaces.devices import Gripper
 from regrasp.sim.robot.arm import SimArm
-from regrasp.sim.robot.gripper import CLOSED_GAP, SimGripper
+from regrasp.sim.robot.gripper import GripperParameters, SimGripper
 
 GAP = 0.0005  # m
 COUPLING = 0.0005  # m between the fingers' ways
 
 
 def make(cell: Cell, client: int) -> SimArm:
-    rng = np.random.default_rng(5)
-    spec, step = cell.known.arm("right"), 1 / cell.hidden.step_rate
-    return SimArm(client, spec, cell.hidden.gripper, cell.hidden.errors, step, None, rng)
+    without_camera = cell.known.model_copy(update={"cameras": ()})
+    return SimArm(client, cell.model_copy(update={"known": without_camera}), "right", np.random.default_rng(5))
 
 
 @pytest.fixture
@@ -55,12 +54,12 @@ def test_it_opens_to_a_gap_and_both_fingers_move_alike(arm: SimArm, gap: float) 
 
 
 def test_an_empty_jaw_closes_to_its_stop(arm: SimArm) -> None:
-    assert arm.gripper.true_gap() == pytest.approx(CLOSED_GAP, abs=GAP)
+    assert arm.gripper.true_gap() == pytest.approx(GripperParameters().closed_gap, abs=GAP)
     arm.gripper.open(0.05)
     run(arm, 1.0)
     arm.gripper.close(20.0)
     run(arm, 1.0)
-    assert arm.gripper.true_gap() == pytest.approx(CLOSED_GAP, abs=GAP)
+    assert arm.gripper.true_gap() == pytest.approx(GripperParameters().closed_gap, abs=GAP)
 
 
 def test_it_moves_at_its_stated_speed(cell: Cell, arm: SimArm) -> None:
@@ -158,7 +157,7 @@ def test_forced_open_it_opens_whatever_it_is_told(arm: SimArm) -> None:
     assert arm.gripper.true_gap() > 0.06
     arm.gripper.set_fault(forced_open=False)
     run(arm, 0.7)
-    assert arm.gripper.true_gap() == pytest.approx(CLOSED_GAP, abs=GAP)
+    assert arm.gripper.true_gap() == pytest.approx(GripperParameters().closed_gap, abs=GAP)
 
 
 def test_the_fingers_are_joined_to_each_other_and_to_nothing_else(arm: SimArm) -> None:

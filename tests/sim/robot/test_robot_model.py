@@ -11,7 +11,7 @@ from scipy.spatial.transform import RigidTransform
 
 from regrasp.motion.robots.kinematics import ArmKinematics
 from regrasp.perception.mapping.occupancy import DARK
-from regrasp.sim.robot.arm import JOINTS, SIGN
+from regrasp.sim.robot.arm import JOINT_LINKS, JOINT_SIGNS
 from regrasp.sim.robot.model import ARM_COLOR, CAMERA_SIZE, finger_position, pad_gap, robot_urdf
 
 PAD = 0.006  # m
@@ -56,7 +56,7 @@ def test_the_pads_collision_shapes_stand_the_gap_apart(robot: tuple[int, int, di
 def test_the_tool_is_where_the_motion_room_believes(robot: tuple[int, int, dict[str, int]]) -> None:
     client, body, links = robot
     q = np.array([0.4, -0.5, 0.6, 0.3, 0.5, -0.7])
-    for name, value in zip(JOINTS, SIGN * q, strict=True):
+    for name, value in zip(JOINT_LINKS, JOINT_SIGNS * q, strict=True):
         p.resetJointState(body, links[name], value, physicsClientId=client)
     pads = [p.getLinkState(body, links[f"{s}_pad"], 0, 1, physicsClientId=client)[4] for s in ("left", "right")]
     expected = ArmKinematics(RigidTransform.identity()).tool(q).translation

@@ -89,7 +89,7 @@ def test_a_hidden_one_is_the_third_behind_a_piece(small: Cell) -> None:
 def test_so_much_is_hidden_by_the_true_mask(small: Cell, name: str) -> None:
     with StudyScene(small, name, 2) as scene:
         wanted = scene.configuration.hidden
-        assert abs(scene.truth.hidden_share("rear") - wanted) < 0.01
+        assert abs(scene.truth.occluded_share("rear") - wanted) < 0.01
         fine = scene.world.cameras["rear"].spec.model_copy(update={"width": 1696, "height": 960}).intrinsics
         shown = scene.world.visuals.snapshot()
         gone = shown.copy()
@@ -102,7 +102,7 @@ def test_so_much_is_hidden_by_the_true_mask(small: Cell, name: str) -> None:
 
 def _red(scene: StudyScene, poses: np.ndarray, camera: object) -> np.ndarray:
     """The columns of the connector's pixels."""
-    ids = scene.world.cameras["rear"].ids(poses, camera)  # type: ignore[arg-type]
+    ids = scene.world.cameras["rear"].segmentation(poses, camera)  # type: ignore[arg-type]
     cable = scene.world.cable
     item = next(i.id for i in scene.world.visuals.items if (i.body, i.link) == (cable.body, cable.connector_link))
     return np.nonzero(ids == item)[1]
@@ -110,7 +110,7 @@ def _red(scene: StudyScene, poses: np.ndarray, camera: object) -> np.ndarray:
 
 def test_nothing_is_hidden_without_a_piece(small: Cell) -> None:
     with StudyScene(small, "3", 2) as scene:
-        assert scene.truth.hidden_share("rear") == 0.0
+        assert scene.truth.occluded_share("rear") == 0.0
 
 
 @pytest.mark.parametrize("name", ["2", "4", "5"])

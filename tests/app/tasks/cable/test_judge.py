@@ -9,7 +9,7 @@ from regrasp.app.tasks.cable.expectations import Expect, PoseError
 from regrasp.app.tasks.cable.judge import Judge
 from regrasp.behaviors.services import Belief, LossNotice
 from regrasp.interfaces.cause import CauseCode
-from regrasp.sim.cable.phase import STILL_SECONDS
+from regrasp.sim.cable.phase import PhaseParameters
 from regrasp.sim.ground_truth import GroundTruth
 
 TICK = 0.05
@@ -186,7 +186,7 @@ def test_slips_are_met_when_every_loss_was_noticed_and_there_were_enough() -> No
 def lost_and_settled(run: Run, pixels: int) -> None:
     run.go(1.0, fingers=2, pixels=500)
     run.go(2.0, fingers=0, speed=0.3, pixels=0)  # swings past behind the obstacle: that does not count
-    run.go(STILL_SECONDS + 0.2, speed=0.001, pixels=pixels)
+    run.go(PhaseParameters().still_seconds + 0.2, speed=0.001, pixels=pixels)
 
 
 def test_hidden_is_an_empty_mask_once_settled_and_a_find_by_the_wrist_camera() -> None:

@@ -11,14 +11,13 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from regrasp.interfaces.cell import TAG_DICTIONARY, Tag
 from regrasp.interfaces.frame import Intrinsics
 from regrasp.sim.cameras.board import board_pictures, board_poses
+from regrasp.sim.render.fiducials import MAX_PARTS, compound_visual, tag_boxes
 from regrasp.sim.render.picture import LightState
-from regrasp.sim.render.printed import tag_boxes, visual
 from regrasp.sim.render.renderer import RendererName, make_renderer
 from regrasp.sim.render.visuals import Visuals
 
 K = Intrinsics.from_fov(424, 240, float(np.deg2rad(30.0)))
 LIGHT = LightState((0.3, -0.5, -1.0), 0.45, 0.55)
-MOST_PARTS = 16  # of one PyBullet shape
 FACING = RigidTransform.from_components([0.0, 0.0, 0.5], Rotation.from_euler("x", np.pi))
 
 
@@ -36,7 +35,7 @@ def tag_of(number: int) -> Tag:
 @pytest.mark.parametrize("renderer", ["auto", "tiny"])
 @pytest.mark.parametrize("number", [0, 7, 17, 23, 49])
 def test_a_tag_is_read_with_its_number_where_it_is(client: int, renderer: RendererName, number: int) -> None:
-    p.createMultiBody(0, -1, visual(client, tag_boxes(tag_of(number)), FACING), physicsClientId=client)
+    p.createMultiBody(0, -1, compound_visual(client, tag_boxes(tag_of(number)), FACING), physicsClientId=client)
     visuals = Visuals(client)
     drawer = make_renderer(visuals, renderer)
     rgb = drawer.render(visuals.snapshot(), RigidTransform.identity(), K, LIGHT).rgb
@@ -52,7 +51,7 @@ def test_a_tag_is_read_with_its_number_where_it_is(client: int, renderer: Render
 @pytest.mark.parametrize("number", range(50))
 def test_every_tag_fits_into_one_shape_beside_the_cylinder(number: int) -> None:
     boxes = tag_boxes(tag_of(number))
-    assert len(boxes) < MOST_PARTS
+    assert len(boxes) < MAX_PARTS
     dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, TAG_DICTIONARY))
     white = cv2.aruco.generateImageMarker(dictionary, number, 6) > 0
     area = sum(box.size[0] * box.size[1] for box in boxes[2:])
@@ -60,7 +59,7 @@ def test_every_tag_fits_into_one_shape_beside_the_cylinder(number: int) -> None:
 
 
 def test_a_shape_keeps_its_cylinder_and_colours(client: int) -> None:
-    shape = visual(client, tag_boxes(tag_of(7)), RigidTransform.identity(), (0.01, 0.09, (0.75, 0.05, 0.06)))
+    shape = compound_visual(client, tag_boxes(tag_of(7)), RigidTransform.identity(), (0.01, 0.09, (0.75, 0.05, 0.06)))
     p.createMultiBody(0, -1, shape, physicsClientId=client)
     first, second, *_ = Visuals(client).items
     assert (first.kind, first.size[:2]) == (p.GEOM_CYLINDER, (0.09, 0.01))
