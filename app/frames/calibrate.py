@@ -17,7 +17,7 @@ from regrasp.app.frames.image_files import read_rgb
 from regrasp.app.studies.table import print_table
 from regrasp.interfaces.cell import CameraSpec
 from regrasp.interfaces.frame import Intrinsics
-from regrasp.perception.camera.calibration import Calibration, calibrate, find_board
+from regrasp.perception.camera.calibration import Calibration, calibrate_intrinsics, find_checkerboard
 from regrasp.sim.cameras.board import board_pictures, board_poses
 
 FloatArray = NDArray[np.float64]
@@ -81,7 +81,7 @@ def run(
     if (different := _different(list(seen.values()), ALIKE * size[0])) < MIN_VIEWS:
         message = f"only {different} of {len(seen)} views differ; hold the board in {MIN_VIEWS} or more ways"
         raise Findings([Finding(source, 0, message)])
-    found = calibrate(list(seen.values()), *size, board.columns, board.rows, board.square)
+    found = calibrate_intrinsics(list(seen.values()), *size, board.columns, board.rows, board.square)
     doubt = max(found.deviations[0] / found.intrinsics.fx, found.deviations[1] / found.intrinsics.fy)
     if not doubt < MOST_DOUBT:  # nan too
         message = f"the views leave the focal length open by {100 * doubt:.1f} %; tilt the board more, and come nearer"
@@ -117,7 +117,7 @@ def _find_boards(
             continue
         sizes.setdefault((rgb.shape[1], rgb.shape[0]), name)
         if len(sizes) == 1 and not wrong:
-            views[name] = find_board(rgb, board.columns, board.rows)
+            views[name] = find_checkerboard(rgb, board.columns, board.rows)
     if len(sizes) > 1:
         told = ", ".join(f"{name} is {width}x{height}" for (width, height), name in sizes.items())
         wrong.append(Finding(source, 0, f"pictures of several sizes: {told}; give those of one camera in one mode"))

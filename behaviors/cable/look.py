@@ -74,8 +74,8 @@ class LookLeaf(HandLeaf):
             stamps.add(result.stamp)
             if len(stamps) == SOUND and perception.trouble("wrist") is None:
                 perception.map_obstacles("wrist")
-                motion.set_obstacles(perception.occupancy.occupied_points(), perception.occupancy.h)
+                motion.set_obstacles(perception.occupancy.occupied_points(), perception.occupancy.voxel_size)
             if isinstance(result, Estimate):
                 seen.append(result)
-            elif glimpses is not None and result.glimpse is not None:
-                glimpses.append(result.glimpse)
+            elif glimpses is not None and result.weak_detection is not None:
+                glimpses.append(result.weak_detection)

@@ -7,7 +7,7 @@ from regrasp.behaviors.cable.hand import HAND, HandLeaf
 from regrasp.behaviors.leaf import Failed, Port, Steps
 from regrasp.interfaces.cause import CauseCode
 from regrasp.motion.service import OPEN_GAP
-from regrasp.perception.tracking.stillness import Stillness
+from regrasp.perception.tracking.stillness import Stillness, StillnessParameters
 
 LEAVE_SECONDS = 0.3  # for the end to swing out of the open jaw
 STILL = 0.25  # of the mean brightness: a cable that moves by about 1 mm; the jaw forgives 20
@@ -43,7 +43,7 @@ class WaitUntilStill(HandLeaf):
 
     def steps(self) -> Steps:
         """See the class."""
-        stillness, begin = Stillness(threshold=STILL), self.services.clock.now()
+        stillness, begin = Stillness(StillnessParameters(threshold=STILL)), self.services.clock.now()
         limit = self.get_input("time_limit")
         perception = self.services.perception
         while self.services.clock.now() < begin + limit:
@@ -57,7 +57,9 @@ class WaitUntilStill(HandLeaf):
                 self.say("still", waited=round(self.services.clock.now() - begin, 2))
                 if voxels := perception.map_new_obstacle("rear"):
                     self.say("a new thing stands in the cell", voxels=voxels)
-                    self.services.motion.set_obstacles(perception.occupancy.occupied_points(), perception.occupancy.h)
+                    self.services.motion.set_obstacles(
+                        perception.occupancy.occupied_points(), perception.occupancy.voxel_size
+                    )
                 return
             yield from self.wait(FRAME_PERIOD)
         raise Failed(CauseCode.NOT_STILL, f"the scene still moved after {limit:.0f} s")

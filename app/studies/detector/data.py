@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from regrasp.interfaces.cell import Cell
 from regrasp.perception.camera.model import project
-from regrasp.perception.pose.detector import HEIGHT, STRIDE, WIDTH, fitted, pixel_sizes
+from regrasp.perception.pose.detector import NETWORK_HEIGHT, NETWORK_WIDTH, STRIDE, letterboxed, pixel_sizes
 from regrasp.perception.pose.segmentation import SegmentationParameters, color_mask
 from regrasp.sim.cameras.depth_noise import DepthNoise
 from regrasp.sim.random_scenes.scene import RandomScene, Shot
@@ -66,9 +66,9 @@ class Target:
 def make_pictures(cell: Cell, seed: int, count: int, tell: Callable[[int], None] = lambda _done: None) -> Pictures:
     """`count` pictures of scenes drawn from `seed`; `tell` is called with the number that is done."""
     out = Pictures(
-        np.zeros((count, HEIGHT, WIDTH, 3), np.uint8),
-        np.zeros((count, HEIGHT // 2, WIDTH // 2), np.uint16),
-        np.zeros((count, HEIGHT, WIDTH), np.uint8),
+        np.zeros((count, NETWORK_HEIGHT, NETWORK_WIDTH, 3), np.uint8),
+        np.zeros((count, NETWORK_HEIGHT // 2, NETWORK_WIDTH // 2), np.uint16),
+        np.zeros((count, NETWORK_HEIGHT, NETWORK_WIDTH), np.uint8),
         np.zeros((count, 2), np.float32),
         np.full((count, LIKES, 2), -1, np.int16),
     )
@@ -79,10 +79,10 @@ def make_pictures(cell: Cell, seed: int, count: int, tell: Callable[[int], None]
         noise = {spec.name: DepthNoise(spec, cell.hidden.errors, seed + first) for spec in cell.known.cameras}
         for i in range(first, min(first + SHOTS, count)):
             shot = scene.shot(present=i % ABSENT != ABSENT - 1)
-            out.images[i], _ = fitted(shot.rgb)
+            out.images[i], _ = letterboxed(shot.rgb)
             depth = noise[shot.camera.name].apply(shot.depth, i)
             out.sizes[i] = np.clip(1e6 * pixel_sizes(depth, shot.camera.intrinsics), 0, 65535).round()
-            out.masks[i] = fitted(shot.mask * np.uint8(255))[0]
+            out.masks[i] = letterboxed(shot.mask * np.uint8(255))[0]
             out.axes[i] = axis_in_image(shot)
             out.likes[i] = _likes(out.images[i], out.masks[i], color, rng)
             tell(i + 1)
@@ -136,7 +136,7 @@ def _cut(
     """A square of `size` px, turned, zoomed, sheared and mirrored, with parts cut out."""
     i = int(rng.integers(len(pictures.images)))
     image, mask = pictures.images[i], pictures.masks[i]
-    middle, draw = rng.uniform([0, 0], [WIDTH, HEIGHT]), float(rng.random())
+    middle, draw = rng.uniform([0, 0], [NETWORK_WIDTH, NETWORK_HEIGHT]), float(rng.random())
     like = pictures.likes[i, rng.integers(LIKES)]
     if draw < NEAR_CONNECTOR and mask.any():
         u, v, width, height = cv2.boundingRect(mask)
@@ -184,10 +184,12 @@ def _cut_out(
         return
     for _ in range(3):
         u, v = rng.integers(0, image.shape[0], 2)
-        there = slice(v, v + HEIGHT // 10), slice(u, u + WIDTH // 10)
+        there = slice(v, v + NETWORK_HEIGHT // 10), slice(u, u + NETWORK_WIDTH // 10)
         image[there], mask[there] = rng.integers(0, 256, 3), 0
         nearer = rng.choice([0.0, rng.uniform(0.6, 1.0)])
-        sizes[v // 2 : (v + HEIGHT // 10) // 2, u // 2 : (u + WIDTH // 10) // 2] = nearer * sizes[v // 2, u // 2]
+        sizes[v // 2 : (v + NETWORK_HEIGHT // 10) // 2, u // 2 : (u + NETWORK_WIDTH // 10) // 2] = (
+            nearer * sizes[v // 2, u // 2]
+        )
 
 
 def _recolored(image: NDArray[np.uint8], rng: np.random.Generator) -> NDArray[np.uint8]:

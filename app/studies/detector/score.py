@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from regrasp.app.studies.detector.data import axis_in_image
 from regrasp.interfaces.cell import Cell
 from regrasp.interfaces.frame import RgbdFrame
-from regrasp.perception.pose.detector import MIN_SCORE, Box, Detection, Detector, overlap
+from regrasp.perception.pose.detector import Detection, Detector, DetectorParameters, PixelBox, intersection_over_union
 from regrasp.perception.pose.estimate import Estimate
 from regrasp.sim.cameras.depth_noise import DepthNoise
 from regrasp.sim.random_scenes.scene import RandomScene, Shot
@@ -39,7 +39,7 @@ class Answer:
     """
 
     found: Sequence[Detection]
-    truth: Box | None = None
+    truth: PixelBox | None = None
     occlusion: float = 0.0
     angle_error_deg: float | None = None
     position_error: tuple[float, ...] | None = None
@@ -49,19 +49,24 @@ class Answer:
         """Of each detection, likeliest first, whether it is the connector; a second one on it is not."""
         out: list[bool] = []
         for detection in self.found:
-            fits = self.truth is not None and overlap(detection.box, self.truth) >= MATCH
+            fits = self.truth is not None and intersection_over_union(detection.box, self.truth) >= MATCH
             out.append(fits and not any(out))
         return out
 
     @property
     def seen(self) -> bool:
         """Whether the connector was found with a score that counts."""
-        return any(right and d.score >= MIN_SCORE for d, right in zip(self.found, self.right(), strict=True))
+        return any(
+            right and d.score >= DetectorParameters.min_score for d, right in zip(self.found, self.right(), strict=True)
+        )
 
     @property
     def false(self) -> int:
         """Boxes with a score that counts on what is no connector."""
-        return sum(d.score >= MIN_SCORE and not right for d, right in zip(self.found, self.right(), strict=True))
+        return sum(
+            d.score >= DetectorParameters.min_score and not right
+            for d, right in zip(self.found, self.right(), strict=True)
+        )
 
 
 def average_precision(answers: Sequence[Answer]) -> float:
@@ -126,7 +131,7 @@ def occlusion_class(shot: Shot) -> int | None:
     return next((i for i, (low, high) in enumerate(OCCLUSION) if low <= shot.occlusion < high), None)
 
 
-def true_box(mask: NDArray[np.bool_]) -> Box | None:
+def true_box(mask: NDArray[np.bool_]) -> PixelBox | None:
     """The box (u0, v0, u1, v1) around a mask (H, W), px, pixel u covering u - 0.5 to u + 0.5; None if it is empty."""
     if not mask.any():
         return None
@@ -170,7 +175,7 @@ def summary(answers: Sequence[Answer]) -> dict[str, Any]:
         "schema": 1,
         "ap50": average_precision(answers),
         "ap50_interval": precision_interval(answers),
-        "min_score": MIN_SCORE,
+        "min_score": DetectorParameters.min_score,
         "recall": [sum(a.seen for a in there), len(there)],
         "recall_by_occlusion": {name: [sum(a.seen for a in group), len(group)] for name, group in classes.items()},
         "false_boxes": sum(a.false for a in answers),

@@ -9,11 +9,12 @@ from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.cell import OPTICAL, Box, Connector, pose_along
 from regrasp.interfaces.frame import Intrinsics
-from regrasp.perception.mapping.occupancy import KNOWN_MARGIN, Occupancy, near_boxes
+from regrasp.perception.mapping.occupancy import Occupancy, OccupancyParameters, near_boxes
 
 Points = NDArray[np.float64]
 REAR = Intrinsics.from_fov(848, 480, np.deg2rad(65.0))
 WRIST = Intrinsics.from_fov(848, 480, np.deg2rad(69.4))
+PARAMETERS = OccupancyParameters(voxel_size=0.015)
 KNOWN = [
     Box(name="floor", center=(0.2, 0.0, -0.02), size=(2.4, 2.4, 0.04)),
     Box(name="back_panel", center=(0.5145, 0.0, 0.305), size=(0.013, 0.9144, 0.6096)),
@@ -27,7 +28,7 @@ HIDDEN_END = Cylinder(np.array([0.43, 0.0, 0.25]), np.array([0.0, 1.0, 0.1]), co
 
 
 def empty(connector: Connector) -> Occupancy:
-    return Occupancy(np.array([0.0, -0.45, 0.0]), np.array([0.52, 0.45, 0.65]), KNOWN, connector)
+    return Occupancy(np.array([0.0, -0.45, 0.0]), np.array([0.52, 0.45, 0.65]), KNOWN, connector, PARAMETERS)
 
 
 def looking(position: tuple[float, float, float], direction: tuple[float, float, float]) -> RigidTransform:
@@ -68,7 +69,7 @@ def test_an_obstacle_is_covered_and_nothing_else_is() -> None:
     occupancy = empty(CONNECTOR)
     look(occupancy, [TALL, CABLE, HIDDEN_END], REAR_POSE)
     points = occupancy.occupied_points()
-    assert farthest(points, inside(TALL)) < occupancy.h
+    assert farthest(points, inside(TALL)) < occupancy.voxel_size
     assert outside(points, TALL).max() < 0.03  # depth scale, camera ray, a voxel
 
 
@@ -90,7 +91,7 @@ def test_a_black_obstacle_is_an_obstacle() -> None:
     occupancy = empty(CONNECTOR)
     block = Block(TALL.lower, TALL.upper, BLACK)
     look(occupancy, [block], REAR_POSE)
-    assert farthest(occupancy.occupied_points(), inside(block)) < 2 * occupancy.h
+    assert farthest(occupancy.occupied_points(), inside(block)) < 2 * occupancy.voxel_size
 
 
 def test_the_robot_is_no_obstacle() -> None:
@@ -121,11 +122,13 @@ def test_the_connectors_own_place_is_freed_when_it_is_found() -> None:
     thin = Block(np.array([0.30, -0.06, 0.0]), np.array([0.31, 0.06, 0.36]), PURPLE)
     occupancy = empty(CONNECTOR)
     look(occupancy, [thin, end], REAR_POSE)
-    assert farthest(occupancy.occupied_points(), end.center[None]) < occupancy.h  # the guess covers it
+    assert farthest(occupancy.occupied_points(), end.center[None]) < occupancy.voxel_size  # the guess covers it
     look(occupancy, [thin, end], looking((0.40, 0.12, 0.55), (-0.04, -0.12, -0.3)), WRIST)
     assert farthest(occupancy.occupied_points(), end.center[None]) > 0.015
 
 
 def test_known_boxes_have_a_margin() -> None:
-    points = np.array([[0.4, 0.0, 0.3], [0.485, 0.0, 0.3], [0.52, 0.0, 0.3], [0.2, 0.0, KNOWN_MARGIN + 0.001]])
-    assert near_boxes(points, KNOWN).tolist() == [False, True, True, False]
+    points = np.array(
+        [[0.4, 0.0, 0.3], [0.485, 0.0, 0.3], [0.52, 0.0, 0.3], [0.2, 0.0, PARAMETERS.known_margin + 0.001]]
+    )
+    assert near_boxes(points, KNOWN, PARAMETERS.known_margin).tolist() == [False, True, True, False]

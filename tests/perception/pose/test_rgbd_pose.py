@@ -10,7 +10,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from regrasp.interfaces.cell import KnownCell
 from regrasp.interfaces.frame import Intrinsics, RgbdFrame
 from regrasp.perception.pose.estimate import Estimate, NoEstimate
-from regrasp.perception.pose.rgbd import Rgbd, min_max_axis, n_mean
+from regrasp.perception.pose.rgbd import Rgbd, RgbdParameters, min_max_axis, n_mean
 from regrasp.perception.pose.segmentation import NotSeen
 
 Vector = NDArray[np.float64]
@@ -113,5 +113,9 @@ def test_holes_and_bad_values_in_the_depth_do_no_harm() -> None:
 
 def test_n_mean_and_min_max_by_hand() -> None:
     points = np.column_stack([np.arange(11.0), np.zeros(11), np.r_[np.full(5, 1.0), np.full(6, 2.0)]])
-    np.testing.assert_allclose(n_mean(points), [4.5, 0.0, 1.5])  # n = 2: the fifth and sixth of eleven
-    np.testing.assert_allclose(min_max_axis(points), np.array([10.0, 0.0, 1.0]) / np.sqrt(101.0))
+    np.testing.assert_allclose(
+        n_mean(points, RgbdParameters.middle_share), [4.5, 0.0, 1.5]
+    )  # n = 2: the fifth and sixth of eleven
+    np.testing.assert_allclose(
+        min_max_axis(points, RgbdParameters.end_share), np.array([10.0, 0.0, 1.0]) / np.sqrt(101.0)
+    )
