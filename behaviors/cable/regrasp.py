@@ -29,7 +29,7 @@ class Regrasp(HandLeaf):
         # A guess near the connector, which was looked at, is no obstacle; a surface that was seen there is one.
         far = _distance_to_axis(points, connector, half) > CLEAR
         kept = far | np.array([tuple(p) in seen for p in points.tolist()], bool)
-        motion.set_obstacles(points[kept], occupancy.h)
+        motion.set_obstacles(points[kept], occupancy.voxel_size)
         yield motion.pick(HAND, connector, cable=cable_course(self.services.known, connector), seen=self.seen)
         try:
             yield from self.grip(connector)
