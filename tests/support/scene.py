@@ -50,7 +50,7 @@ def seen(
     seed: int = 5,
     camera: RigidTransform = REAR_POSE,
 ) -> RgbdFrame:
-    """The rear camera's frame: whole within `WINDOW` pixels of the point `at` (3,) m, elsewhere what `register` reads."""
+    """The rear camera's frame: whole within `WINDOW` pixels of `at` (3,) m, elsewhere what `register` reads."""
     sensor = sensor or Sensor()
     u, v = np.rint(project(camera.inv().apply(at)[None], REAR)[0]).astype(int)
     u0, u1 = (int(np.clip(u + side, 0, REAR.width)) for side in (-WINDOW, WINDOW))
