@@ -80,7 +80,7 @@ class Registration:
         ray = point - self.world_from_camera.translation
         jacobian = np.zeros((6, 7))
         jacobian[:3, :3] = np.eye(3)
-        jacobian[:3, 3:6] = -_skew(ray)
+        jacobian[:3, 3:6] = -skew(ray)
         jacobian[:3, 6] = ray
         jacobian[3:, 3:6] = np.eye(3)
         return np.asarray(jacobian @ self.covariance @ jacobian.T)
@@ -264,10 +264,14 @@ def _rotation_matrix(vector: FloatArray) -> FloatArray:
     angle = float(np.linalg.norm(vector))
     if angle < 1e-12:
         return np.eye(3)
-    k = _skew(vector / angle)
+    k = skew(vector / angle)
     return np.asarray(np.eye(3) + np.sin(angle) * k + (1.0 - np.cos(angle)) * k @ k)
 
 
-def _skew(v: FloatArray) -> FloatArray:
-    """The matrix (3, 3) that times w is v x w."""
-    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
+def skew(vectors: FloatArray) -> FloatArray:
+    """Matrices (..., 3, 3) that times w give v x w for each v of `vectors` (..., 3)."""
+    x, y, z = np.moveaxis(vectors, -1, 0)
+    out = np.zeros((*vectors.shape, 3))
+    out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -z, y, -x
+    out[..., 1, 0], out[..., 2, 0], out[..., 2, 1] = z, -y, x
+    return out

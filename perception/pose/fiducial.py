@@ -18,13 +18,12 @@ from regrasp.interfaces.cell import TAG_DICTIONARY, Clip, Connector, KnownCell, 
 from regrasp.interfaces.frame import Intrinsics, RgbdFrame
 from regrasp.perception.arrays import FloatArray
 from regrasp.perception.camera.model import pixel_rays, project
-from regrasp.perception.camera.registration import FIXED_CAMERA_ERRORS, WRIST_CAMERA_ERRORS, CameraErrors
+from regrasp.perception.camera.registration import FIXED_CAMERA_ERRORS, WRIST_CAMERA_ERRORS, CameraErrors, skew
 from regrasp.perception.pose.estimate import Estimate, NoEstimate
 from regrasp.perception.pose.segmentation import NotSeen
 
 NO_ERRORS = CameraErrors(0.0, 0.0, 0.0)  # without known boxes poses stand in the camera's own frame, as in `register`
 REDUNDANCY = 2.0  # degrees of freedom: the 8 coordinates of four corners less the 6 of a pose
-CROSS_PRODUCTS = np.cross(np.eye(3)[:, None], np.eye(3))  # (3, 3, 3) of the unit vectors
 
 
 @dataclass(frozen=True)
@@ -265,15 +264,10 @@ def _covariance(square: FloatArray, center: FloatArray, k: Intrinsics, parameter
     zero = np.zeros(4)
     u = np.stack([k.fx / z, zero, -k.fx * x / z**2], axis=-1)
     v = np.stack([zero, k.fy / z, -k.fy * y / z**2], axis=-1)
-    moved = np.concatenate([np.broadcast_to(np.eye(3), (4, 3, 3)), -_skew(square - center)], axis=2)
+    moved = np.concatenate([np.broadcast_to(np.eye(3), (4, 3, 3)), -skew(square - center)], axis=2)
     jacobian = (np.stack([u, v], axis=1) @ moved).reshape(8, 6) / parameters.corner_noise
     prior = np.diag([0.0, 0.0, 0.0, *[parameters.tilt_deviation**-2] * 3])
     return np.asarray(np.linalg.inv(jacobian.T @ jacobian + prior))
-
-
-def _skew(vectors: FloatArray) -> FloatArray:
-    """Matrices (..., 3, 3) that times w give v x w for each v of `vectors` (..., 3)."""
-    return np.asarray(np.tensordot(vectors, CROSS_PRODUCTS, 1).swapaxes(-1, -2))
 
 
 def _in_world(found: TagPose, world_from_camera: RigidTransform, errors: CameraErrors) -> TagPose:
@@ -281,7 +275,7 @@ def _in_world(found: TagPose, world_from_camera: RigidTransform, errors: CameraE
     pose = world_from_camera * found.pose
     rotation = np.kron(np.eye(2), world_from_camera.as_matrix()[:3, :3])
     jacobian = np.eye(6)
-    jacobian[:3, 3:] = -_skew(pose.translation - world_from_camera.translation)
+    jacobian[:3, 3:] = -skew(pose.translation - world_from_camera.translation)
     camera = jacobian @ np.diag([errors.position**2] * 3 + [errors.rotation**2] * 3) @ jacobian.T
     covariance = rotation @ found.covariance @ rotation.T + camera
     return TagPose(pose, covariance, found.readings, found.area, found.ambiguity)

@@ -47,7 +47,7 @@ def between(found: RigidTransform, true: RigidTransform) -> NDArray[np.float64]:
     return np.concatenate([found.translation - true.translation, (found.rotation * true.rotation.inv()).as_rotvec()])
 
 
-def unlikely(error: NDArray[np.float64], covariance: NDArray[np.float64]) -> float:
+def mahalanobis_sq(error: NDArray[np.float64], covariance: NDArray[np.float64]) -> float:
     """Squared Mahalanobis distance."""
     return float(error @ np.linalg.solve(covariance, error))
 
@@ -66,7 +66,7 @@ def test_free_views_are_found_and_the_covariance_tells_how_well(renderer: Render
     assert np.median(distances) < 0.003
     assert np.percentile(distances, 95) < 0.012
     for part, limit in ((slice(0, 3), chi2.ppf(0.95, 3)), (slice(3, 6), chi2.ppf(0.95, 3))):
-        inside = [unlikely(error[part], covariance[part, part]) < limit for error, covariance in errors]
+        inside = [mahalanobis_sq(error[part], covariance[part, part]) < limit for error, covariance in errors]
         assert np.mean(inside) > 0.85
 
 
@@ -197,7 +197,7 @@ def test_spoilt_frames_give_a_reason_or_a_pose_that_holds(
     rgb = np.clip(light * frame.rgb.astype(float), 0, 255).astype(np.uint8)
     result = find_tag(replace(frame, rgb=rgb, depth=depth), TAG)
     if isinstance(result, TagPose):
-        assert unlikely(between(result.pose, true), result.covariance) < 60.0
+        assert mahalanobis_sq(between(result.pose, true), result.covariance) < 60.0
         assert np.isfinite(result.covariance).all()
 
 
