@@ -149,5 +149,5 @@ class Perception:
 
     def _register(self, frame: RgbdFrame) -> Registration:
         """A frame's camera, corrected by the known boxes."""
-        errors = expected_errors(self._known, frame.camera)
+        errors = expected_errors(self._known, frame.camera, self._parameters.registration)
         return register(frame, self._pose_of(frame), self._known.boxes, errors, self._parameters.registration)

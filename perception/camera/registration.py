@@ -19,22 +19,6 @@ from regrasp.perception.camera.model import pixel_rays, subsampled
 
 
 @dataclass(frozen=True)
-class RegistrationParameters:
-    """Which depth readings count, and how much."""
-
-    pixel_step: int = 16  # px between the readings used: 1,590 of them at 848x480
-    gates: tuple[float, ...] = (0.06, 0.03, 0.015, 0.010)  # m; one iteration each, farther readings show other things
-    face_border: float = 0.03  # m; the rim of a face does not count
-    min_gated_share: float = 0.25  # choice: of a face direction's readings; with fewer, things stand before the faces
-    neighbour_step: int = 2  # readings to the neighbours that must lie alike: 34 mm at 0.7 m
-    max_unevenness: float = 0.017  # m between neighbours; choice: three standard deviations of their difference
-    behind_distance: float = 0.03  # m behind a face, from which the camera seems to look through it
-    max_behind_share: float = 0.2  # of the readings on faces; noise makes no such share
-    min_readings: int = 30  # fewer correct nothing
-    depth_noise: float = 0.0035  # m at the panels, 0.86 m away: 0.004, less an eighth that the weights make up for
-
-
-@dataclass(frozen=True)
 class CameraErrors:
     """Standard deviations of a camera's assumed pose and depth: position (m, each axis), rotation (rad), scale."""
 
@@ -49,11 +33,31 @@ FIXED_CAMERA_ERRORS = CameraErrors(0.002, 0.003, 0.015)
 WRIST_CAMERA_ERRORS = CameraErrors(0.006, 0.02, 0.015)
 
 
-def expected_errors(known: KnownCell, camera: str) -> CameraErrors:
+@dataclass(frozen=True)
+class RegistrationParameters:
+    """Which depth readings count, and how much."""
+
+    pixel_step: int = 16  # px between the readings used: 1,590 of them at 848x480
+    gates: tuple[float, ...] = (0.06, 0.03, 0.015, 0.010)  # m; one iteration each, farther readings show other things
+    face_border: float = 0.03  # m; the rim of a face does not count
+    min_gated_share: float = 0.25  # choice: of a face direction's readings; with fewer, things stand before the faces
+    neighbour_step: int = 2  # readings to the neighbours that must lie alike: 34 mm at 0.7 m
+    max_unevenness: float = 0.017  # m between neighbours; choice: three standard deviations of their difference
+    behind_distance: float = 0.03  # m behind a face, from which the camera seems to look through it
+    max_behind_share: float = 0.2  # of the readings on faces; noise makes no such share
+    min_readings: int = 30  # fewer correct nothing
+    depth_noise: float = 0.0035  # m at the panels, 0.86 m away: 0.004, less an eighth that the weights make up for
+    fixed_errors: CameraErrors = FIXED_CAMERA_ERRORS  # to expect of a camera that is fixed in the cell
+    wrist_errors: CameraErrors = WRIST_CAMERA_ERRORS  # to expect of a camera that an arm carries
+
+
+def expected_errors(
+    known: KnownCell, camera: str, parameters: RegistrationParameters = RegistrationParameters()
+) -> CameraErrors:
     """The errors to expect of a camera of the cell by its mount; a camera that is not in the cell counts as fixed."""
     mounts = [c.mount for c in known.cameras if c.name == camera]
     carried = any(isinstance(mount, WristMount) for mount in mounts)
-    return WRIST_CAMERA_ERRORS if carried else FIXED_CAMERA_ERRORS
+    return parameters.wrist_errors if carried else parameters.fixed_errors
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,20 +117,17 @@ def register(
     start = world_from_camera.as_matrix()
     rotation, position, scale = start[:3, :3], start[:3, 3], 1.0
     information, correction, behind_share = prior, np.zeros(7), 0.0
+    limits = (
+        parameters.face_border,
+        parameters.min_gated_share,
+        parameters.neighbour_step,
+        parameters.max_unevenness,
+        parameters.behind_distance,
+        parameters.depth_noise,
+    )
     for gate in parameters.gates:
-        measured, gradient, count, behind_share = _normal_equations(
-            scale * readings @ rotation.T,
-            position,
-            lower,
-            upper,
-            gate,
-            parameters.face_border,
-            parameters.min_gated_share,
-            parameters.neighbour_step,
-            parameters.max_unevenness,
-            parameters.behind_distance,
-            parameters.depth_noise,
-        )
+        rays = scale * readings @ rotation.T
+        measured, gradient, count, behind_share = _normal_equations(rays, position, lower, upper, gate, *limits)
         if count < parameters.min_readings:
             break
         information = prior + measured

@@ -40,6 +40,8 @@ class FiducialParameters:
     max_depth_residual: float = 3.0  # deviations; what is further off counts as this
     max_size_error: float = 0.05  # choice: two deviations of the depth's scale, 3 %, and as much again for the size
     tilt_deviation: float = 1.0  # rad; choice: prior on the rotation, which a frontal view hardly shows
+    fixed_errors: CameraErrors = FIXED_CAMERA_ERRORS  # to expect of a camera that is fixed in the cell
+    wrist_errors: CameraErrors = WRIST_CAMERA_ERRORS  # to expect of a camera that an arm carries
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +114,8 @@ class Fiducial:
         found = find_tag(frame, body.tag, near_in_camera, self._parameters)
         if isinstance(found, NoEstimate):
             return found
-        errors = WRIST_CAMERA_ERRORS if frame.camera in self._carried else FIXED_CAMERA_ERRORS
+        carried = frame.camera in self._carried
+        errors = self._parameters.wrist_errors if carried else self._parameters.fixed_errors
         return _in_world(found, world_from_camera, errors if self._in_cell else NO_ERRORS)
 
 

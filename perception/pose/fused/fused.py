@@ -14,7 +14,6 @@ from regrasp.interfaces.cell import Box, KnownCell, pose_along
 from regrasp.interfaces.frame import RgbdFrame
 from regrasp.perception.arrays import FloatArray
 from regrasp.perception.camera.registration import (
-    FIXED_CAMERA_ERRORS,
     CameraErrors,
     Registration,
     RegistrationParameters,
@@ -87,7 +86,10 @@ class Fused:
 
     def __init__(self, known: KnownCell, parameters: FusedParameters = FusedParameters()) -> None:
         self._connector, self._boxes, self._parameters = known.connector, known.boxes, parameters
-        self._errors: dict[str, CameraErrors] = {c.name: expected_errors(known, c.name) for c in known.cameras}
+        registration = parameters.registration
+        self._errors: dict[str, CameraErrors] = {
+            c.name: expected_errors(known, c.name, registration) for c in known.cameras
+        }
         noise = parameters.blob.disparity_noise
         self._stereo: dict[str, Stereo] = {c.name: Stereo.of(c, noise) for c in known.cameras}
         self._color = SegmentationParameters.for_color(known.connector.color)
@@ -105,7 +107,7 @@ class Fused:
         if not blobs:
             message = f"no blob of {self._parameters.blob.min_area} pixels has the connector's colour"
             return NoEstimate(frame.stamp, frame.camera, NotSeen.NO_COLOR, message)
-        errors = self._errors.get(frame.camera, FIXED_CAMERA_ERRORS)
+        errors = self._errors.get(frame.camera, self._parameters.registration.fixed_errors)
         camera = register(frame, world_from_camera, self._boxes, errors, self._parameters.registration)
         if camera.mahalanobis_sq > self._parameters.max_camera_mahalanobis_sq:
             message = "the cell's panels are not where the camera's intrinsics, its depth and its place put them"
