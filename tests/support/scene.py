@@ -1,4 +1,4 @@
-"""The thesis's cell before the ray caster: its floor and panels, a connector with its cable, a camera told wrong."""
+"""The thesis's cell for the ray caster: floor and panels, a connector with its cable, a camera with a pose error."""
 
 from collections.abc import Sequence
 from dataclasses import replace

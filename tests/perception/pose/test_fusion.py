@@ -1,4 +1,4 @@
-"""Several estimates made one: what may be expected of it for any estimates, and how often it is right."""
+"""Fusion of estimates: properties that hold for any estimates, and how often the stated regions hold the truth."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -52,7 +52,7 @@ def random_covariance(rng: np.random.Generator, axis: FloatArray, scale: float =
 
 
 def draws(seed: int, cameras: Sequence[str]) -> list[Estimate]:
-    """An estimate for each camera named, with errors as its own covariance tells."""
+    """An estimate for each camera named, with errors drawn from its own covariance."""
     rng = np.random.default_rng(seed)
     axis = rng.normal(size=3)
     axis /= np.linalg.norm(axis)

@@ -52,7 +52,7 @@ def surface(center: Vector, axis: Vector) -> tuple[Vector, Vector]:
 
 
 def silhouette_rays(center: Vector, axis: Vector, count: int = 120) -> Vector:
-    """Unit rays (count, 3) from the camera that just touch the body: found by bisection outwards from its middle."""
+    """Unit rays (count, 3) from the camera that just touch the body, by bisection outwards from its centre."""
     view = center / np.linalg.norm(center)
     u = np.cross(view, [0.0, 1.0, 0.0])
     u /= np.linalg.norm(u)
@@ -73,7 +73,7 @@ def unit(vectors: Vector) -> Vector:
 
 
 def signed(points: Vector, center: Vector, axis: Vector) -> Vector:
-    """Signed distance (n,) of points (n, 3) from the body, the textbook's way."""
+    """Signed distance (n,) of points (n, 3) from the body, by the textbook's formula."""
     offset = points - center
     along = offset @ axis
     side = np.linalg.norm(offset - along[:, None] * axis, axis=1) - RADIUS
@@ -110,7 +110,7 @@ def off(found: CylinderFit, axis: Vector) -> tuple[float, float]:
 @settings(max_examples=60, derandomize=True)  # a few poses put a reading at the brink of a face
 @given(degrees, tilts, st.integers(0, 2**32 - 1))
 def test_the_rows_are_the_derivatives(in_image: float, to_camera: float, seed: int) -> None:
-    """Deviations of many metres keep what weighs a reading from changing with the pose."""
+    """Deviations of many metres keep the weight of a reading from changing with the pose."""
     rng = np.random.default_rng(seed)
     axis = turned(in_image, to_camera)
     seen = observed(CENTER, axis, 0.5)  # nearer to the rims the step would change the face that a ray meets

@@ -11,7 +11,7 @@ from regrasp.interfaces.cell import KnownCell
 from regrasp.interfaces.frame import RgbdFrame
 from regrasp.perception.camera.registration import FIXED_CAMERA_ERRORS
 from regrasp.perception.pose.estimate import Estimate, NoEstimate
-from regrasp.perception.pose.fused.fused import Fused
+from regrasp.perception.pose.fused.fused import Fused, FusedParameters
 from regrasp.perception.pose.segmentation import NotSeen
 
 Vector = NDArray[np.float64]
@@ -144,6 +144,14 @@ def test_a_flat_piece_on_a_panel_is_refused(fused: Fused, panels: list[Thing], k
     for seed in range(4):
         result = fused.estimate(seen([*panels, sticker, plug_before], at, seed=seed), REAR_POSE)
         assert isinstance(result, NoEstimate)
+
+
+def test_a_technique_takes_its_parameters(known: KnownCell, panels: list[Thing]) -> None:
+    strict = Fused(known, FusedParameters(min_readings=10_000))
+    result = strict.estimate(seen([*panels, *plug()]), REAR_POSE)
+    assert isinstance(result, NoEstimate)
+    assert result.reason is NotSeen.NO_DEPTH
+    assert "10000 are needed" in result.message
 
 
 def test_red_things_beside_it_are_not_mistaken(fused: Fused, panels: list[Thing]) -> None:
