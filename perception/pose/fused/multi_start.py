@@ -55,6 +55,7 @@ def fit_from_starts(
 
     few, all_of_it = thinned(blob.observation, parameters.rough_points), blob.observation
     coarse, fine = parameters.coarse_scale, parameters.fine_scale
+    # No steps: this only gives each start its cost.
     starts = [fit_cylinder(few, s, coarse, fit_parameters, 0) for s in _starts(all_of_it, connector, parameters)]
     starts.sort(key=lambda f: f.cost)
     followed = _distinct(starts, parameters.rough_fits, parameters)

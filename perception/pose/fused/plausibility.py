@@ -23,8 +23,8 @@ class PlausibilityParameters:
 
     max_silhouette_residual: float = 0.5  # px, median over the silhouette
     max_stray_share: float = 0.3  # of the silhouette, more than a pixel off: a cable before the body makes as much
-    max_median_depth: float = 1.2  # deviations, median of the depth residuals
-    max_high_depth: float = 2.2  # deviations, 80th percentile of the depth residuals
+    max_median_depth_residual: float = 1.2  # deviations, median of the depth residuals
+    max_depth_residual_p80: float = 2.2  # deviations, 80th percentile of the depth residuals
     # rad; choice: a cylinder seen so nearly along its axis shows a disc, as a ball does
     max_head_on_angle: float = float(np.deg2rad(4.0))
     # Search radius (px). Same-coloured pixels in it that the fitted cylinder does not explain mean that the blob
@@ -54,7 +54,7 @@ def refusal(
         return f"its silhouette is {edge:.1f} pixels off the connector's, {stray:.0%} of it more than one"
     residuals = np.abs(depth_residuals(seen.points, seen.point_deviations, body, fit_parameters))
     median, high = float(np.median(residuals)), float(np.percentile(residuals, 80))
-    if median > parameters.max_median_depth or high > parameters.max_high_depth:
+    if median > parameters.max_median_depth_residual or high > parameters.max_depth_residual_p80:
         return f"its surface is {median:.1f} deviations off the connector's, a fifth of it more than {high:.1f}"
     head_on = np.cos(parameters.max_head_on_angle)
     if abs(float(body.axis @ body.center)) > head_on * float(np.linalg.norm(body.center)):
