@@ -35,7 +35,6 @@ class Stillness:
 
     def __init__(self, parameters: StillnessParameters = StillnessParameters()) -> None:
         self._parameters = parameters
-        self.moving_blocks = 0
         self._images: deque[tuple[float, NDArray[np.float32]]] = deque()
 
     def reset(self) -> None:
@@ -52,8 +51,8 @@ class Stillness:
         if newest - self._images[0][0] < window - 1e-9:
             return None
         stack = np.stack([image for _, image in self._images])
-        self.moving_blocks = int(np.count_nonzero(np.ptp(stack, axis=0) > self._parameters.threshold))
-        return self.moving_blocks < self._parameters.min_blocks
+        moving = int(np.count_nonzero(np.ptp(stack, axis=0) > self._parameters.threshold))
+        return moving < self._parameters.min_blocks
 
 
 def _block_means(rgb: ColorImage, block: int) -> NDArray[np.float32]:
