@@ -103,7 +103,7 @@ class Detector:
         self._parameters = parameters
 
     def detect(self, frame: RgbdFrame, min_score: float | None = None) -> list[Detection]:
-        """The connectors in `frame`, the likeliest first; with a score of at least the parameters' without another."""
+        """The connectors in `frame`, the likeliest first. `min_score` overrides the parameters' own."""
         least = self._parameters.min_score if min_score is None else min_score
         return self._with_color(frame.rgb, self._decode(*self._forward(frame), least))
 
