@@ -133,24 +133,30 @@ def _closest_approach(
     start = center[0] * axis[0] + center[1] * axis[1] + center[2] * axis[2]
     middle = (out - slope * start) / max(1.0 - slope * slope, 1e-3)
     if slope * slope < 0.999 and abs(middle * slope - start) < half - radius:
-        return signed_distance(middle * ray[0], middle * ray[1], middle * ray[2], center, axis, radius, half)[0], middle
+        return _distance_on_ray(middle, ray, center, axis, radius, half), middle
     low, high = out - half - radius, out + half + radius
     first, second = high - GOLDEN_RATIO * (high - low), low + GOLDEN_RATIO * (high - low)
-    at_first = signed_distance(first * ray[0], first * ray[1], first * ray[2], center, axis, radius, half)[0]
-    at_second = signed_distance(second * ray[0], second * ray[1], second * ray[2], center, axis, radius, half)[0]
+    at_first = _distance_on_ray(first, ray, center, axis, radius, half)
+    at_second = _distance_on_ray(second, ray, center, axis, radius, half)
     for _ in range(search_steps):
         if at_first < at_second:
             high, second, at_second = second, first, at_first
             first = high - GOLDEN_RATIO * (high - low)
-            at_first = signed_distance(first * ray[0], first * ray[1], first * ray[2], center, axis, radius, half)[0]
+            at_first = _distance_on_ray(first, ray, center, axis, radius, half)
         else:
             low, first, at_first = first, second, at_second
             second = low + GOLDEN_RATIO * (high - low)
-            at_second = signed_distance(second * ray[0], second * ray[1], second * ray[2], center, axis, radius, half)[
-                0
-            ]
+            at_second = _distance_on_ray(second, ray, center, axis, radius, half)
     best = 0.5 * (low + high)
     return min(at_first, at_second), best
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _distance_on_ray(
+    out: float, ray: FloatArray, center: FloatArray, axis: FloatArray, radius: float, half: float
+) -> float:
+    """Signed distance (m) of the point at the range `out` (m) on a unit ray."""
+    return signed_distance(out * ray[0], out * ray[1], out * ray[2], center, axis, radius, half)[0]
 
 
 @numba.njit(cache=True, error_model="numpy")
