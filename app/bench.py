@@ -22,8 +22,8 @@ from regrasp.app.studies.table import print_table
 from regrasp.behaviors import LEAVES
 from regrasp.interfaces.cell import TAG_DICTIONARY, Cell
 from regrasp.interfaces.frame import RgbdFrame
-from regrasp.perception.camera.registration import FIXED, register
-from regrasp.perception.pose.detector import Detector, fitted, network_input, pixel_sizes, shipped_network
+from regrasp.perception.camera.registration import FIXED_CAMERA_ERRORS, register
+from regrasp.perception.pose.detector import Detector, letterboxed, network_input, pixel_sizes, shipped_network
 from regrasp.perception.pose.estimate import NoEstimate
 from regrasp.perception.pose.fused.fused import Fused
 from regrasp.perception.pose.rgbd import Rgbd
@@ -199,7 +199,7 @@ def color_techniques(cell: Cell, width: int) -> dict[str, tuple[Call, Call]]:
         "rgbd": lambda: rgbd.estimate(frame, pose),
         "fused": lambda: fused.estimate(frame, pose),
         "fused, the colour's mask": lambda: color_mask(frame.rgb, color),
-        "fused, the camera registered": lambda: register(frame, pose, known.boxes, FIXED),
+        "fused, the camera registered": lambda: register(frame, pose, known.boxes, FIXED_CAMERA_ERRORS),
         "fused, all but registered": lambda: unregistered.estimate(frame, pose),
     }
     return {f"{width}x480 {name} / bare OpenCV calls": (call, bare) for name, call in ours.items()}
@@ -211,7 +211,7 @@ def detector_stages(cell: Cell, width: int) -> dict[str, tuple[Call, Call]]:
     network = cv2.dnn.readNetFromONNX(np.frombuffer(shipped_network(), np.uint8))
 
     def make_input() -> Any:
-        return network_input(fitted(frame.rgb)[0], pixel_sizes(frame.depth, frame.intrinsics))[None]
+        return network_input(letterboxed(frame.rgb)[0], pixel_sizes(frame.depth, frame.intrinsics))[None]
 
     inputs = make_input()
 

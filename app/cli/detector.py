@@ -133,13 +133,13 @@ def _detector(cell: "Cell", model: Path | None) -> Any:
     import numpy as np
 
     from regrasp.interfaces.frame import Intrinsics, RgbdFrame
-    from regrasp.perception.pose.detector import HEIGHT, WIDTH, Detector
+    from regrasp.perception.pose.detector import NETWORK_HEIGHT, NETWORK_WIDTH, Detector
 
     cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)  # the finding below says what is wrong
     try:
         detector = Detector(cell.known, model.read_bytes() if model else None)
-        blank = np.zeros((HEIGHT, WIDTH), np.float32)
-        k = Intrinsics.from_fov(WIDTH, HEIGHT, 1.0)
+        blank = np.zeros((NETWORK_HEIGHT, NETWORK_WIDTH), np.float32)
+        k = Intrinsics.from_fov(NETWORK_WIDTH, NETWORK_HEIGHT, 1.0)
         detector.detect(RgbdFrame("blank", 0, 0.0, np.zeros((*blank.shape, 3), np.uint8), blank, k))
         return detector
     except (cv2.error, ValueError):

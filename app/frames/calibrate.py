@@ -17,7 +17,7 @@ from regrasp.app.frames.image_files import read_rgb
 from regrasp.app.studies.table import print_table
 from regrasp.interfaces.cell import CameraSpec
 from regrasp.interfaces.frame import Intrinsics
-from regrasp.perception.camera.calibration import Calibration, calibrate, find_board
+from regrasp.perception.camera.calibration import Calibration, calibrate_intrinsics, find_checkerboard
 from regrasp.sim.cameras.board import board_pictures, board_poses
 
 Picture = tuple[str, Callable[[], NDArray[np.uint8]]]  # a name, and a function that returns the RGB image
@@ -105,7 +105,7 @@ def run_calibration(
     if (different := _different(list(seen.values()), checks.min_view_distance * size[0])) < checks.min_views:
         message = f"only {different} of {len(seen)} views differ; hold the board in {checks.min_views} or more ways"
         raise Findings([Finding(source, 0, message)])
-    found = calibrate(list(seen.values()), *size, board.columns, board.rows, board.square)
+    found = calibrate_intrinsics(list(seen.values()), *size, board.columns, board.rows, board.square)
     deviation = max(found.deviations[0] / found.intrinsics.fx, found.deviations[1] / found.intrinsics.fy)
     if not deviation < checks.max_focal_deviation:  # nan too
         message = (
@@ -143,7 +143,7 @@ def _find_boards(
             continue
         sizes.setdefault((rgb.shape[1], rgb.shape[0]), name)
         if len(sizes) == 1 and not wrong:
-            views[name] = find_board(rgb, board.columns, board.rows)
+            views[name] = find_checkerboard(rgb, board.columns, board.rows)
     if len(sizes) > 1:
         sizes_text = ", ".join(f"{name} is {width}x{height}" for (width, height), name in sizes.items())
         wrong.append(

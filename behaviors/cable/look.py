@@ -84,8 +84,8 @@ class LookLeaf(HandLeaf):
             stamps.add(result.stamp)
             if len(stamps) == self.view.frames_before_mapping and perception.trouble("wrist") is None:
                 perception.map_obstacles("wrist")
-                motion.set_obstacles(perception.occupancy.occupied_points(), perception.occupancy.h)
+                motion.set_obstacles(perception.occupancy.occupied_points(), perception.occupancy.voxel_size)
             if isinstance(result, Estimate):
                 seen.append(result)
-            elif weak_detections is not None and result.glimpse is not None:
-                weak_detections.append(result.glimpse)
+            elif weak_detections is not None and result.weak_detection is not None:
+                weak_detections.append(result.weak_detection)

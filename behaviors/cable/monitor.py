@@ -26,7 +26,7 @@ class Monitor(Leaf):
         """See the class."""
         perception, now = self.services.perception, self.services.clock.now()
         tool, held = self.services.motion.tool(HANDLING_ARM), self.services.belief.held
-        perception.track.held(tool.translation)
+        perception.track.set_holding_tool(tool.translation)
         perception.hint = None if held is None else (tool * held).rotation.apply([1.0, 0.0, 0.0])
         if now >= self._due - 1e-9:
             perception.look("rear")
@@ -44,6 +44,6 @@ class Monitor(Leaf):
     def terminate(self, new_status: Status) -> None:
         """When the tree stops the leaf, forget the hand and the hint: the carrying is over."""
         if new_status is Status.INVALID:
-            self.services.perception.track.held(None)
+            self.services.perception.track.set_holding_tool(None)
             self.services.perception.hint = None
             self._due = 0.0

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 from regrasp.behaviors.cable.hand import HANDLING_ARM, HandLeaf
 from regrasp.behaviors.leaf import LeafFailed, LeafPort, LeafSteps
 from regrasp.interfaces.cause import CauseCode
-from regrasp.perception.tracking.stillness import Stillness
+from regrasp.perception.tracking.stillness import Stillness, StillnessParameters
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,8 @@ class WaitUntilStill(HandLeaf):
 
     def steps(self) -> LeafSteps:
         """See the class."""
-        stillness, begin = Stillness(threshold=self.parameters.threshold), self.services.clock.now()
+        stillness = Stillness(StillnessParameters(threshold=self.parameters.threshold))
+        begin = self.services.clock.now()
         limit = self.get_input("time_limit")
         perception = self.services.perception
         while self.services.clock.now() < begin + limit:
@@ -73,7 +74,9 @@ class WaitUntilStill(HandLeaf):
                 self.say("still", waited=round(self.services.clock.now() - begin, 2))
                 if voxels := perception.map_new_obstacle("rear"):
                     self.say("a new thing stands in the cell", voxels=voxels)
-                    self.services.motion.set_obstacles(perception.occupancy.occupied_points(), perception.occupancy.h)
+                    self.services.motion.set_obstacles(
+                        perception.occupancy.occupied_points(), perception.occupancy.voxel_size
+                    )
                 return
             yield from self.wait(self.parameters.frame_period)
         raise LeafFailed(CauseCode.NOT_STILL, f"the scene still moved after {limit:.0f} s")

@@ -40,7 +40,7 @@ class Regrasp(HandLeaf):
         # The connector was looked at, so a guess near it is no obstacle; a surface that was seen there is one.
         far = _distance_to_axis(points, connector, half) > self.parameters.clear_radius
         kept = far | np.array([tuple(p) in seen for p in points.tolist()], bool)
-        motion.set_obstacles(points[kept], occupancy.h)
+        motion.set_obstacles(points[kept], occupancy.voxel_size)
         cable = cable_course(self.services.known, connector)
         yield motion.pick(HANDLING_ARM, connector, cable=cable, point_cloud=self.rear_point_cloud)
         try:

@@ -32,5 +32,5 @@ class StartUp(StepsLeaf):
             yield None
         perception.look("rear")  # the plugged end, while no hand hides it
         voxels = perception.map_obstacles("rear")
-        motion.set_obstacles(perception.occupancy.occupied_points(), perception.occupancy.h)
+        motion.set_obstacles(perception.occupancy.occupied_points(), perception.occupancy.voxel_size)
         self.say("looked around", occupied_voxels=voxels)

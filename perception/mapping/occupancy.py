@@ -1,6 +1,7 @@
-"""Obstacles from depth images: what an arm must keep clear of besides the boxes that it was told of."""
+"""A voxel map of obstacles from depth images: what an arm must keep clear of besides the boxes that it knows."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from enum import IntEnum
 
 import cv2
@@ -10,49 +11,60 @@ from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.cell import Box, Connector
 from regrasp.interfaces.frame import Intrinsics, RgbdFrame
-from regrasp.perception.camera.model import project, rays, subsampled
+from regrasp.perception.arrays import ColorImage, DepthImage, FloatArray, Mask
+from regrasp.perception.camera.model import pixel_rays, project, subsampled
 from regrasp.perception.pose.segmentation import SegmentationParameters, color_mask
 
-FloatArray = NDArray[np.float64]
-Depth = NDArray[np.float32]
-Mask = NDArray[np.bool_]
 Spheres = tuple[FloatArray, FloatArray]  # centres (n, 3) m in the world, radii (n,) m
 
-STEP = 4  # pixels; choice: 5 mm apart at 0.75 m, a third of a voxel
-KNOWN_MARGIN = 0.025  # m; choice: depth scale 1.5 % of 0.85 m is 13 mm, camera pose 6 mm, noise 4 mm
-ASSUMED_DEPTH = 0.08  # m; choice: how far an obstacle reaches behind its seen surface until a view shows otherwise
-EDGE = 0.03  # m; neighbours that differ by more are an edge, where depth readings fly between the surfaces
-ROBOT_MARGIN = 0.02  # m; choice: arms are 5 mm off, depth scale 13 mm
-DARK = 45  # of 255; choice: the cable's 0.06 is 15 in full light
-THIN = 0.0075  # m; choice: a dark pixel nearer than this to a lighter one is cable (7 mm) or the rim of a dark thing
-NOTHING = 1e3  # m; farther than any reading
-CLOSER = 1.1  # choice: a look from up to this many times the range may overrule the one before
+NO_READING = 1e3  # m; farther than any reading
+
+
+@dataclass(frozen=True)
+class OccupancyParameters:
+    """Resolution of the map, and which depth readings are obstacles."""
+
+    voxel_size: float = 0.010  # m; obstacles stand within 0.1 m of the connector, and a hand must pass between
+    pixel_step: int = 4  # px; choice: the readings are 5 mm apart at 0.75 m
+    known_margin: float = 0.025  # m; choice: depth scale 1.5 % of 0.85 m is 13 mm, camera pose 6 mm, noise 4 mm
+    robot_margin: float = 0.02  # m; choice: arms are 5 mm off, depth scale 13 mm
+    assumed_depth: float = 0.08  # m; choice: how far an obstacle reaches behind its surface until a view shows it
+    max_depth_step: float = 0.03  # m between neighbours; more is an edge, where readings fly between the surfaces
+    max_cable_brightness: int = 45  # of 255; choice: the cable's 0.06 is 15 in full light
+    cable_width: float = 0.0075  # m; choice: dark pixels nearer to lighter ones are cable (7 mm), or a dark thing's rim
+    overrule_range: float = 1.1  # choice: a look from up to this many times the range overrules the one before
 
 
 class Voxel(IntEnum):
     """What is known of a voxel."""
 
     UNSEEN = 0
-    FREE = 1  # looked through
-    BEHIND = 2  # assumed full: behind a seen surface
+    FREE = 1  # a ray passed through
+    BEHIND = 2  # behind a seen surface: assumed full
     SURFACE = 3  # seen
 
 
 class Occupancy:
-    """Voxels of a region of the world. Known boxes are left to those who check them exactly."""
+    """Voxels of a region of the world. Known boxes are left out: they are checked exactly elsewhere."""
 
     def __init__(
-        self, lower: FloatArray, upper: FloatArray, known: Sequence[Box], connector: Connector, h: float = 0.015
+        self,
+        lower: FloatArray,
+        upper: FloatArray,
+        known: Sequence[Box],
+        connector: Connector,
+        parameters: OccupancyParameters = OccupancyParameters(),
     ) -> None:
-        """Region from `lower` to `upper` (3,) m in voxels of edge `h` m. `known` boxes and connector do not count."""
-        counts = np.ceil((upper - lower) / h - 1e-9).astype(int)
+        """The region is from `lower` to `upper` (3,) m, world frame. `known` boxes and `connector` do not count."""
+        size = parameters.voxel_size
+        counts = np.ceil((upper - lower) / size - 1e-9).astype(int)
         grid = np.moveaxis(np.indices(tuple(counts)), 0, -1).reshape(-1, 3)
-        centers = lower + (grid + 0.5) * h
-        self.h = h
-        self._known = known
-        self._centers = np.ascontiguousarray(centers[~near_boxes(centers, known)])
+        centers = lower + (grid + 0.5) * size
+        self.voxel_size = size
+        self._known, self._parameters = known, parameters
+        self._centers = np.ascontiguousarray(centers[~near_boxes(centers, known, parameters.known_margin)])
         self._state = np.zeros(len(self._centers), np.uint8)
-        self._range = np.full(len(self._centers), np.inf, np.float32)  # of the look that decided the state
+        self._range = np.full(len(self._centers), np.inf, np.float32)  # m, of the look that decided the state
         self._color = SegmentationParameters.for_color(connector.color)
         self._thickness = 2 * connector.radius
 
@@ -65,77 +77,89 @@ class Occupancy:
         frame: RgbdFrame,
         world_from_camera: RigidTransform,
         ignore: Sequence[Spheres] = (),
-        assumed_depth: float = ASSUMED_DEPTH,
+        *,
+        guess_behind: bool = True,
     ) -> None:
-        """Take in a frame. Depth readings within `ROBOT_MARGIN` of the `ignore` spheres, the arms, are no obstacles.
+        """Take in a frame. Depth readings near the `ignore` spheres, which stand for the arms, are no obstacles.
 
-        Each voxel in view is compared with the reading on its pixel: before it the voxel is free, at it a surface, up
-        to `assumed_depth` m behind it assumed full. A look overrules a guess, and any look but from much closer.
+        Each voxel in view is compared with the reading on its pixel: before it the voxel is free, at it a surface.
+        With `guess_behind`, voxels up to the assumed depth behind it count as full until a look shows otherwise. A look
+        overrules a guess, and another look unless that was from much closer.
         """
-        k = subsampled(frame.intrinsics, STEP)
-        depth = cv2.medianBlur(np.where(np.isfinite(frame.depth), frame.depth, 0), 3)[::STEP, ::STEP]
+        step = self._parameters.pixel_step
+        k = subsampled(frame.intrinsics, step)
+        depth = cv2.medianBlur(np.where(np.isfinite(frame.depth), frame.depth, 0), 3)[::step, ::step]
         red = color_mask(frame.rgb, self._color)
-        through = np.where(depth > 0, _nearest_around(depth) - self.h, 0)
+        free_depth = np.where(depth > 0, _min_filter(depth) - self.voxel_size, 0)
         # Where the connector is, no obstacle is: a guess that covers it must not keep the hand away.
-        found = _nearest_around(np.where(red[::STEP, ::STEP] > 0, depth, np.float32(0)))
-        beside = (found < NOTHING) & (depth > found - self._thickness)
-        through = np.where(beside, np.maximum(through, found + self._thickness), through)
-        solid = (depth > 0) & ~_edges(depth) & ~_thin(frame.rgb, depth, k)
-        solid &= cv2.dilate(red, np.ones((5, 5), np.uint8))[::STEP, ::STEP] == 0
-        points = world_from_camera.apply((rays(k) * depth[..., None])[solid])
-        solid[solid] = ~(near_boxes(points, self._known) | _near_spheres(points, ignore))
+        found = _min_filter(np.where(red[::step, ::step] > 0, depth, np.float32(0)))
+        beside = (found < NO_READING) & (depth > found - self._thickness)
+        free_depth = np.where(beside, np.maximum(free_depth, found + self._thickness), free_depth)
+        solid = (depth > 0) & ~self._edges(depth) & ~self._cable(frame.rgb, depth, k)
+        solid &= cv2.dilate(red, np.ones((5, 5), np.uint8))[::step, ::step] == 0
+        points = world_from_camera.apply((pixel_rays(k) * depth[..., None])[solid])
+        known = near_boxes(points, self._known, self._parameters.known_margin)
+        solid[solid] = ~(known | _near_spheres(points, ignore, self._parameters.robot_margin))
         local = world_from_camera.inv().apply(self._centers)
         pixels = np.nan_to_num(np.rint(project(local, k)), nan=-1.0)
         seen = np.flatnonzero(np.all((pixels >= 0) & (pixels < [k.width, k.height]), axis=1))
         u, v = pixels[seen].astype(int).T
-        self._update(assumed_depth, seen, local[seen, 2], depth[v, u], through[v, u], solid[v, u])
+        assumed_depth = self._parameters.assumed_depth if guess_behind else 0.0
+        self._update(seen, local[seen, 2], depth[v, u], free_depth[v, u], solid[v, u], assumed_depth)
 
     def _update(
-        self, assumed_depth: float, seen: NDArray[np.intp], z: FloatArray, reading: Depth, through: Depth, solid: Mask
+        self,
+        seen: NDArray[np.intp],
+        z: FloatArray,
+        reading: DepthImage,
+        free_depth: DepthImage,
+        solid: Mask,
+        assumed_depth: float,
     ) -> None:
-        """Voxels `seen` (n,) at depth `z` against their pixels: the `reading`, and how far one looks `through`."""
-        free = z < through
-        surface = solid & (np.abs(z - reading) <= self.h)
-        behind = solid & (z > reading + self.h) & (z <= reading + assumed_depth)
+        """Compare voxels `seen` (n,) at depth `z` (m) with their pixels: the `reading`, and the end of free space."""
+        free = z < free_depth
+        surface = solid & (np.abs(z - reading) <= self.voxel_size)
+        behind = solid & (z > reading + self.voxel_size) & (z <= reading + assumed_depth)
         state = self._state[seen]
-        open_to_look = (state == Voxel.UNSEEN) | (state == Voxel.BEHIND) | (z <= CLOSER * self._range[seen])
-        for looked, value in ((free, Voxel.FREE), (surface, Voxel.SURFACE)):
-            chosen = seen[looked & open_to_look]
+        near_enough = z <= self._parameters.overrule_range * self._range[seen]
+        may_change = (state == Voxel.UNSEEN) | (state == Voxel.BEHIND) | near_enough
+        for shown, value in ((free, Voxel.FREE), (surface, Voxel.SURFACE)):
+            chosen = seen[shown & may_change]
             self._state[chosen] = value
-            self._range[chosen] = z[looked & open_to_look]
+            self._range[chosen] = z[shown & may_change]
         self._state[seen[behind & (state == Voxel.UNSEEN)]] = Voxel.BEHIND
 
+    def _cable(self, rgb: ColorImage, depth: DepthImage, k: Intrinsics) -> Mask:
+        """Dark pixels near to lighter ones, as the cable's are; a dark obstacle loses only its rim by this."""
+        step, dark_limit = self._parameters.pixel_step, self._parameters.max_cable_brightness
+        dark = np.ascontiguousarray(rgb[::step, ::step]).max(axis=2) < dark_limit
+        inside = cv2.distanceTransform(dark.astype(np.uint8), cv2.DIST_L2, 3) - 0.5
+        return np.asarray(dark & (inside * depth / k.fx < self._parameters.cable_width))
 
-def near_boxes(points: FloatArray, boxes: Sequence[Box]) -> Mask:
-    """Whether each of `points` (n, 3) m is inside one of `boxes` or within `KNOWN_MARGIN` of it."""
+    def _edges(self, depth: DepthImage) -> Mask:
+        """Pixels at a depth edge, by their 3x3 neighbourhood: thin things, and readings that fly between surfaces."""
+        farthest = cv2.dilate(depth, np.ones((3, 3), np.uint8))
+        return np.asarray(farthest - _min_filter(depth) > self._parameters.max_depth_step)
+
+
+def near_boxes(points: FloatArray, boxes: Sequence[Box], margin: float) -> Mask:
+    """Whether each of `points` (n, 3) m is inside one of `boxes` or within `margin` m of it; (n,)."""
     near = np.zeros(len(points), np.bool_)
     for box in boxes:
         beyond = np.maximum(np.abs(points - box.center) - 0.5 * np.asarray(box.size), 0.0)
-        near |= np.einsum("ij,ij->i", beyond, beyond) <= KNOWN_MARGIN**2
+        near |= np.einsum("ij,ij->i", beyond, beyond) <= margin**2
     return near
 
 
-def _near_spheres(points: FloatArray, groups: Sequence[Spheres]) -> Mask:
+def _near_spheres(points: FloatArray, groups: Sequence[Spheres], margin: float) -> Mask:
     near = np.zeros(len(points), np.bool_)
     for centers, radii in groups:
         squared = (points**2).sum(axis=1)[:, None] + (centers**2).sum(axis=1) - 2 * points @ centers.T
-        near |= np.any(squared <= (radii + ROBOT_MARGIN) ** 2, axis=1)
+        near |= np.any(squared <= (radii + margin) ** 2, axis=1)
     return near
 
 
-def _thin(rgb: NDArray[np.uint8], depth: Depth, k: Intrinsics) -> Mask:
-    """Dark pixels near to lighter ones, as the cable's are; of a dark obstacle this costs the rim alone."""
-    dark = np.ascontiguousarray(rgb[::STEP, ::STEP]).max(axis=2) < DARK
-    inside = cv2.distanceTransform(dark.astype(np.uint8), cv2.DIST_L2, 3) - 0.5
-    return np.asarray(dark & (inside * depth / k.fx < THIN))
-
-
-def _edges(depth: Depth) -> Mask:
-    """Pixels whose 3x3 readings lie further apart than `EDGE`: thin things, flying readings."""
-    farthest = cv2.dilate(depth, np.ones((3, 3), np.uint8))
-    return np.asarray(farthest - _nearest_around(depth) > EDGE)
-
-
-def _nearest_around(depth: Depth) -> Depth:
-    """The nearest reading in each pixel's 3x3 neighbourhood; `NOTHING` where there is none."""
-    return np.asarray(cv2.erode(np.where(depth > 0, depth, np.float32(NOTHING)), np.ones((3, 3), np.uint8)), np.float32)
+def _min_filter(depth: DepthImage) -> DepthImage:
+    """The nearest reading in each pixel's 3x3 neighbourhood; `NO_READING` where there is none."""
+    readings = np.where(depth > 0, depth, np.float32(NO_READING))
+    return np.asarray(cv2.erode(readings, np.ones((3, 3), np.uint8)), np.float32)

@@ -1,21 +1,21 @@
 """Where the cable runs, from what is known of its two ends."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.cell import KnownCell
+from regrasp.perception.arrays import FloatArray
 
 
-def cable_course(known: KnownCell, world_from_connector: RigidTransform, spacing: float = 0.01) -> NDArray[np.float64]:
-    """Points (n, 3) m about `spacing` apart along the cable of a connector at rest, from the plugged end on.
+def cable_course(known: KnownCell, world_from_connector: RigidTransform, spacing: float = 0.01) -> FloatArray:
+    """Points (n, 3) m, world, about `spacing` m apart along the cable of a connector at rest, from the plugged end on.
 
-    A cubic between the two ends with their directions: the shape of a lightly bent rod (small deflections).
+    A cubic Hermite curve between the two ends with their directions: the shape of a rod under small deflections.
     """
-    start, course = known.cable_anchor
+    start, start_direction = known.cable_anchor
     end = world_from_connector.apply([-0.5 * known.connector.length, 0.0, 0.0])
     direction = world_from_connector.rotation.apply([1.0, 0.0, 0.0])
     chord = float(np.linalg.norm(end - start))
-    curve = CubicHermiteSpline([0.0, chord], np.stack([start, end]), np.stack([course, direction]))
+    curve = CubicHermiteSpline([0.0, chord], np.stack([start, end]), np.stack([start_direction, direction]))
     return np.asarray(curve(np.linspace(0.0, chord, max(2, round(chord / spacing)))))

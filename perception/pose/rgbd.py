@@ -1,30 +1,37 @@
 """The thesis's RGB-D technique: the connector's pose from its colour and depth (Hwang 2024, section 3.2.3)."""
 
+from dataclasses import dataclass
+
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.cell import KnownCell
 from regrasp.interfaces.frame import RgbdFrame
+from regrasp.perception.arrays import FloatArray
 from regrasp.perception.camera.model import deproject
-from regrasp.perception.pose.estimate import LEFT, Estimate, NoEstimate, pose_covariance
+from regrasp.perception.pose.estimate import DEFAULT_AXIS, Estimate, NoEstimate, pose_covariance
 from regrasp.perception.pose.segmentation import NoSegment, NotSeen, SegmentationParameters, segment
 
-FloatArray = NDArray[np.float64]
 
-MIN_POINTS = 20  # choice: n-mean and min/max need distinct points
-MIDDLE_SHARE = 0.2  # choice: n for the position is a fifth of the points: averages noise and stays in the middle
-END_SHARE = 0.05  # choice: n for each end is a twentieth: 70 points at 0.75 m; more would shorten the vector
-# Of position and axis, root mean square over the thesis's nine configurations: the chain cannot tell a hidden part.
-POSITION_DEVIATION, ANGLE_DEVIATION = 0.012, 0.3  # m each axis, rad
-DEVIATIONS = 2.0  # choice: an even spread ends at 1.73 standard deviations, so 2 cuts outliers and no ends
+@dataclass(frozen=True)
+class RgbdParameters:
+    """How many points the means take, and how far off the result is."""
+
+    min_points: int = 20  # choice: n-mean and min/max need distinct points
+    outlier_deviations: float = 2.0  # choice: an even spread ends at 1.73 deviations: 2 cuts outliers, and no ends
+    middle_share: float = 0.2  # of the points, for the position; choice: averages noise and stays in the middle
+    end_share: float = 0.05  # of the points, for each end; choice: 70 at 0.75 m; more would shorten the vector
+    # Root mean square errors over the thesis's nine configurations: the technique cannot tell a hidden part.
+    position_deviation: float = 0.012  # m, each axis
+    axis_deviation: float = 0.3  # rad
 
 
 class Rgbd:
-    """A `Technique`. It knows the connector's colour; its largest patch is the connector."""
+    """A `Technique`. It knows the connector's colour; the largest blob of it is the connector."""
 
-    def __init__(self, known: KnownCell) -> None:
-        self._parameters = SegmentationParameters.for_color(known.connector.color)
+    def __init__(self, known: KnownCell, parameters: RgbdParameters = RgbdParameters()) -> None:
+        self._parameters = parameters
+        self._color = SegmentationParameters.for_color(known.connector.color)
         self._length = known.connector.length
 
     def estimate(
@@ -36,28 +43,31 @@ class Rgbd:
         near: FloatArray | None = None,
     ) -> Estimate | NoEstimate:
         """See `Technique.estimate`. The position is the visible part's, the roll the camera's, as in the thesis."""
-        found = segment(frame.rgb, self._parameters)
+        found = segment(frame.rgb, self._color)
         if isinstance(found, NoSegment):
             return NoEstimate(frame.stamp, frame.camera, found.reason, found.message)
         cloud = deproject(frame.depth, found.mask, frame.intrinsics, found.corner)
-        points = without_outliers(cloud) if len(cloud) >= MIN_POINTS else cloud
-        if len(points) < MIN_POINTS:
-            message = f"{len(points)} depth readings on {found.area} pixels of the connector, {MIN_POINTS} are needed"
+        least = self._parameters.min_points
+        points = without_outliers(cloud, self._parameters.outlier_deviations) if len(cloud) >= least else cloud
+        if len(points) < least:
+            message = f"{len(points)} depth readings on {found.area} pixels of the connector, {least} are needed"
             return NoEstimate(frame.stamp, frame.camera, NotSeen.NO_DEPTH, message)
-        here = min_max_axis(points)
-        along = np.sort(points @ here)
+        direction = min_max_axis(points, self._parameters.end_share)
+        along = np.sort(points @ direction)
         extent = float(along[int(0.99 * len(along))] - along[int(0.01 * len(along))])
-        pose = seen_pose(n_mean(points), here, world_from_camera, LEFT if axis is None else axis)
-        position, way = pose.translation, pose.as_matrix()[:3, 0]
-        too_long = extent - self._length  # what shows more than the connector is that much in doubt
-        spread = pose_covariance(way, max(POSITION_DEVIATION, too_long), ANGLE_DEVIATION)
+        center = n_mean(points, self._parameters.middle_share)
+        pose = seen_pose(center, direction, world_from_camera, DEFAULT_AXIS if axis is None else axis)
+        position, world_axis = pose.translation, pose.as_matrix()[:3, 0]
+        too_long = extent - self._length  # a part that is longer than the connector makes the position so uncertain
+        deviation = max(self._parameters.position_deviation, too_long)
+        covariance = pose_covariance(world_axis, deviation, self._parameters.axis_deviation)
         return Estimate(
             frame.stamp,
             frame.camera,
             position,
-            way,
+            world_axis,
             pose,
-            spread,
+            covariance,
             len(points),
             found.area,
             extent,
@@ -65,26 +75,26 @@ class Rgbd:
         )
 
 
-def without_outliers(points: FloatArray) -> FloatArray:
-    """Those of `points` (n, 3) that lie within `DEVIATIONS` standard deviations of the mean along every axis."""
+def without_outliers(points: FloatArray, deviations: float) -> FloatArray:
+    """Those of `points` (n, 3) that lie within so many standard deviations of the mean along every axis."""
     square = (points - points.mean(axis=0)) ** 2
-    u, v, w = (square <= DEVIATIONS**2 * square.mean(axis=0) + 1e-18).T
+    u, v, w = (square <= deviations**2 * square.mean(axis=0) + 1e-18).T
     return np.asarray(points[u & v & w])
 
 
-def n_mean(points: FloatArray) -> FloatArray:
-    """Per axis, the mean of the n middle values of `points` (m, 3); (3,). n is `MIDDLE_SHARE` of m."""
-    n = max(1, round(MIDDLE_SHARE * len(points)))
+def n_mean(points: FloatArray, share: float) -> FloatArray:
+    """Per axis, the mean of the n middle values of `points` (m, 3); (3,). n is this share of m."""
+    n = max(1, round(share * len(points)))
     start = (len(points) - n) // 2
     return np.asarray(np.partition(points, (start, start + n - 1), axis=0)[start : start + n].mean(axis=0))
 
 
-def min_max_axis(points: FloatArray) -> FloatArray:
+def min_max_axis(points: FloatArray, share: float) -> FloatArray:
     """Unit vector (3,) from the mean of the n lowest to that of the n highest of `points` (m, 3), optical frame.
 
-    Lowest and highest along image x or y, whichever lie further apart; n is `END_SHARE` of m.
+    Lowest and highest along image x or y, whichever gives the longer distance; n is this share of m.
     """
-    n = max(1, round(END_SHARE * len(points)))
+    n = max(1, round(share * len(points)))
     spreads, vectors = [], []
     for k in (0, 1):
         order = np.argpartition(points[:, k], (n, len(points) - n))
@@ -97,10 +107,11 @@ def min_max_axis(points: FloatArray) -> FloatArray:
 def seen_pose(
     center: FloatArray, axis: FloatArray, world_from_camera: RigidTransform, hint: FloatArray
 ) -> RigidTransform:
-    """world_from_connector of a `center` (3,) and a unit `axis` (3,) in the optical frame.
+    """world_from_connector of a `center` (3,) m and a unit `axis` (3,) in the optical frame.
 
-    The axis points where `hint` (3,), world, does; z is as near as can be to the camera's up (forward if up aligns).
-    Plain arithmetic: scipy's transforms would take a third of the technique's time.
+    The axis points to the side of `hint` (3,), world; z is as near as can be to the camera's up direction, or to its
+    forward direction where the axis is nearly parallel to up. In plain arithmetic: scipy's transforms would take a
+    third of the technique's time.
     """
     camera = world_from_camera.as_matrix()
     out = np.eye(4)
@@ -112,4 +123,4 @@ def seen_pose(
     z = z - (z @ x) * x
     z /= np.sqrt(z @ z)
     out[:3, 0], out[:3, 1], out[:3, 2] = x, np.cross(z, x), z
-    return RigidTransform(out, normalize=False)  # it is a rotation: to make it one would take as long again
+    return RigidTransform(out, normalize=False)  # it is a rotation: to normalise it would take as long again

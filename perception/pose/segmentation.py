@@ -8,16 +8,18 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-HUE_STEPS, BLUE = 180, 120  # OpenCV's 8-bit hue counts half degrees
+from regrasp.perception.arrays import ColorImage, Mask
+
+HUE_STEPS, BLUE_HUE = 180, 120  # OpenCV's 8-bit hue counts half degrees
 
 
 class NotSeen(StrEnum):
     """Why an image gave no connector."""
 
     NO_COLOR = "no_color"  # no pixel of its colour
-    TOO_SMALL = "too_small"  # its largest patch has too few pixels
+    TOO_SMALL = "too_small"  # too few pixels of it are in sight
     NO_CAMERA = "no_camera"  # the camera is not to be trusted
-    NO_DEPTH = "no_depth"  # the patch has too few depth readings
+    NO_DEPTH = "no_depth"  # its pixels have too few depth readings
     NOT_ITS_SHAPE = "not_its_shape"  # its colour, but not a cylinder of its size
     NO_TAG = "no_tag"  # its tag is not in sight
     WRONG_SIZE = "wrong_size"  # its tag's size in the image and the depth there disagree
@@ -26,51 +28,51 @@ class NotSeen(StrEnum):
 
 @dataclass(frozen=True)
 class SegmentationParameters:
-    """What counts as the connector's colour, in OpenCV's 8-bit HSV, and how its patch is cleaned.
+    """What counts as the connector's colour, in OpenCV's 8-bit HSV, and how its blob is cleaned.
 
-    Light scales value and leaves hue and saturation alone, so value has a low floor and no ceiling: `for_color` derives
-    the figures. `dilate` and `erode` count 3x3 passes: one closes gaps of two pixels, and as many erosions undo it.
+    The amount of light scales value and leaves hue and saturation alone, so value has a low floor and no ceiling. See
+    `for_color`.
     """
 
-    hue: float
-    hue_tolerance: float
-    min_saturation: int
-    min_value: int
-    dilate: int = 1
-    erode: int = 1
+    hue: float  # 0 to 180
+    hue_tolerance: float  # to either side
+    min_saturation: int  # of 255
+    min_value: int  # of 255
+    dilate: int = 1  # passes with a 3x3 kernel; one closes gaps of two pixels
+    erode: int = 1  # passes; as many as dilations undo their growth
     min_area: int = 30  # pixels; choice: 2 % of the connector at 0.75 m, and more than noise gathers
 
     @classmethod
-    def for_color(cls, color: tuple[float, float, float]) -> "SegmentationParameters":
+    def for_color(cls, color: tuple[float, float, float], hue_tolerance: float = 8.0) -> "SegmentationParameters":
         """Parameters for an RGB colour, each 0 to 1.
 
-        Choices: hue +-8 (knowledge: red is h <= 8 or >= 172 of 180); at least half of the colour's saturation, for
-        haze and glare; a fifth of its value, since full shadow leaves 0.45 of the light, 20 % less leaves 0.36, and a
-        face turned away from an inexact light a little less.
+        Choices: hue +-8, since red is h <= 8 or >= 172 of 180; at least half of the colour's saturation, for haze and
+        glare; a fifth of its value, since full shadow leaves 0.45 of the light, 20 % less light leaves 0.36 of it, and
+        a face turned away from the light a little less.
         """
         hue, saturation, value = colorsys.rgb_to_hsv(*color)
-        return cls(hue * HUE_STEPS, 8.0, round(255 * saturation / 2), round(255 * value / 5))
+        return cls(hue * HUE_STEPS, hue_tolerance, round(255 * saturation / 2), round(255 * value / 5))
 
     def range(self) -> tuple[int, NDArray[np.uint8], NDArray[np.uint8]]:
-        """OpenCV's code for the change of an RGB image to HSV, and the lower and upper corner (3,) in it.
+        """OpenCV's code that converts an RGB image to HSV, and the lower and upper limit (3,) of the colour there.
 
-        Where the range of hues would pass through 0, as red's does, the code is the one that takes red for blue: there
-        hue h is 120 - h, and the range is whole.
+        Where the range of hues would pass through 0, as red's does, the code exchanges red and blue: this turns hue h
+        into 120 - h, and the range is in one piece.
         """
         code, low, high = cv2.COLOR_RGB2HSV, round(self.hue - self.hue_tolerance), round(self.hue + self.hue_tolerance)
         if low < 0 or high >= HUE_STEPS:
-            code, low, high = cv2.COLOR_BGR2HSV, (BLUE - high) % HUE_STEPS, (BLUE - low) % HUE_STEPS
+            code, low, high = cv2.COLOR_BGR2HSV, (BLUE_HUE - high) % HUE_STEPS, (BLUE_HUE - low) % HUE_STEPS
         floor = (self.min_saturation, self.min_value)
         return code, np.array([low, *floor], np.uint8), np.array([high, 255, 255], np.uint8)
 
 
 @dataclass(frozen=True, eq=False)
 class Segment:
-    """The connector's pixels: their number, the first pixel (u, v) of the box that holds them, a `mask` of the box."""
+    """The connector's pixels."""
 
-    area: int
-    corner: tuple[int, int]
-    mask: NDArray[np.bool_]
+    area: int  # number of pixels
+    corner: tuple[int, int]  # first pixel (u, v) of the box around them
+    mask: Mask  # (h, w), of the box
 
 
 @dataclass(frozen=True)
@@ -81,14 +83,14 @@ class NoSegment:
     message: str
 
 
-def color_mask(rgb: NDArray[np.uint8], parameters: SegmentationParameters) -> NDArray[np.uint8]:
+def color_mask(rgb: ColorImage, parameters: SegmentationParameters) -> NDArray[np.uint8]:
     """255 where the colour is the connector's, else 0; (H, W)."""
     code, low, high = parameters.range()
     return np.asarray(cv2.inRange(cv2.cvtColor(rgb, code), low, high), np.uint8)
 
 
-def segment(rgb: NDArray[np.uint8], parameters: SegmentationParameters) -> Segment | NoSegment:
-    """The largest patch of the connector's colour in `rgb` (H, W, 3): mask, dilate, largest contour by area, erode."""
+def segment(rgb: ColorImage, parameters: SegmentationParameters) -> Segment | NoSegment:
+    """The largest blob of the connector's colour in `rgb` (H, W, 3): mask, dilate, largest contour by area, erode."""
     binary = color_mask(rgb, parameters)
     kernel = np.ones((3, 3), np.uint8)
     dilated = cv2.dilate(binary, kernel, iterations=parameters.dilate)
@@ -97,13 +99,13 @@ def segment(rgb: NDArray[np.uint8], parameters: SegmentationParameters) -> Segme
         return NoSegment(NotSeen.NO_COLOR, "no pixel has the connector's colour")
     largest = max(contours, key=cv2.contourArea)
     u, v, width, height = cv2.boundingRect(largest)
-    # The contour fills holes; what was no colour before the dilation and after it stays out.
-    patch = np.zeros((height, width), np.uint8)
-    cv2.drawContours(patch, [largest], -1, 255, cv2.FILLED, offset=(-u, -v))
-    cv2.bitwise_and(patch, dilated[v : v + height, u : u + width], dst=patch)
-    patch = cv2.erode(patch, kernel, iterations=parameters.erode, borderType=cv2.BORDER_CONSTANT, borderValue=0)
-    area = cv2.countNonZero(patch)
+    # The contour fills holes; the dilated mask takes them out again.
+    blob = np.zeros((height, width), np.uint8)
+    cv2.drawContours(blob, [largest], -1, 255, cv2.FILLED, offset=(-u, -v))
+    cv2.bitwise_and(blob, dilated[v : v + height, u : u + width], dst=blob)
+    blob = cv2.erode(blob, kernel, iterations=parameters.erode, borderType=cv2.BORDER_CONSTANT, borderValue=0)
+    area = cv2.countNonZero(blob)
     if area < parameters.min_area:
-        message = f"the largest patch of the connector's colour has {area} pixels, {parameters.min_area} are needed"
+        message = f"the largest blob of the connector's colour has {area} pixels, {parameters.min_area} are needed"
         return NoSegment(NotSeen.TOO_SMALL, message)
-    return Segment(area, (u, v), patch > 0)
+    return Segment(area, (u, v), blob > 0)

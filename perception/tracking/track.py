@@ -5,16 +5,19 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
+from regrasp.perception.arrays import FloatArray
 from regrasp.perception.pose.estimate import Estimate, NoEstimate
 
-FloatArray = NDArray[np.float64]
 
-FRESH_LIMIT = 0.5  # s; choice: seven frames at 15 Hz, so that a few lost ones do not start a search
-LIVE_INTERVAL = 1.0  # s; choice: the thesis shows two poses one second apart
-LIVE_CHANGE = 1e-6  # m; choice: a mean of quantised noisy depth never repeats to the micrometre, a frozen image does
-HIDING_RADIUS = 0.10  # m; choice: a hand can hide what was last seen within a connector's length of its centre
+@dataclass(frozen=True)
+class TrackParameters:
+    """Limits of the checks, and how far a hand hides things."""
+
+    max_age: float = 0.5  # s; choice: seven frames at 15 Hz, so that a few lost ones do not start a search
+    live_interval: float = 1.0  # s; choice: the thesis shows two poses one second apart
+    min_change: float = 1e-6  # m; choice: a mean of noisy depth never repeats to the micrometre, a frozen image does
+    hiding_radius: float = 0.10  # m; choice: a hand hides what was last seen within a connector's length of its centre
 
 
 class TrackState(StrEnum):
@@ -42,15 +45,12 @@ class TrackHealth:
 
 
 class ConnectorTrack:
-    """The connector's estimates of all cameras, newest last, and whether a hand holds it."""
+    """The connector's estimates by all cameras, newest last, and whether a hand holds it."""
 
-    def __init__(
-        self, fresh_limit: float = FRESH_LIMIT, live_interval: float = LIVE_INTERVAL, live_change: float = LIVE_CHANGE
-    ) -> None:
-        """Limits in seconds, seconds and metres."""
-        self._fresh_limit, self._live_interval, self._live_change = fresh_limit, live_interval, live_change
+    def __init__(self, parameters: TrackParameters = TrackParameters()) -> None:
+        self._parameters = parameters
         self._estimates: deque[Estimate] = deque()
-        self._last_miss: NoEstimate | None = None
+        self._last_failure: NoEstimate | None = None
         self._tool: FloatArray | None = None
         self._hand_near = False
 
@@ -60,39 +60,43 @@ class ConnectorTrack:
         return self._estimates[-1] if self._estimates else None
 
     def feed(self, result: Estimate | NoEstimate) -> None:
-        """Take in what a frame gave. One that is not newer than the same camera's last is ignored: a frozen image."""
+        """Take in what a frame gave.
+
+        An estimate that is not newer than the same camera's last is ignored, since its image is frozen.
+        """
         if isinstance(result, NoEstimate):
-            self._last_miss = result
+            self._last_failure = result
             return
         if any(e.camera == result.camera and e.stamp >= result.stamp for e in self._estimates):
             return
         self._estimates.append(result)
-        while self._estimates[0].stamp < result.stamp - 2 * self._live_interval:
+        while self._estimates[0].stamp < result.stamp - 2 * self._parameters.live_interval:
             self._estimates.popleft()
         if self._tool is not None:
-            self._hand_near = bool(np.linalg.norm(result.position - self._tool) <= HIDING_RADIUS)
+            self._hand_near = self._is_near(result, self._tool)
 
-    def held(self, tool: FloatArray | None) -> None:
+    def set_holding_tool(self, tool: FloatArray | None) -> None:
         """Say where the holding gripper's centre (3,) m is, or None when the finger gap says that nothing is held."""
         if tool is not None and self._tool is None:  # a new grasp: it took what was last seen there
             last = self.last
-            self._hand_near = last is not None and bool(np.linalg.norm(last.position - tool) <= HIDING_RADIUS)
+            self._hand_near = last is not None and self._is_near(last, tool)
         self._tool = tool
 
     def check(self, now: float) -> TrackHealth:
-        """The three checks at second `now`."""
+        """The three checks at time `now` (s)."""
         if self.last is None:
-            why = f": {self._last_miss.message}" if self._last_miss else ""
+            why = f": {self._last_failure.message}" if self._last_failure else ""
             return TrackHealth(False, False, False, f"the connector was never seen{why}")
+        limits = self._parameters
         age = now - self.last.stamp
         change = self._change(now)
-        fresh, live = age <= self._fresh_limit, change >= self._live_change
-        seen = f"seen {age:.2f} s ago by the {self.last.camera} camera, limit {self._fresh_limit:.2f} s"
-        moved = f"changed {1e3 * change:.3f} mm within {self._live_interval:.1f} s"
+        fresh, live = age <= limits.max_age, change >= limits.min_change
+        seen = f"seen {age:.2f} s ago by the {self.last.camera} camera, limit {limits.max_age:.2f} s"
+        moved = f"changed {1e3 * change:.3f} mm within {limits.live_interval:.1f} s"
         return TrackHealth(True, fresh, live, f"connector {seen}; {moved}")
 
     def state(self, now: float) -> tuple[TrackState, str]:
-        """What is known at second `now`, and a sentence. What the hand hides is not lost."""
+        """What is known at time `now` (s), and a sentence. What the hand hides is not lost."""
         health = self.check(now)
         if health.ok:
             return TrackState.VISIBLE, health.reason
@@ -103,26 +107,22 @@ class ConnectorTrack:
         return TrackState.LOST, health.reason
 
     def position(self, now: float) -> FloatArray | None:
-        """Best guess (3,) m of where the connector is: as last seen, or in the hand that hides it."""
+        """Best guess (3,) m of where the connector is: as last seen, or in the hand that hides it; None if never seen.
+
+        World frame, like the estimates.
+        """
         if self.state(now)[0] is TrackState.HIDDEN_BY_HAND:
             return self._tool
         return None if self.last is None else self.last.position
 
-    def drift(self, now: float) -> FloatArray:
-        """Velocity (3,) m/s over the live interval before `now`, by least squares; 0 from fewer than three."""
-        recent = self._recent(now)
-        if len(recent) < 3:
-            return np.zeros(3)
-        t = np.array([e.stamp for e in recent])
-        t -= t.mean()
-        return np.asarray(t @ np.array([e.position for e in recent]) / (t @ t))
-
-    def _recent(self, now: float) -> list[Estimate]:
-        """The newest estimate's camera's within the interval; another camera's bias would look like motion."""
-        camera = self.last.camera if self.last else ""
-        return [e for e in self._estimates if e.camera == camera and e.stamp >= now - self._live_interval]
+    def _is_near(self, estimate: Estimate, tool: FloatArray) -> bool:
+        return bool(np.linalg.norm(estimate.position - tool) <= self._parameters.hiding_radius)
 
     def _change(self, now: float) -> float:
-        """Metres between the corners of the box that holds the recent positions; 0 from fewer than two."""
-        recent = self._recent(now)
-        return float(np.linalg.norm(np.ptp([e.position for e in recent], axis=0))) if len(recent) > 1 else 0.0
+        """Diagonal (m) of the box that holds the recent positions; 0 from fewer than two.
+
+        Only those of the newest estimate's camera count: another camera's bias would look like motion.
+        """
+        camera, begin = self.last.camera if self.last else "", now - self._parameters.live_interval
+        recent = [e.position for e in self._estimates if e.camera == camera and e.stamp >= begin]
+        return float(np.linalg.norm(np.ptp(recent, axis=0))) if len(recent) > 1 else 0.0

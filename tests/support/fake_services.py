@@ -145,7 +145,7 @@ class FakePerception:
         self.hint: Vector | None = None
         self.looks: list[float] = []
         self.troubles: dict[str, str] = {}
-        self.occupancy = SimpleNamespace(occupied_points=lambda: np.empty((0, 3)), h=0.01)
+        self.occupancy = SimpleNamespace(occupied_points=lambda: np.empty((0, 3)), voxel_size=0.01)
 
     def use(self, technique: str) -> None:
         """One technique is like the other."""

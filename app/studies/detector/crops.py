@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regrasp.app.studies.detector.data import Pictures
-from regrasp.perception.pose.detector import HEIGHT, STRIDE, WIDTH
+from regrasp.perception.pose.detector import NETWORK_HEIGHT, NETWORK_WIDTH, STRIDE
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,7 @@ def _crop_middle(
     pictures: Pictures, i: int, rng: np.random.Generator, parameters: AugmentationParameters
 ) -> NDArray[np.float64]:
     """The pixel (u, v) of picture `i` to crop around: on the connector, on a look-alike, or anywhere."""
-    middle, draw = rng.uniform([0, 0], [WIDTH, HEIGHT]), float(rng.random())
+    middle, draw = rng.uniform([0, 0], [NETWORK_WIDTH, NETWORK_HEIGHT]), float(rng.random())
     look_alike = pictures.look_alikes[i, rng.integers(pictures.look_alikes.shape[1])]
     if draw < parameters.connector_share and pictures.masks[i].any():
         u, v, width, height = cv2.boundingRect(pictures.masks[i])
@@ -156,7 +156,7 @@ def _cut_out(
     """Cover some rectangles with plain colours, in place; their depth becomes nearer or has no reading."""
     if rng.random() < 1 - parameters.cutout_share:
         return
-    height, width = HEIGHT // parameters.cutout_fraction, WIDTH // parameters.cutout_fraction
+    height, width = NETWORK_HEIGHT // parameters.cutout_fraction, NETWORK_WIDTH // parameters.cutout_fraction
     for _ in range(parameters.cutouts):
         u, v = rng.integers(0, image.shape[0], 2)
         cutout = slice(v, v + height), slice(u, u + width)

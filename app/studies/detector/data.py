@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from regrasp.interfaces.cell import Cell
 from regrasp.perception.camera.model import project
-from regrasp.perception.pose.detector import HEIGHT, WIDTH, fitted, pixel_sizes
+from regrasp.perception.pose.detector import NETWORK_HEIGHT, NETWORK_WIDTH, letterboxed, pixel_sizes
 from regrasp.perception.pose.segmentation import SegmentationParameters, color_mask
 from regrasp.sim.cameras.depth_noise import DepthNoise
 from regrasp.sim.random_scenes.scene import RandomScene, Shot
@@ -56,9 +56,9 @@ def make_pictures(
 ) -> Pictures:
     """`count` pictures of scenes drawn from `seed`; `report_progress` is called with the number drawn so far."""
     out = Pictures(
-        np.zeros((count, HEIGHT, WIDTH, 3), np.uint8),
-        np.zeros((count, HEIGHT // 2, WIDTH // 2), np.uint16),
-        np.zeros((count, HEIGHT, WIDTH), np.uint8),
+        np.zeros((count, NETWORK_HEIGHT, NETWORK_WIDTH, 3), np.uint8),
+        np.zeros((count, NETWORK_HEIGHT // 2, NETWORK_WIDTH // 2), np.uint16),
+        np.zeros((count, NETWORK_HEIGHT, NETWORK_WIDTH), np.uint8),
         np.zeros((count, 2), np.float32),
         np.full((count, parameters.look_alike_pixels, 2), -1, np.int16),
     )
@@ -69,10 +69,10 @@ def make_pictures(
         noise = {spec.name: DepthNoise(spec, cell.hidden.errors, seed + first) for spec in cell.known.cameras}
         for i in range(first, min(first + parameters.shots_per_scene, count)):
             shot = scene.shot(present=(i + 1) % parameters.absent_every != 0)
-            out.images[i], _ = fitted(shot.rgb)
+            out.images[i], _ = letterboxed(shot.rgb)
             depth = noise[shot.camera.name].apply(shot.depth, i)
             out.sizes[i] = np.clip(1e6 * pixel_sizes(depth, shot.camera.intrinsics), 0, 65535).round()
-            out.masks[i] = fitted(shot.mask * np.uint8(255))[0]
+            out.masks[i] = letterboxed(shot.mask * np.uint8(255))[0]
             out.axes[i] = axis_in_image(shot)
             out.look_alikes[i] = _look_alike_pixels(
                 out.images[i], out.masks[i], color, parameters.look_alike_pixels, rng

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from regrasp.app.studies.detector.data import axis_in_image
 from regrasp.interfaces.cell import Cell
 from regrasp.interfaces.frame import RgbdFrame
-from regrasp.perception.pose.detector import MIN_SCORE, Box, Detection, Detector, overlap
+from regrasp.perception.pose.detector import Detection, Detector, DetectorParameters, PixelBox, intersection_over_union
 from regrasp.perception.pose.estimate import Estimate
 from regrasp.sim.cameras.depth_noise import DepthNoise
 from regrasp.sim.random_scenes.scene import RandomScene, Shot
@@ -43,7 +43,7 @@ class ScoredPicture:
     """The detections in one picture, likeliest first, and the ground truth."""
 
     detections: Sequence[Detection]
-    truth: Box | None = None  # around the connector's visible part; None: it is not in the picture
+    truth: PixelBox | None = None  # around the connector's visible part; None: it is not in the picture
     occlusion: float = 0.0  # share of the connector that is hidden
     angle_error_deg: float | None = None  # of the axis in the image, for the right box; None: no such axis
     position_error: tuple[float, ...] | None = None  # (3,) m, world; None: no pose
@@ -54,19 +54,25 @@ class ScoredPicture:
         """For each detection whether it is the connector; a second box on the connector is wrong."""
         out: list[bool] = []
         for detection in self.detections:
-            fits = self.truth is not None and overlap(detection.box, self.truth) >= self.min_overlap
+            fits = self.truth is not None and intersection_over_union(detection.box, self.truth) >= self.min_overlap
             out.append(fits and not any(out))
         return out
 
     @property
     def detected(self) -> bool:
         """Whether the connector was found with a score that counts."""
-        return any(right and d.score >= MIN_SCORE for d, right in zip(self.detections, self.correct(), strict=True))
+        return any(
+            right and d.score >= DetectorParameters.min_score
+            for d, right in zip(self.detections, self.correct(), strict=True)
+        )
 
     @property
     def false_positives(self) -> int:
         """The number of wrong boxes with a score that counts."""
-        return sum(d.score >= MIN_SCORE and not right for d, right in zip(self.detections, self.correct(), strict=True))
+        return sum(
+            d.score >= DetectorParameters.min_score and not right
+            for d, right in zip(self.detections, self.correct(), strict=True)
+        )
 
 
 def average_precision(pictures: Sequence[ScoredPicture]) -> float:
@@ -149,7 +155,7 @@ def occlusion_class(shot: Shot, min_visible_area: int = ScoreParameters.min_visi
     return next((i for i, (low, high) in enumerate(OCCLUSION) if low <= shot.occlusion < high), None)
 
 
-def true_box(mask: NDArray[np.bool_]) -> Box | None:
+def true_box(mask: NDArray[np.bool_]) -> PixelBox | None:
     """The box (u0, v0, u1, v1) px around a mask (H, W), None if it is empty. Pixel u covers u - 0.5 to u + 0.5."""
     if not mask.any():
         return None
@@ -195,7 +201,7 @@ def detector_figures(pictures: Sequence[ScoredPicture]) -> dict[str, Any]:
         "schema": 1,
         "ap50": average_precision(pictures),
         "ap50_interval": precision_interval(pictures),
-        "min_score": MIN_SCORE,
+        "min_score": DetectorParameters.min_score,
         "recall": [sum(a.detected for a in there), len(there)],
         "recall_by_occlusion": {name: [sum(a.detected for a in group), len(group)] for name, group in classes.items()},
         "false_boxes": sum(a.false_positives for a in pictures),

@@ -19,7 +19,7 @@ from torch import nn
 from regrasp.app.studies.detector.crops import AugmentationParameters, draw_crop, target_maps
 from regrasp.app.studies.detector.data import Pictures
 from regrasp.app.studies.detector.score import ScoredPicture, ScoreParameters, average_precision, true_box
-from regrasp.perception.pose.detector import HEIGHT, INPUT, WIDTH, decode, network_input
+from regrasp.perception.pose.detector import NETWORK_HEIGHT, NETWORK_INPUT, NETWORK_WIDTH, decode, network_input
 
 OPSET = 17  # of ONNX; choice: OpenCV 5 reads it
 
@@ -156,12 +156,18 @@ def loss(maps: torch.Tensor, wanted: torch.Tensor) -> torch.Tensor:
 
 
 def to_onnx(network: Network) -> bytes:
-    """The network as an ONNX file: `INPUT` (1, 13, 120, 216) in, `maps` (1, 7, 30, 54) out."""
-    file, example = io.BytesIO(), (torch.zeros(1, 13, HEIGHT // 2, WIDTH // 2),)
+    """The network as an ONNX file: `NETWORK_INPUT` (1, 13, 120, 216) in, `maps` (1, 7, 30, 54) out."""
+    file, example = io.BytesIO(), (torch.zeros(1, 13, NETWORK_HEIGHT // 2, NETWORK_WIDTH // 2),)
     network.eval()
     with warnings.catch_warnings(action="ignore", category=DeprecationWarning):  # the newer way needs onnxscript, too
         torch.onnx.export(
-            network, example, file, dynamo=False, input_names=[INPUT], output_names=["maps"], opset_version=OPSET
+            network,
+            example,
+            file,
+            dynamo=False,
+            input_names=[NETWORK_INPUT],
+            output_names=["maps"],
+            opset_version=OPSET,
         )
     network.train()
     return file.getvalue()

@@ -1,169 +1,85 @@
-"""Fits a capped cylinder of known size to what a camera saw of it: depth points, and rays along its outline.
+"""The compiled arithmetic of `cylinder_fit`: a capped cylinder's distances, the normal equations and their solution.
 
-Everything is in the camera's optical frame, metres. The body's signed distance is convex, so along a ray it has one
-minimum: 0 for a ray that touches the outline, less for one that hits.
+All of it is in one file: numba's cache does not notice a change of a function that another file compiles in.
+
+Everything is in the camera's optical frame, metres; `half` is half the cylinder's length. The body's signed distance is
+convex, so along a ray it has one minimum: 0 for a ray that touches the silhouette, less for one that hits the body.
 """
-
-from dataclasses import dataclass
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from regrasp.perception.arrays import FloatArray, Mask
 
-STEPS = 20  # Levenberg-Marquardt steps at most
-CONVERGED = 1e-4  # share of the cost that a step must save to be worth another
-COARSE, FINE = 12.0, 2.0  # deviations; choice: what is further off counts less (Cauchy), little while the way is sought
-GRAZING = 0.1  # choice: cosine under which a surface that the ray grazes counts as no flatter
-SURFACE = 0.0005  # m; choice: what depth readings deviate where the surface runs along the ray
-SEARCH_STEPS = 12  # of the golden section: 0.1 m shrinks to 0.3 mm, where the distance is off by micrometres
-_GOLD = 0.6180339887498949
-
-
-@dataclass(frozen=True, eq=False)
-class Sight:
-    """What was seen of the body.
-
-    `points` (n, 3) m lie on it, `deviations` (n,) m along their rays; `rays` (m, 3) unit vectors along its outline or,
-    where `inside` (m,), somewhere in it, `widths` (m,) their deviations in rad. `point_share` and `ray_share`: the
-    share of points and rays that count as independent.
-    """
-
-    points: FloatArray
-    deviations: FloatArray
-    rays: FloatArray
-    widths: FloatArray
-    inside: Mask
-    point_share: float
-    ray_share: float
-
-
-@dataclass(frozen=True, eq=False)
-class Fit:
-    """`center` (3,), unit `axis` (3,), the `cost` (half the sum of squared, faded deviations), `covariance` (5, 5).
-
-    The covariance is that of the centre, then of the turns about `tilts` (2, 3), the unit vectors square to the axis.
-    What the sight leaves open is known to the body's length and to 1 rad.
-    """
-
-    center: FloatArray
-    axis: FloatArray
-    cost: float
-    covariance: FloatArray
-    tilts: FloatArray
-
-
-def fit(
-    sight: Sight, center: FloatArray, axis: FloatArray, radius: float, length: float, fade: float, steps: int = STEPS
-) -> Fit:
-    """The cylinder of `radius` and `length` m that explains the sight, from a start at `center` (3,) and `axis` (3,).
-
-    What is more than `fade` deviations off counts little.
-    """
-    center, axis = np.ascontiguousarray(center, float), np.ascontiguousarray(axis, float)
-    return Fit(
-        *_fit(
-            sight.points,
-            sight.deviations,
-            sight.rays,
-            sight.widths,
-            sight.inside,
-            sight.point_share,
-            sight.ray_share,
-            center,
-            axis,
-            radius,
-            length / 2,
-            fade,
-            steps,
-        )
-    )
-
-
-def thinned(sight: Sight, count: int) -> Sight:
-    """The sight with about `count` points and as many rays, each counting for those left out."""
-    p, r = 1 + len(sight.points) // count, 1 + len(sight.rays) // count
-    return Sight(
-        sight.points[::p],
-        sight.deviations[::p],
-        sight.rays[::r],
-        sight.widths[::r],
-        sight.inside[::r],
-        sight.point_share * p,
-        sight.ray_share * r,
-    )
-
-
-def nearest_on_rays(
-    rays: FloatArray, center: FloatArray, axis: FloatArray, radius: float, length: float
-) -> tuple[FloatArray, FloatArray]:
-    """For unit `rays` (n, 3): the least signed distance (n,) m from the cylinder, and how far out (n,) m that is.
-
-    The distance is below 0 where the ray goes through the body.
-    """
-    return _nearest_on_rays(np.ascontiguousarray(rays, float), center, axis, radius, length / 2)
+GOLDEN_RATIO = 0.6180339887498949
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _nearest_on_rays(
-    rays: FloatArray, center: FloatArray, axis: FloatArray, radius: float, half: float
+def closest_approaches(
+    rays: FloatArray, center: FloatArray, axis: FloatArray, radius: float, half: float, search_steps: int
 ) -> tuple[FloatArray, FloatArray]:
-    misses, far = np.empty(len(rays)), np.empty(len(rays))
+    """See `regrasp.perception.pose.fused.cylinder_fit.closest_approaches`."""
+    distances, ranges = np.empty(len(rays)), np.empty(len(rays))
     for i in range(len(rays)):
-        misses[i], far[i] = _nearest_on_ray(rays[i], center, axis, radius, half)
-    return misses, far
-
-
-def depth_misses(
-    points: FloatArray, deviations: FloatArray, center: FloatArray, axis: FloatArray, radius: float, length: float
-) -> FloatArray:
-    """How many of their `deviations` (n,) m the `points` (n, 3) lie behind the cylinder on their rays; (n,)."""
-    return _depth_misses(points, deviations, center, axis, radius, length / 2)
+        distances[i], ranges[i] = _closest_approach(rays[i], center, axis, radius, half, search_steps)
+    return distances, ranges
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _depth_misses(
-    points: FloatArray, deviations: FloatArray, center: FloatArray, axis: FloatArray, radius: float, half: float
+def depth_residuals(
+    points: FloatArray,
+    deviations: FloatArray,
+    center: FloatArray,
+    axis: FloatArray,
+    radius: float,
+    half: float,
+    min_facing: float,
+    surface_noise: float,
 ) -> FloatArray:
+    """See `regrasp.perception.pose.fused.cylinder_fit.depth_residuals`."""
     out, gradient = np.empty(len(points)), np.empty(3)
     for i in range(len(points)):
-        off, deviation = _point_miss(points[i], deviations[i], center, axis, radius, half, gradient)
-        out[i] = off / deviation
+        residual, deviation = _point_residual(
+            points[i], deviations[i], center, axis, radius, half, min_facing, surface_noise, gradient
+        )
+        out[i] = residual / deviation
     return out
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _point_miss(
+def _point_residual(
     point: FloatArray,
     along_ray: float,
     center: FloatArray,
     axis: FloatArray,
     radius: float,
     half: float,
+    min_facing: float,
+    surface_noise: float,
     gradient: FloatArray,
 ) -> tuple[float, float]:
-    """How far (m) a reading lies behind the body on its ray, and the deviation of that; `gradient` (3,) becomes minus
-    its derivative by the body's place. A ray that misses the body has its reading's distance from it instead.
+    """How far (m) a reading lies behind the body on its ray, and the deviation of that.
+
+    `gradient` (3,) becomes minus its derivative by the body's centre. If the ray misses the body, the residual is the
+    reading's distance from the body.
     """
     out = np.sqrt(point[0] ** 2 + point[1] ** 2 + point[2] ** 2)
     x, y, z = point[0] / out, point[1] / out, point[2] / out
     hit, nx, ny, nz = _first_hit(x, y, z, center, axis, radius, half)
     if hit > 0:
-        facing = min(nx * x + ny * y + nz * z, -GRAZING)
+        facing = min(nx * x + ny * y + nz * z, -min_facing)
         gradient[0], gradient[1], gradient[2] = nx / facing, ny / facing, nz / facing
-        return out - hit, np.sqrt(along_ray * along_ray + (SURFACE / facing) ** 2)
-    off, nx, ny, nz = distance(point[0], point[1], point[2], center, axis, radius, half)
+        return out - hit, np.sqrt(along_ray * along_ray + (surface_noise / facing) ** 2)
+    residual, nx, ny, nz = signed_distance(point[0], point[1], point[2], center, axis, radius, half)
     gradient[0], gradient[1], gradient[2] = nx, ny, nz
-    return off, np.sqrt((along_ray * (nx * x + ny * y + nz * z)) ** 2 + SURFACE**2)
+    return residual, np.sqrt((along_ray * (nx * x + ny * y + nz * z)) ** 2 + surface_noise**2)
 
 
 @numba.njit(cache=True, error_model="numpy")
 def _first_hit(
     x: float, y: float, z: float, center: FloatArray, axis: FloatArray, radius: float, half: float
 ) -> tuple[float, float, float, float]:
-    """How far out (m) a unit ray from the camera meets the body, and the outward normal there; 0 if it misses."""
+    """Range (m) at which a unit ray from the camera hits the body, and the outward normal there; 0 if it misses."""
     slope = x * axis[0] + y * axis[1] + z * axis[2]
     start = center[0] * axis[0] + center[1] * axis[1] + center[2] * axis[2]
     px, py, pz = x - slope * axis[0], y - slope * axis[1], z - slope * axis[2]
@@ -184,10 +100,10 @@ def _first_hit(
 
 
 @numba.njit(cache=True, error_model="numpy")
-def distance(
+def signed_distance(
     x: float, y: float, z: float, center: FloatArray, axis: FloatArray, radius: float, half: float
 ) -> tuple[float, float, float, float]:
-    """Signed distance m of a point from the cylinder's surface, and its gradient (3)."""
+    """Signed distance (m) of a point from the body's surface, below 0 inside, and its gradient (3)."""
     qx, qy, qz = x - center[0], y - center[1], z - center[2]
     along = qx * axis[0] + qy * axis[1] + qz * axis[2]
     px, py, pz = qx - along * axis[0], qy - along * axis[1], qz - along * axis[2]
@@ -205,58 +121,66 @@ def distance(
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _nearest_on_ray(
-    ray: FloatArray, center: FloatArray, axis: FloatArray, radius: float, half: float
+def _closest_approach(
+    ray: FloatArray, center: FloatArray, axis: FloatArray, radius: float, half: float, search_steps: int
 ) -> tuple[float, float]:
-    """Least signed distance along a ray from the camera, and how far out (m) it is.
+    """Least signed distance (m) along a unit ray from the camera, and the range (m) where it is.
 
-    Where the ray passes nearest to the axis, if that is well between the ends; else by golden section.
+    In closed form where the ray passes nearest to the axis well between the ends, else by golden section search.
     """
     out = ray[0] * center[0] + ray[1] * center[1] + ray[2] * center[2]
     slope = ray[0] * axis[0] + ray[1] * axis[1] + ray[2] * axis[2]
     start = center[0] * axis[0] + center[1] * axis[1] + center[2] * axis[2]
     middle = (out - slope * start) / max(1.0 - slope * slope, 1e-3)
     if slope * slope < 0.999 and abs(middle * slope - start) < half - radius:
-        return distance(middle * ray[0], middle * ray[1], middle * ray[2], center, axis, radius, half)[0], middle
+        return _distance_on_ray(middle, ray, center, axis, radius, half), middle
     low, high = out - half - radius, out + half + radius
-    first, second = high - _GOLD * (high - low), low + _GOLD * (high - low)
-    at_first = distance(first * ray[0], first * ray[1], first * ray[2], center, axis, radius, half)[0]
-    at_second = distance(second * ray[0], second * ray[1], second * ray[2], center, axis, radius, half)[0]
-    for _ in range(SEARCH_STEPS):
+    first, second = high - GOLDEN_RATIO * (high - low), low + GOLDEN_RATIO * (high - low)
+    at_first = _distance_on_ray(first, ray, center, axis, radius, half)
+    at_second = _distance_on_ray(second, ray, center, axis, radius, half)
+    for _ in range(search_steps):
         if at_first < at_second:
             high, second, at_second = second, first, at_first
-            first = high - _GOLD * (high - low)
-            at_first = distance(first * ray[0], first * ray[1], first * ray[2], center, axis, radius, half)[0]
+            first = high - GOLDEN_RATIO * (high - low)
+            at_first = _distance_on_ray(first, ray, center, axis, radius, half)
         else:
             low, first, at_first = first, second, at_second
-            second = low + _GOLD * (high - low)
-            at_second = distance(second * ray[0], second * ray[1], second * ray[2], center, axis, radius, half)[0]
+            second = low + GOLDEN_RATIO * (high - low)
+            at_second = _distance_on_ray(second, ray, center, axis, radius, half)
     best = 0.5 * (low + high)
     return min(at_first, at_second), best
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _add(
+def _distance_on_ray(
+    out: float, ray: FloatArray, center: FloatArray, axis: FloatArray, radius: float, half: float
+) -> float:
+    """Signed distance (m) of the point at the range `out` (m) on a unit ray."""
+    return signed_distance(out * ray[0], out * ray[1], out * ray[2], center, axis, radius, half)[0]
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _add_residual(
     hessian: FloatArray,
     gradient: FloatArray,
     row: FloatArray,
     residual: float,
     deviation: float,
-    fade: float,
+    scale: float,
     share: float,
 ) -> float:
-    """Add one residual with its row of derivatives (5,) to the normal equations; its cost."""
-    whitened = residual / deviation / fade
+    """Add one residual with its row (5,) of the Jacobian to the normal equations; its Cauchy cost."""
+    whitened = residual / deviation / scale
     weight = share / (deviation * deviation * (1.0 + whitened * whitened))
     for i in range(5):
         gradient[i] += weight * row[i] * residual
         for j in range(5):
             hessian[i, j] += weight * row[i] * row[j]
-    return 0.5 * share * fade * fade * np.log1p(whitened * whitened)
+    return 0.5 * share * scale * scale * np.log1p(whitened * whitened)
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _row(
+def _jacobian_row(
     row: FloatArray,
     x: float,
     y: float,
@@ -265,23 +189,23 @@ def _row(
     gy: float,
     gz: float,
     center: FloatArray,
-    tilts: FloatArray,
+    tilt_axes: FloatArray,
 ) -> None:
-    """Derivatives (5,) of the distance at a point with gradient g: by the centre, and by turns about the tilts."""
+    """Derivatives (5,) of the distance at a point with gradient g: by centre, and by rotation about the tilt axes."""
     row[0], row[1], row[2] = -gx, -gy, -gz
     qx, qy, qz = x - center[0], y - center[1], z - center[2]
     cx, cy, cz = qy * gz - qz * gy, qz * gx - qx * gz, qx * gy - qy * gx
     for k in range(2):
-        row[3 + k] = -(tilts[k, 0] * cx + tilts[k, 1] * cy + tilts[k, 2] * cz)
+        row[3 + k] = -(tilt_axes[k, 0] * cx + tilt_axes[k, 1] * cy + tilt_axes[k, 2] * cz)
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _equations(
+def normal_equations(
     points: FloatArray,
-    deviations: FloatArray,
+    point_deviations: FloatArray,
     rays: FloatArray,
-    widths: FloatArray,
-    inside: Mask,
+    ray_deviations: FloatArray,
+    occluded: Mask,
     point_share: float,
     ray_share: float,
     center: FloatArray,
@@ -289,31 +213,36 @@ def _equations(
     tilts: FloatArray,
     radius: float,
     half: float,
-    fade: float,
+    scale: float,
+    min_facing: float,
+    surface_noise: float,
+    search_steps: int,
 ) -> tuple[FloatArray, FloatArray, float]:
-    """Normal equations (5, 5), (5,) at a pose, and the cost."""
+    """Hessian (5, 5) and gradient (5,) of the cost at a pose, and the cost; `scale` is the Cauchy loss's."""
     hessian, gradient, row, normal = np.zeros((5, 5)), np.zeros(5), np.zeros(5), np.zeros(3)
     cost = 0.0
     for i in range(len(points)):
-        off, deviation = _point_miss(points[i], deviations[i], center, axis, radius, half, normal)
-        _row(row, points[i, 0], points[i, 1], points[i, 2], normal[0], normal[1], normal[2], center, tilts)
-        cost += _add(hessian, gradient, row, off, deviation, fade, point_share)
+        residual, deviation = _point_residual(
+            points[i], point_deviations[i], center, axis, radius, half, min_facing, surface_noise, normal
+        )
+        _jacobian_row(row, points[i, 0], points[i, 1], points[i, 2], normal[0], normal[1], normal[2], center, tilts)
+        cost += _add_residual(hessian, gradient, row, residual, deviation, scale, point_share)
     for i in range(len(rays)):
-        out, far = _nearest_on_ray(rays[i], center, axis, radius, half)
-        if inside[i] and out <= 0:
+        out, far = _closest_approach(rays[i], center, axis, radius, half, search_steps)
+        if occluded[i] and out <= 0:
             continue
         x, y, z = far * rays[i, 0], far * rays[i, 1], far * rays[i, 2]
-        out, gx, gy, gz = distance(x, y, z, center, axis, radius, half)
-        # At the rim the gradient jumps between two that are aslant to the ray: only what is square to it is true.
+        out, gx, gy, gz = signed_distance(x, y, z, center, axis, radius, half)
+        # At the rim the gradient jumps between two that are oblique to the ray: only the part across it is right.
         along = gx * rays[i, 0] + gy * rays[i, 1] + gz * rays[i, 2]
         gx, gy, gz = gx - along * rays[i, 0], gy - along * rays[i, 1], gz - along * rays[i, 2]
-        _row(row, x, y, z, gx, gy, gz, center, tilts)
-        cost += _add(hessian, gradient, row, out, widths[i] * far, fade, ray_share)
+        _jacobian_row(row, x, y, z, gx, gy, gz, center, tilts)
+        cost += _add_residual(hessian, gradient, row, out, ray_deviations[i] * far, scale, ray_share)
     return hessian, gradient, cost
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _tilts(axis: FloatArray) -> FloatArray:
+def tilt_axes(axis: FloatArray) -> FloatArray:
     """Two unit vectors (2, 3) square to the axis and to each other."""
     out = np.zeros((2, 3))
     k = np.argmin(np.abs(axis))
@@ -325,50 +254,52 @@ def _tilts(axis: FloatArray) -> FloatArray:
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _fit(
+def levenberg_marquardt(
     points: FloatArray,
-    deviations: FloatArray,
+    point_deviations: FloatArray,
     rays: FloatArray,
-    widths: FloatArray,
-    inside: Mask,
+    ray_deviations: FloatArray,
+    occluded: Mask,
     point_share: float,
     ray_share: float,
     center: FloatArray,
     axis: FloatArray,
     radius: float,
     half: float,
-    fade: float,
-    steps: int,
+    scale: float,
+    min_facing: float,
+    surface_noise: float,
+    search_steps: int,
+    max_steps: int,
+    min_gain: float,
 ) -> tuple[FloatArray, FloatArray, float, FloatArray, FloatArray]:
-    """Levenberg-Marquardt from a start."""
-    tilts, damping = _tilts(axis), 1e-3
-    hessian, gradient, cost = _equations(
-        points, deviations, rays, widths, inside, point_share, ray_share, center, axis, tilts, radius, half, fade
-    )
-    for _ in range(steps):
+    """Centre, axis, cost, covariance (5, 5) and tilt axes of the fit; see `cylinder_fit.fit_cylinder`."""
+    tilts, damping = tilt_axes(axis), 1e-3
+    seen = (points, point_deviations, rays, ray_deviations, occluded, point_share, ray_share)
+    body = (radius, half, scale, min_facing, surface_noise, search_steps)
+    hessian, gradient, cost = normal_equations(*seen, center, axis, tilts, *body)
+    for _ in range(max_steps):
         damped = hessian.copy()
         for k in range(5):
             damped[k, k] += damping * hessian[k, k] + 1e-9
         step = np.linalg.solve(damped, -gradient)
-        turn = step[3] * tilts[0] + step[4] * tilts[1]
-        moved = center + step[:3]
-        turned = axis + np.cross(turn, axis)
-        turned /= np.sqrt(np.sum(turned**2))
-        around = _tilts(turned)
-        new = _equations(
-            points, deviations, rays, widths, inside, point_share, ray_share, moved, turned, around, radius, half, fade
-        )
+        rotation = step[3] * tilts[0] + step[4] * tilts[1]
+        new_center = center + step[:3]
+        new_axis = axis + np.cross(rotation, axis)
+        new_axis /= np.sqrt(np.sum(new_axis**2))
+        new_tilts = tilt_axes(new_axis)
+        new = normal_equations(*seen, new_center, new_axis, new_tilts, *body)
         if new[2] < cost:
-            saved = cost - new[2]
-            center, axis, tilts = moved, turned, around
+            gain = cost - new[2]
+            center, axis, tilts = new_center, new_axis, new_tilts
             hessian, gradient, cost = new
             damping = max(damping * 0.2, 1e-6)
-            if saved < CONVERGED * cost:
+            if gain < min_gain * cost:
                 break
         else:
             damping *= 8.0
             if damping > 1e6:
                 break
-    for k in range(5):
+    for k in range(5):  # a weak prior, so that what is not observed has a finite variance
         hessian[k, k] += 0.25 / half**2 if k < 3 else 1.0
     return center, axis, cost, np.linalg.inv(hessian), tilts

@@ -6,7 +6,7 @@ import pytest
 from typer.testing import CliRunner
 
 from regrasp.app.cli.commands import app
-from regrasp.perception.pose.detector import INPUT, shipped_network
+from regrasp.perception.pose.detector import NETWORK_INPUT, shipped_network
 
 
 def invoke(*args: str) -> Any:
@@ -43,7 +43,9 @@ def test_a_file_without_a_network_is_one_line(tmp_path: Path, data: bytes | None
 
 def test_a_network_with_another_input_is_one_line(tmp_path: Path) -> None:
     """OpenCV alone would compute something of it."""
-    (tmp_path / "older.onnx").write_bytes(shipped_network().replace(INPUT.encode(), INPUT.upper().encode()))
+    (tmp_path / "older.onnx").write_bytes(
+        shipped_network().replace(NETWORK_INPUT.encode(), NETWORK_INPUT.upper().encode())
+    )
     result = invoke("evaluate-detector", str(tmp_path / "older.onnx"))
     assert result.exit_code == 2
     assert result.output.count("\n") == 1

@@ -77,7 +77,7 @@ class Eyes(FakePerception):
         self.shows = lambda camera, t: None if self.hidden and (gone or camera == "rear") else seen(t, place, camera)
         still = np.full((48, 64, 3), 160, np.uint8)
         self.frames = lambda t: RgbdFrame("rear", 1, t, still, np.zeros((48, 64), np.float32), K)
-        self.occupancy = SimpleNamespace(occupied_points=lambda guessed=True: np.empty((0, 3)), h=0.01)
+        self.occupancy = SimpleNamespace(occupied_points=lambda guessed=True: np.empty((0, 3)), voxel_size=0.01)
 
 
 class Play:

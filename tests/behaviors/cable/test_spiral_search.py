@@ -78,7 +78,7 @@ def test_a_glimpse_is_no_find(stage: Stage) -> None:
 
 def test_what_shows_too_little_is_looked_at_next(stage: Stage) -> None:
     place = PLACE + np.array([0.0, 0.12, -0.05])
-    little = replace(unseen(0.0, "wrist"), reason=NotSeen.TOO_SMALL, glimpse=place)
+    little = replace(unseen(0.0, "wrist"), reason=NotSeen.TOO_SMALL, weak_detection=place)
 
     def shows(_: str, t: float) -> Estimate | NoEstimate:
         return replace(little, stamp=t) if len(stage.motion.moves) == 1 else seen(t, place, "wrist")

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from regrasp.interfaces.frame import Intrinsics
-from regrasp.perception.camera.calibration import calibrate, find_board, undistorted
+from regrasp.perception.camera.calibration import calibrate_intrinsics, find_checkerboard, undistorted
 from regrasp.sim.cameras.board import board_pictures, board_poses
 from regrasp.sim.render.renderer import RendererName
 
@@ -35,10 +35,10 @@ def corners_through(lens: list[float], noise: float, seed: int, views: int = 15)
 @pytest.mark.parametrize("renderer", ["auto", "tiny"])
 def test_rendered_boards_give_the_camera_that_took_them(renderer: RendererName) -> None:
     poses = board_poses(K, COLUMNS, ROWS, SQUARE, 12, np.random.default_rng(5))
-    views = [find_board(rgb, COLUMNS, ROWS) for rgb in board_pictures(K, poses, COLUMNS, ROWS, SQUARE, renderer)]
+    views = [find_checkerboard(rgb, COLUMNS, ROWS) for rgb in board_pictures(K, poses, COLUMNS, ROWS, SQUARE, renderer)]
     seen = [view for view in views if view is not None]
     assert len(seen) >= 11
-    found = calibrate(seen, K.width, K.height, COLUMNS, ROWS, SQUARE)
+    found = calibrate_intrinsics(seen, K.width, K.height, COLUMNS, ROWS, SQUARE)
     assert found.rms < 0.3
     assert max(float(np.linalg.norm(r, axis=1).mean()) for r in found.residuals) < 0.3
     assert found.intrinsics.fx == pytest.approx(K.fx, rel=0.005)
@@ -50,7 +50,9 @@ def test_rendered_boards_give_the_camera_that_took_them(renderer: RendererName) 
 @settings(max_examples=15)
 @given(st.floats(-0.3, 0.1), st.floats(-0.1, 0.1), st.integers(0, 1000))
 def test_a_lens_is_told_apart_from_the_focal_length(k1: float, k2: float, seed: int) -> None:
-    found = calibrate(corners_through([k1, k2, 0.0, 0.0], 0.05, seed), K.width, K.height, COLUMNS, ROWS, SQUARE)
+    found = calibrate_intrinsics(
+        corners_through([k1, k2, 0.0, 0.0], 0.05, seed), K.width, K.height, COLUMNS, ROWS, SQUARE
+    )
     assert found.rms < 0.15
     assert abs(found.intrinsics.fx - K.fx) < 6 * found.deviations[0] + 0.1
     assert found.distortion[0] == pytest.approx(k1, abs=0.03)
@@ -58,7 +60,7 @@ def test_a_lens_is_told_apart_from_the_focal_length(k1: float, k2: float, seed: 
 
 def test_the_deviations_grow_with_the_corners_noise() -> None:
     quiet, noisy = (
-        calibrate(corners_through([0.0] * 4, noise, 1), K.width, K.height, COLUMNS, ROWS, SQUARE)
+        calibrate_intrinsics(corners_through([0.0] * 4, noise, 1), K.width, K.height, COLUMNS, ROWS, SQUARE)
         for noise in (0.05, 0.5)
     )
     assert noisy.deviations[0] > 5 * quiet.deviations[0]
@@ -66,12 +68,12 @@ def test_the_deviations_grow_with_the_corners_noise() -> None:
 
 def test_two_views_are_too_few() -> None:
     with pytest.raises(ValueError, match="2 views"):
-        calibrate(corners_through([0.0] * 4, 0.0, 1)[:2], K.width, K.height, COLUMNS, ROWS, SQUARE)
+        calibrate_intrinsics(corners_through([0.0] * 4, 0.0, 1)[:2], K.width, K.height, COLUMNS, ROWS, SQUARE)
 
 
 def test_no_board_is_found_where_there_is_none() -> None:
     for rgb in (np.zeros((120, 160, 3), np.uint8), np.random.default_rng(0).integers(0, 256, (120, 160, 3), np.uint8)):
-        assert find_board(rgb, COLUMNS, ROWS) is None
+        assert find_checkerboard(rgb, COLUMNS, ROWS) is None
 
 
 def test_a_straight_line_is_straight_again() -> None:

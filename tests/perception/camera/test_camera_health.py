@@ -2,9 +2,10 @@ import numpy as np
 import pytest
 
 from regrasp.interfaces.frame import Intrinsics, RgbdFrame
-from regrasp.perception.camera.health import REPEATS, STALE, CameraHealth
+from regrasp.perception.camera.health import CameraHealth, CameraHealthParameters
 
 RATE = 15
+MAX_AGE, REPEATS = CameraHealthParameters().max_frame_age, CameraHealthParameters().max_repeats
 
 
 def frame(number: int, *, light: int = 100, measured: float = 0.8, still: bool = False) -> RgbdFrame:
@@ -49,7 +50,7 @@ def test_one_frame_read_often_is_not_frozen() -> None:
     assert fed(*[frame(1)] * 10).trouble(0.1) is None
 
 
-@pytest.mark.parametrize(("age", "late"), [(0.9 * STALE, False), (1.1 * STALE, True)])
+@pytest.mark.parametrize(("age", "late"), [(0.9 * MAX_AGE, False), (1.1 * MAX_AGE, True)])
 def test_a_stream_that_stands_still_is_late(age: float, late: bool) -> None:
     assert bool(fed(frame(1)).trouble(1 / RATE + age)) == late
 

@@ -9,11 +9,12 @@ from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.cell import OPTICAL, Box, Connector, pose_along
 from regrasp.interfaces.frame import Intrinsics
-from regrasp.perception.mapping.occupancy import KNOWN_MARGIN, Occupancy, near_boxes
+from regrasp.perception.mapping.occupancy import Occupancy, OccupancyParameters, near_boxes
 
 Points = NDArray[np.float64]
 REAR = Intrinsics.from_fov(848, 480, np.deg2rad(65.0))
 WRIST = Intrinsics.from_fov(848, 480, np.deg2rad(69.4))
+PARAMETERS = OccupancyParameters(voxel_size=0.015)
 KNOWN = [
     Box(name="floor", center=(0.2, 0.0, -0.02), size=(2.4, 2.4, 0.04)),
     Box(name="back_panel", center=(0.5145, 0.0, 0.305), size=(0.013, 0.9144, 0.6096)),
@@ -27,14 +28,14 @@ HIDDEN_END = Cylinder(np.array([0.43, 0.0, 0.25]), np.array([0.0, 1.0, 0.1]), co
 
 
 def empty(connector: Connector) -> Occupancy:
-    return Occupancy(np.array([0.0, -0.45, 0.0]), np.array([0.52, 0.45, 0.65]), KNOWN, connector)
+    return Occupancy(np.array([0.0, -0.45, 0.0]), np.array([0.52, 0.45, 0.65]), KNOWN, connector, PARAMETERS)
 
 
 def looking(position: tuple[float, float, float], direction: tuple[float, float, float]) -> RigidTransform:
     return RigidTransform.from_components(position, pose_along(position, direction).rotation * OPTICAL)
 
 
-def look(
+def integrate(
     occupancy: Occupancy,
     things: Sequence[Cylinder | Block],
     world_from_camera: RigidTransform,
@@ -66,31 +67,31 @@ def inside(block: Block) -> Points:
 
 def test_an_obstacle_is_covered_and_nothing_else_is() -> None:
     occupancy = empty(CONNECTOR)
-    look(occupancy, [TALL, CABLE, HIDDEN_END], REAR_POSE)
+    integrate(occupancy, [TALL, CABLE, HIDDEN_END], REAR_POSE)
     points = occupancy.occupied_points()
-    assert farthest(points, inside(TALL)) < occupancy.h
+    assert farthest(points, inside(TALL)) < occupancy.voxel_size
     assert outside(points, TALL).max() < 0.03  # depth scale, camera ray, a voxel
 
 
 @pytest.mark.parametrize("scale", [-0.015, 0.0, 0.015])
 def test_an_empty_cell_with_cable_and_connector_stays_empty(scale: float) -> None:
     occupancy = empty(CONNECTOR)
-    look(occupancy, [CABLE, HIDDEN_END], REAR_POSE, scale=scale)
+    integrate(occupancy, [CABLE, HIDDEN_END], REAR_POSE, scale=scale)
     assert len(occupancy.occupied_points()) == 0
 
 
 def test_the_wrist_camera_close_by_takes_no_cable_for_an_obstacle() -> None:
     occupancy = empty(CONNECTOR)
     near = looking((0.15, -0.25, 0.33), (0.21, 0.0, -0.08))
-    look(occupancy, [CABLE], near, WRIST)
+    integrate(occupancy, [CABLE], near, WRIST)
     assert len(occupancy.occupied_points()) == 0
 
 
 def test_a_black_obstacle_is_an_obstacle() -> None:
     occupancy = empty(CONNECTOR)
     block = Block(TALL.lower, TALL.upper, BLACK)
-    look(occupancy, [block], REAR_POSE)
-    assert farthest(occupancy.occupied_points(), inside(block)) < 2 * occupancy.h
+    integrate(occupancy, [block], REAR_POSE)
+    assert farthest(occupancy.occupied_points(), inside(block)) < 2 * occupancy.voxel_size
 
 
 def test_the_robot_is_no_obstacle() -> None:
@@ -98,8 +99,8 @@ def test_the_robot_is_no_obstacle() -> None:
     axis = arm.axis / np.linalg.norm(arm.axis)
     spheres = (arm.center + np.linspace(-0.15, 0.15, 11)[:, None] * axis, np.full(11, 0.035))
     seen, ignored = empty(CONNECTOR), empty(CONNECTOR)
-    look(seen, [arm], REAR_POSE)
-    look(ignored, [arm], REAR_POSE, ignore=[spheres])
+    integrate(seen, [arm], REAR_POSE)
+    integrate(ignored, [arm], REAR_POSE, ignore=[spheres])
     assert len(seen.occupied_points()) > 100
     assert len(ignored.occupied_points()) == 0
 
@@ -107,9 +108,9 @@ def test_the_robot_is_no_obstacle() -> None:
 def test_a_look_from_the_side_clears_what_was_assumed_behind() -> None:
     thin = Block(np.array([0.30, -0.06, 0.0]), np.array([0.32, 0.06, 0.36]), PURPLE)
     occupancy = empty(CONNECTOR)
-    look(occupancy, [thin], REAR_POSE)
+    integrate(occupancy, [thin], REAR_POSE)
     assert np.count_nonzero(outside(occupancy.occupied_points(), thin) > 0.04) > 100
-    look(occupancy, [thin], looking((0.36, 0.35, 0.5), (0.0, -0.8, -0.6)), WRIST)
+    integrate(occupancy, [thin], looking((0.36, 0.35, 0.5), (0.0, -0.8, -0.6)), WRIST)
     behind = occupancy.occupied_points()
     behind = behind[(behind[:, 0] > 0.36) & (np.abs(behind[:, 1]) < 0.05) & (behind[:, 2] < 0.33)]
     assert len(behind) == 0
@@ -120,12 +121,14 @@ def test_the_connectors_own_place_is_freed_when_it_is_found() -> None:
     end = Cylinder(np.array([0.36, 0.0, 0.25]), np.array([0.0, 1.0, 0.1]), color=RED)
     thin = Block(np.array([0.30, -0.06, 0.0]), np.array([0.31, 0.06, 0.36]), PURPLE)
     occupancy = empty(CONNECTOR)
-    look(occupancy, [thin, end], REAR_POSE)
-    assert farthest(occupancy.occupied_points(), end.center[None]) < occupancy.h  # the guess covers it
-    look(occupancy, [thin, end], looking((0.40, 0.12, 0.55), (-0.04, -0.12, -0.3)), WRIST)
+    integrate(occupancy, [thin, end], REAR_POSE)
+    assert farthest(occupancy.occupied_points(), end.center[None]) < occupancy.voxel_size  # the guess covers it
+    integrate(occupancy, [thin, end], looking((0.40, 0.12, 0.55), (-0.04, -0.12, -0.3)), WRIST)
     assert farthest(occupancy.occupied_points(), end.center[None]) > 0.015
 
 
 def test_known_boxes_have_a_margin() -> None:
-    points = np.array([[0.4, 0.0, 0.3], [0.485, 0.0, 0.3], [0.52, 0.0, 0.3], [0.2, 0.0, KNOWN_MARGIN + 0.001]])
-    assert near_boxes(points, KNOWN).tolist() == [False, True, True, False]
+    points = np.array(
+        [[0.4, 0.0, 0.3], [0.485, 0.0, 0.3], [0.52, 0.0, 0.3], [0.2, 0.0, PARAMETERS.known_margin + 0.001]]
+    )
+    assert near_boxes(points, KNOWN, PARAMETERS.known_margin).tolist() == [False, True, True, False]

@@ -14,13 +14,13 @@ from regrasp.interfaces.cell import KnownCell
 from regrasp.interfaces.frame import Intrinsics, RgbdFrame
 from regrasp.perception.camera.model import project
 from regrasp.perception.pose.detector import (
-    LEAST_SIZE,
-    MIN_SCORE,
+    MIN_PIXEL_SIZE,
     Detector,
+    DetectorParameters,
     decode,
-    fitted,
+    intersection_over_union,
+    letterboxed,
     network_input,
-    overlap,
     pixel_sizes,
 )
 from regrasp.perception.pose.estimate import Estimate, NoEstimate
@@ -69,7 +69,7 @@ def test_box_and_angle_of_a_free_connector(detector: Detector, degrees: float) -
     ends = project(MIDDLE + np.outer([-0.045, 0.045], thing.axis), K)
     side = 0.010 / 0.75 * K.fx * np.abs(axis_at(degrees + 90))[:2]
     u0, v0, u1, v1 = np.concatenate([ends.min(axis=0) - side, ends.max(axis=0) + side]).tolist()
-    assert overlap(found[0].box, (u0, v0, u1, v1)) > 0.5
+    assert intersection_over_union(found[0].box, (u0, v0, u1, v1)) > 0.5
     assert abs((np.rad2deg(found[0].angle) - degrees + 90) % 180 - 90) < 12
     assert found[0].in_plane > 0.8
 
@@ -79,7 +79,7 @@ def test_pictures_of_any_size(detector: Detector, size: tuple[int, int]) -> None
     k = Intrinsics.from_fov(*size, np.deg2rad(65.0))
     found = detector.detect(view(Cylinder(MIDDLE, axis_at(20.0)), k=k))
     assert len(found) == 1
-    middle = np.array(found[0].middle)
+    middle = np.array(found[0].center)
     assert np.linalg.norm(middle - [k.cx, k.cy]) < 0.015 / 0.75 * k.fx
 
 
@@ -95,7 +95,7 @@ def test_the_pose_is_that_of_the_front_of_the_visible_part(detector: Detector) -
 
 def test_where_few_readings_are_the_axis_is_the_networks_own(detector: Detector) -> None:
     frame = view(Cylinder(MIDDLE, axis_at(30.0)))
-    u, v = detector.detect(frame)[0].middle
+    u, v = detector.detect(frame)[0].center
     depth = np.zeros_like(frame.depth)
     few = np.s_[round(v) - 1 : round(v) + 2, round(u) - 1 : round(u) + 2]
     depth[few] = frame.depth[few]
@@ -131,7 +131,7 @@ def test_reasons_have_names_and_numbers(detector: Detector) -> None:
     nothing = detector.estimate(view(), EYE)
     assert isinstance(nothing, NoEstimate)
     assert nothing.reason == NotSeen.LOW_SCORE
-    assert str(MIN_SCORE) in nothing.message
+    assert str(DetectorParameters().min_score) in nothing.message
     frame = view(Cylinder(MIDDLE, axis_at(0.0)))
     blind = detector.estimate(dataclasses.replace(frame, depth=np.zeros_like(frame.depth)), EYE)
     assert isinstance(blind, NoEstimate)
@@ -174,8 +174,8 @@ def test_maps_are_read_as_they_are_written() -> None:
     maps[:, 25, 50] = [0.2, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0]
     found = decode(maps, 0.5, 0.1)
     assert [round(d.score, 3) for d in found] == [0.9, 0.2]
-    assert found[0].middle == pytest.approx((30.75 * 8 / 0.5 - 0.5, 20.0 * 8 / 0.5 - 0.5))
-    assert found[0].edges == pytest.approx((6 * 16, 3 * 16), rel=1e-5)
+    assert found[0].center == pytest.approx((30.75 * 8 / 0.5 - 0.5, 20.0 * 8 / 0.5 - 0.5))
+    assert found[0].size == pytest.approx((6 * 16, 3 * 16), rel=1e-5)
     assert (found[0].angle, found[0].in_plane) == pytest.approx((0.5, 0.7), rel=1e-5)
 
 
@@ -190,7 +190,7 @@ def test_a_box_elsewhere_counts_though_its_cell_is_next_to_a_likelier_one() -> N
 def test_a_picture_is_shrunk_without_a_change_of_shape() -> None:
     rgb = np.zeros((480, 640, 3), np.uint8)
     cv2.circle(rgb, (320, 240), 100, (255, 255, 255), -1)
-    small, scale = fitted(rgb)
+    small, scale = letterboxed(rgb)
     assert small.shape == (240, 432, 3)
     assert scale == 0.5
     _, _, width, height = cv2.boundingRect((small[..., 0] > 127).astype(np.uint8))
@@ -203,10 +203,10 @@ def test_a_pixel_of_the_input_shows_as_much_as_geometry_says(z: float, size: tup
     k = Intrinsics.from_fov(*size, np.deg2rad(fov))
     sizes = pixel_sizes(np.full(size[::-1], z, np.float32), k)
     assert sizes.shape == (120, 216)
-    _, scale = fitted(np.zeros(size[::-1], np.uint8))
+    _, scale = letterboxed(np.zeros(size[::-1], np.uint8))
     assert sizes.max() * scale / 2 * size[0] == pytest.approx(2 * z * np.tan(np.deg2rad(fov) / 2), rel=1e-5)
     given_to_network = network_input(np.zeros((240, 432, 3), np.uint8), sizes)[12]
-    assert given_to_network.max() == pytest.approx(max(0, np.log(sizes.max() / LEAST_SIZE) / 2), abs=1e-5)
+    assert given_to_network.max() == pytest.approx(max(0, np.log(sizes.max() / MIN_PIXEL_SIZE) / 2), abs=1e-5)
 
 
 @pytest.mark.parametrize("value", [0.0, -1.0, np.nan, np.inf, 1e30])
@@ -227,7 +227,7 @@ def test_the_network_sees_every_pixel_once() -> None:
     seen = network_input(image, sizes)
     for k, (down, right) in enumerate([(0, 0), (0, 1), (1, 0), (1, 1)]):
         assert seen[3 * k : 3 * k + 3] == pytest.approx(image[down::2, right::2].transpose(2, 0, 1) / 255, abs=1e-6)
-    assert seen[12] == pytest.approx(np.log(np.maximum(sizes, LEAST_SIZE) / LEAST_SIZE) / 2, abs=1e-5)
+    assert seen[12] == pytest.approx(np.log(np.maximum(sizes, MIN_PIXEL_SIZE) / MIN_PIXEL_SIZE) / 2, abs=1e-5)
 
 
 def test_size_tells_the_connector_from_a_large_likeness(detector: Detector) -> None:
@@ -240,14 +240,14 @@ def test_size_tells_the_connector_from_a_large_likeness(detector: Detector) -> N
 
 @given(boxes, boxes)
 def test_overlap_is_a_share_and_symmetric(a: tuple[float, ...], b: tuple[float, ...]) -> None:
-    share = overlap(a, b)  # type: ignore[arg-type]
+    share = intersection_over_union(a, b)  # type: ignore[arg-type]
     assert 0 <= share <= 1
-    assert share == pytest.approx(overlap(b, a))  # type: ignore[arg-type]
-    assert overlap(a, a) == pytest.approx(1.0)  # type: ignore[arg-type]
+    assert share == pytest.approx(intersection_over_union(b, a))  # type: ignore[arg-type]
+    assert intersection_over_union(a, a) == pytest.approx(1.0)  # type: ignore[arg-type]
 
 
 def test_boxes_without_area_do_not_overlap() -> None:
-    assert overlap((1.0, 1.0, 1.0, 1.0), (1.0, 1.0, 1.0, 1.0)) == 0.0
+    assert intersection_over_union((1.0, 1.0, 1.0, 1.0), (1.0, 1.0, 1.0, 1.0)) == 0.0
 
 
 def test_another_red_thing_is_no_connector(detector: Detector) -> None:

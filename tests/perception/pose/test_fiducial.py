@@ -19,13 +19,14 @@ from regrasp.perception.camera.calibration import undistorted
 from regrasp.perception.camera.model import project
 from regrasp.perception.pose import fiducial
 from regrasp.perception.pose.estimate import Estimate, NoEstimate
-from regrasp.perception.pose.fiducial import Fiducial, TagPose, find_tag
+from regrasp.perception.pose.fiducial import Fiducial, FiducialParameters, TagPose, find_tag
 from regrasp.perception.pose.segmentation import NotSeen
 from regrasp.perception.pose.technique import make_technique
 from regrasp.sim.render.renderer import RendererName
 
 MIDDLE = np.array([0.05, -0.04, 0.75])
 BESIDE = np.array([-0.2, 0.1, 0.9])
+NOISE = FiducialParameters().corner_noise
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +47,7 @@ def between(found: RigidTransform, true: RigidTransform) -> NDArray[np.float64]:
     return np.concatenate([found.translation - true.translation, (found.rotation * true.rotation.inv()).as_rotvec()])
 
 
-def unlikely(error: NDArray[np.float64], covariance: NDArray[np.float64]) -> float:
+def mahalanobis_sq(error: NDArray[np.float64], covariance: NDArray[np.float64]) -> float:
     """Squared Mahalanobis distance."""
     return float(error @ np.linalg.solve(covariance, error))
 
@@ -65,7 +66,7 @@ def test_free_views_are_found_and_the_covariance_tells_how_well(renderer: Render
     assert np.median(distances) < 0.003
     assert np.percentile(distances, 95) < 0.012
     for part, limit in ((slice(0, 3), chi2.ppf(0.95, 3)), (slice(3, 6), chi2.ppf(0.95, 3))):
-        inside = [unlikely(error[part], covariance[part, part]) < limit for error, covariance in errors]
+        inside = [mahalanobis_sq(error[part], covariance[part, part]) < limit for error, covariance in errors]
         assert np.mean(inside) > 0.85
 
 
@@ -97,7 +98,7 @@ def test_without_depth_two_poses_remain_and_depth_settles_which(scene: TagScene)
         frame = scene.frame(facing(np.array([0.0, 0.0, 0.9]), np.deg2rad(14.0), towards, 0.4), number=7)
         for name, shown in (("deep", frame), ("blind", replace(frame, depth=np.zeros_like(frame.depth)))):
             result = found(shown)
-            doubts[name].append(result.doubt)
+            doubts[name].append(result.ambiguity)
             tilts[name].append(float(np.sqrt(np.trace(result.covariance[3:, 3:]))))
     assert np.mean(np.array(doubts["blind"]) > 0.05) > 0.3
     assert np.mean(doubts["deep"]) < 0.5 * np.mean(doubts["blind"])
@@ -196,7 +197,7 @@ def test_spoilt_frames_give_a_reason_or_a_pose_that_holds(
     rgb = np.clip(light * frame.rgb.astype(float), 0, 255).astype(np.uint8)
     result = find_tag(replace(frame, rgb=rgb, depth=depth), TAG)
     if isinstance(result, TagPose):
-        assert unlikely(between(result.pose, true), result.covariance) < 60.0
+        assert mahalanobis_sq(between(result.pose, true), result.covariance) < 60.0
         assert np.isfinite(result.covariance).all()
 
 
@@ -234,19 +235,19 @@ def test_the_covariance_follows_the_corners_noise(scene: TagScene) -> None:
     square = (true * TAG.body_from_tag).apply([[-half, half, 0], [half, half, 0], [half, -half, 0], [-half, -half, 0]])
     corners, rng, errors = project(square, K), np.random.default_rng(2), []
     for _ in range(400):
-        solved = fiducial._solve(corners + rng.normal(0, fiducial.CORNER_NOISE, (4, 2)), TAG, K)
+        solved = fiducial._solve(corners + rng.normal(0, NOISE, (4, 2)), TAG, K, NOISE)
         assert solved is not None
         poses, _, _ = solved
         both = [between(pose * TAG.body_from_tag.inv(), true) for pose in poses]
         errors.append(min(both, key=lambda error: float(np.linalg.norm(error[3:]))))
     drawn = np.cov(np.array(errors).T)
-    told = fiducial._covariance(square, true.translation, K)
+    told = fiducial._covariance(square, true.translation, K, FiducialParameters())
     np.testing.assert_allclose(np.sqrt(np.diag(told)), np.sqrt(np.diag(drawn)), rtol=0.2)
 
 
 def test_an_exact_square_has_one_pose() -> None:
     """OpenCV's second is not a number then."""
-    solved = fiducial._solve(np.array([[397.5, 152.5], [425.5, 152.5], [425.5, 180.5], [397.5, 180.5]]), TAG, K)
+    solved = fiducial._solve(np.array([[397.5, 152.5], [425.5, 152.5], [425.5, 180.5], [397.5, 180.5]]), TAG, K, NOISE)
     assert solved is not None
     assert np.isfinite(solved[1]).all()
     assert solved[1][0, :, 2].mean() == pytest.approx(TAG.size * K.fx / 28.0, rel=0.01)

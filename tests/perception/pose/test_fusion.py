@@ -1,4 +1,4 @@
-"""Several estimates made one: what may be expected of it for any estimates, and how often it is right."""
+"""Fusion of estimates: properties that hold for any estimates, and how often the stated regions hold the truth."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -13,11 +13,12 @@ from scipy.stats import chi2
 
 from regrasp.interfaces.cell import pose_along
 from regrasp.perception.pose.estimate import ROLL_VARIANCE, Estimate, pose_covariance
-from regrasp.perception.pose.fusion import COMMON, FAR, fuse
+from regrasp.perception.pose.fusion import FusionParameters, fuse
 
 FloatArray = NDArray[np.float64]
 PLACE, LEFT = np.array([0.4, 0.1, 0.3]), np.array([0.0, 1.0, 0.0])
 SEEDS = st.integers(0, 2**32 - 1)
+COMMON, FAR = FusionParameters().common_share, FusionParameters().max_mahalanobis_sq
 
 
 def estimate(
@@ -51,7 +52,7 @@ def random_covariance(rng: np.random.Generator, axis: FloatArray, scale: float =
 
 
 def draws(seed: int, cameras: Sequence[str]) -> list[Estimate]:
-    """An estimate for each camera named, with errors as its own covariance tells."""
+    """An estimate for each camera named, with errors drawn from its own covariance."""
     rng = np.random.default_rng(seed)
     axis = rng.normal(size=3)
     axis /= np.linalg.norm(axis)

@@ -10,13 +10,13 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from regrasp.interfaces.cell import KnownCell
 from regrasp.interfaces.frame import Intrinsics, RgbdFrame
 from regrasp.perception.pose.estimate import Estimate, NoEstimate
-from regrasp.perception.pose.rgbd import Rgbd, min_max_axis, n_mean
+from regrasp.perception.pose.rgbd import Rgbd, RgbdParameters, min_max_axis, n_mean
 from regrasp.perception.pose.segmentation import NotSeen
 
 Vector = NDArray[np.float64]
 EYE = RigidTransform.identity()  # the camera's optical frame is the world
 known = SimpleNamespace(connector=CONNECTOR)
-look = Rgbd(cast(KnownCell, known)).estimate
+estimate = Rgbd(cast(KnownCell, known)).estimate
 MIDDLE = np.array([0.0, 0.0, 0.75])
 
 
@@ -45,7 +45,7 @@ def errors(result: Estimate | NoEstimate, axis: Vector) -> tuple[float, float, f
 def test_it_finds_the_front_and_its_axis_roughly() -> None:
     axis = tilted(10.0, 0.0)
     frames = [view(axis, MIDDLE_THIRD, seed) for seed in range(10)]
-    along, across, angle = np.array([errors(look(f, EYE), axis) for f in frames]).mean(axis=0)
+    along, across, angle = np.array([errors(estimate(f, EYE), axis) for f in frames]).mean(axis=0)
     assert along < 0.005
     assert 0.006 < across < 0.010  # the surface is sqrt(3)/2 of the radius before the axis
     assert angle < 12.0
@@ -58,7 +58,7 @@ def test_a_hidden_part_draws_it_to_the_visible_part_s_middle(share: float, side:
     low, high = min(cut, side * 0.12), max(cut, side * 0.12)
     block = Block(np.array([low, -0.2, 0.65]), np.array([high, 0.2, 0.70]), PURPLE)
     axis = tilted(0.0, 15.0)
-    visible = np.array([errors(look(view(axis, MIDDLE_THIRD, seed, block), EYE), axis) for seed in range(8)])
+    visible = np.array([errors(estimate(view(axis, MIDDLE_THIRD, seed, block), EYE), axis) for seed in range(8)])
     assert np.median(visible[:, 0]) > 0.4 * share * 0.09
 
 
@@ -66,19 +66,21 @@ def test_the_sign_follows_the_hint_or_world_left() -> None:
     axis = np.array([1.0, 0.0, 0.0])
     frame = view(axis, MIDDLE_THIRD, 3)
     for hint in (axis, -axis):
-        result = look(frame, EYE, axis=hint)
+        result = estimate(frame, EYE, axis=hint)
         assert isinstance(result, Estimate)
         assert result.axis @ hint > 0.99
-    upright = look(view(np.array([0.0, 1.0, 0.0]), MIDDLE_THIRD, 3), EYE)
+    upright = estimate(view(np.array([0.0, 1.0, 0.0]), MIDDLE_THIRD, 3), EYE)
     assert isinstance(upright, Estimate)
     assert upright.axis[1] > 0.99
 
 
 def test_world_pose_does_not_depend_on_where_the_camera_stands() -> None:
     things: list[Cylinder | Block] = [wall(), Cylinder(MIDDLE, tilted(20.0, 30.0))]
-    here = look(render(things, EYE, MIDDLE_THIRD, Sensor(), 5), EYE, axis=np.array([1.0, 0.0, 0.0]))
+    here = estimate(render(things, EYE, MIDDLE_THIRD, Sensor(), 5), EYE, axis=np.array([1.0, 0.0, 0.0]))
     assert isinstance(here, Estimate)
-    there = look(render(things, EYE, MIDDLE_THIRD, Sensor(), 5), REAR_POSE, axis=REAR_POSE.rotation.apply([1.0, 0, 0]))
+    there = estimate(
+        render(things, EYE, MIDDLE_THIRD, Sensor(), 5), REAR_POSE, axis=REAR_POSE.rotation.apply([1.0, 0, 0])
+    )
     assert isinstance(there, Estimate)
     np.testing.assert_allclose(there.position, REAR_POSE.apply(here.position), atol=1e-9)
     np.testing.assert_allclose(there.axis, REAR_POSE.rotation.apply(here.axis), atol=1e-9)
@@ -88,12 +90,12 @@ def test_world_pose_does_not_depend_on_where_the_camera_stands() -> None:
 
 
 def test_reasons_are_named() -> None:
-    empty = look(render([wall()], EYE, MIDDLE_THIRD, Sensor(), 1), EYE)
+    empty = estimate(render([wall()], EYE, MIDDLE_THIRD, Sensor(), 1), EYE)
     assert isinstance(empty, NoEstimate)
     assert empty.reason is NotSeen.NO_COLOR
     seen = view(np.array([1.0, 0.0, 0.0]), MIDDLE_THIRD, 1)
     blind = RgbdFrame("rear", 1, 0.5, seen.rgb, np.zeros_like(seen.depth), seen.intrinsics)
-    result = look(blind, EYE)
+    result = estimate(blind, EYE)
     assert isinstance(result, NoEstimate)
     assert (result.reason, result.stamp) == (NotSeen.NO_DEPTH, 0.5)
 
@@ -107,11 +109,15 @@ def test_holes_and_bad_values_in_the_depth_do_no_harm() -> None:
     depth[rng.random(depth.shape) < 0.05] = np.nan
     depth[rng.random(depth.shape) < 0.02] += 0.3
     spoilt = RgbdFrame("rear", 1, 0.0, frame.rgb, depth, frame.intrinsics)
-    along, across, angle = errors(look(spoilt, EYE), axis)
+    along, across, angle = errors(estimate(spoilt, EYE), axis)
     assert (along < 0.01, across < 0.015, angle < 25.0) == (True, True, True), (along, across, angle)
 
 
 def test_n_mean_and_min_max_by_hand() -> None:
     points = np.column_stack([np.arange(11.0), np.zeros(11), np.r_[np.full(5, 1.0), np.full(6, 2.0)]])
-    np.testing.assert_allclose(n_mean(points), [4.5, 0.0, 1.5])  # n = 2: the fifth and sixth of eleven
-    np.testing.assert_allclose(min_max_axis(points), np.array([10.0, 0.0, 1.0]) / np.sqrt(101.0))
+    np.testing.assert_allclose(
+        n_mean(points, RgbdParameters.middle_share), [4.5, 0.0, 1.5]
+    )  # n = 2: the fifth and sixth of eleven
+    np.testing.assert_allclose(
+        min_max_axis(points, RgbdParameters.end_share), np.array([10.0, 0.0, 1.0]) / np.sqrt(101.0)
+    )

@@ -78,7 +78,7 @@ def test_a_speck_is_too_small_and_says_how_small() -> None:
     assert (found.reason, "16 pixels" in found.message) == (NotSeen.TOO_SMALL, True)
 
 
-def test_the_larger_of_two_patches_wins_and_small_gaps_close() -> None:
+def test_the_larger_of_two_blobs_wins_and_small_gaps_close() -> None:
     rgb = np.zeros((80, 120, 3), np.uint8)
     rgb[10:20, 5:35] = (190, 13, 15)
     rgb[40:60, 20:100] = (190, 13, 15)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.motion.robots.kinematics import ArmKinematics
-from regrasp.perception.mapping.occupancy import DARK
+from regrasp.perception.mapping.occupancy import OccupancyParameters
 from regrasp.sim.robot.arm import JOINT_LINKS, JOINT_SIGNS
 from regrasp.sim.robot.model import ARM_COLOR, CAMERA_SIZE, finger_position, pad_gap, robot_urdf
 
@@ -86,7 +86,7 @@ def test_the_arms_are_dark_grey_and_lighter_than_the_cable(robot: tuple[int, int
     arms = [c for c in colors if c == pytest.approx(ARM_COLOR)]
     assert len(arms) >= 12
     assert max(ARM_COLOR) < 0.5
-    assert 255 * min(ARM_COLOR) > DARK
+    assert 255 * min(ARM_COLOR) > OccupancyParameters().max_cable_brightness
 
 
 def _size(shape: ET.Element) -> list[float]:

@@ -6,14 +6,29 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from regrasp.perception.pose.fused import cylinder
-from regrasp.perception.pose.fused.cylinder import COARSE, Fit, Sight, depth_misses, distance, fit, nearest_on_rays
+from regrasp.perception.pose.fused.cylinder import signed_distance
+from regrasp.perception.pose.fused.cylinder_fit import (
+    Cylinder,
+    CylinderFit,
+    CylinderFitParameters,
+    Observation,
+    closest_approaches,
+    depth_residuals,
+    fit_cylinder,
+)
+from regrasp.perception.pose.fused.multi_start import MultiStartParameters
 
 Vector = NDArray[np.float64]
 RADIUS, LENGTH = 0.010, 0.09
+COARSE, PARAMETERS = MultiStartParameters().coarse_scale, CylinderFitParameters()
 CENTER = np.array([0.04, -0.03, 0.7])
 VIEW = CENTER / np.linalg.norm(CENTER)
 degrees = st.floats(-180.0, 180.0)
 tilts = st.floats(-85.0, 85.0)  # out of the image; 90 is end-on
+
+
+def body(center: Vector, axis: Vector) -> Cylinder:
+    return Cylinder(center, axis, RADIUS, LENGTH)
 
 
 def turned(in_image: float, to_camera: float) -> Vector:
@@ -36,8 +51,8 @@ def surface(center: Vector, axis: Vector) -> tuple[Vector, Vector]:
     return np.vstack([side, *caps]), np.vstack([normal, *(np.tile(end * axis, (len(flat), 1)) for end in (-1, 1))])
 
 
-def outline_rays(center: Vector, axis: Vector, count: int = 120) -> Vector:
-    """Unit rays (count, 3) from the camera that just touch the body: found by bisection outwards from its middle."""
+def silhouette_rays(center: Vector, axis: Vector, count: int = 120) -> Vector:
+    """Unit rays (count, 3) from the camera that just touch the body, by bisection outwards from its centre."""
     view = center / np.linalg.norm(center)
     u = np.cross(view, [0.0, 1.0, 0.0])
     u /= np.linalg.norm(u)
@@ -58,7 +73,7 @@ def unit(vectors: Vector) -> Vector:
 
 
 def signed(points: Vector, center: Vector, axis: Vector) -> Vector:
-    """Signed distance (n,) of points (n, 3) from the body, the textbook's way."""
+    """Signed distance (n,) of points (n, 3) from the body, by the textbook's formula."""
     offset = points - center
     along = offset @ axis
     side = np.linalg.norm(offset - along[:, None] * axis, axis=1) - RADIUS
@@ -77,16 +92,16 @@ def nearest(rays: Vector, center: Vector, axis: Vector) -> Vector:
     return signed((low + high) / 2 * rays, center, axis)
 
 
-def sight(center: Vector, axis: Vector, facing: float = 0.05) -> Sight:
-    """All that an exact camera sees of the body where the cosine to the line of sight is at least `facing`."""
+def observed(center: Vector, axis: Vector, facing: float = 0.05) -> Observation:
+    """What an exact camera sees of the body where the cosine to the line of sight is at least `facing`."""
     points, normals = surface(center, axis)
     points = points[np.einsum("ij,ij->i", points, normals) < -facing * np.linalg.norm(points, axis=1)]
-    rays = outline_rays(center, axis)
+    rays = silhouette_rays(center, axis)
     n, m = len(points), len(rays)
-    return Sight(points, np.full(n, 0.002), rays, np.full(m, 0.001), np.zeros(m, bool), 1.0, 1.0)
+    return Observation(points, np.full(n, 0.002), rays, np.full(m, 0.001), np.zeros(m, bool), 1.0, 1.0)
 
 
-def off(found: Fit, axis: Vector) -> tuple[float, float]:
+def off(found: CylinderFit, axis: Vector) -> tuple[float, float]:
     """Millimetres and degrees."""
     angle = np.rad2deg(np.arccos(min(1.0, abs(float(found.axis @ axis)))))
     return 1e3 * float(np.linalg.norm(found.center - CENTER)), float(angle)
@@ -95,20 +110,21 @@ def off(found: Fit, axis: Vector) -> tuple[float, float]:
 @settings(max_examples=60, derandomize=True)  # a few poses put a reading at the brink of a face
 @given(degrees, tilts, st.integers(0, 2**32 - 1))
 def test_the_rows_are_the_derivatives(in_image: float, to_camera: float, seed: int) -> None:
-    """Deviations of many metres keep what weighs a reading from changing with the pose."""
+    """Deviations of many metres keep the weight of a reading from changing with the pose."""
     rng = np.random.default_rng(seed)
     axis = turned(in_image, to_camera)
-    seen = sight(CENTER, axis, 0.5)  # nearer to the rims the step would change the face that a ray meets
+    seen = observed(CENTER, axis, 0.5)  # nearer to the rims the step would change the face that a ray meets
     points = seen.points * (1.0 + 0.003 * rng.normal(size=(len(seen.points), 1)))
     rays = unit(seen.rays + rng.uniform(0.0, 0.1, (len(seen.rays), 1)) * (seen.rays - VIEW))  # inside are kinks
     center = CENTER + 0.0001 * rng.normal(size=3)
-    body = (RADIUS, LENGTH / 2)
+    size = (RADIUS, LENGTH / 2)
+    limits = (PARAMETERS.min_facing, PARAMETERS.surface_noise, PARAMETERS.search_steps)
 
     def at(step: Vector) -> tuple[Vector, float]:
-        basis = cylinder._tilts(axis)
+        basis = cylinder.tilt_axes(axis)
         moved = axis + np.cross(step[3] * basis[0] + step[4] * basis[1], axis)
         args = (points, np.full(len(points), 50.0), rays, np.full(len(rays), 50.0), np.zeros(len(rays), bool), 1.0, 1.0)
-        _, gradient, cost = cylinder._equations(*args, center + step[:3], unit(moved), basis, *body, 1e6)
+        _, gradient, cost = cylinder.normal_equations(*args, center + step[:3], unit(moved), basis, *size, 1e6, *limits)
         return gradient, cost
 
     gradient, _ = at(np.zeros(5))
@@ -119,7 +135,7 @@ def test_the_rows_are_the_derivatives(in_image: float, to_camera: float, seed: i
         assert slope == pytest.approx(gradient[k], abs=0.1 * float(np.abs(gradient).max()))
 
 
-def test_exact_sight_gives_the_exact_pose() -> None:
+def test_exact_observations_give_the_exact_pose() -> None:
     """From starts 3 cm and 30 degrees off; nearer to end-on than 70 degrees the way back is not always downhill."""
     rng = np.random.default_rng(0)
     exact, draws = 0, 60
@@ -127,7 +143,7 @@ def test_exact_sight_gives_the_exact_pose() -> None:
         axis = turned(rng.uniform(-180, 180), rng.uniform(-70, 70))
         shift, turn = 0.03 * unit(rng.normal(size=3)), np.deg2rad(30.0) * unit(rng.normal(size=3))
         start = CENTER + shift, Rotation.from_rotvec(turn).apply(axis)
-        millimetres, angle = off(fit(sight(CENTER, axis), *start, RADIUS, LENGTH, COARSE), axis)
+        millimetres, angle = off(fit_cylinder(observed(CENTER, axis), body(*start), COARSE), axis)
         exact += millimetres < 0.2 and angle < 0.3
     assert exact >= 0.95 * draws
 
@@ -136,7 +152,7 @@ def test_exact_sight_gives_the_exact_pose() -> None:
 def test_the_exact_pose_is_a_resting_place(to_camera: float) -> None:
     for in_image in (0.0, 50.0, 90.0, 130.0):
         axis = turned(in_image, to_camera)
-        found = fit(sight(CENTER, axis), CENTER + 0.003, axis + 0.05, RADIUS, LENGTH, COARSE)
+        found = fit_cylinder(observed(CENTER, axis), body(CENTER + 0.003, axis + 0.05), COARSE)
         assert off(found, axis) == pytest.approx((0.0, 0.0), abs=0.2)
 
 
@@ -145,18 +161,18 @@ def test_the_exact_pose_is_a_resting_place(to_camera: float) -> None:
 def test_the_least_distance_along_a_ray_is_that_of_a_search(in_image: float, to_camera: float) -> None:
     axis = turned(in_image, to_camera)
     rays = unit(VIEW + 0.06 * np.random.default_rng(0).normal(size=(60, 3)))
-    misses, far = nearest_on_rays(rays, CENTER, axis, RADIUS, LENGTH)
+    distances, ranges = closest_approaches(rays, body(CENTER, axis))
     exact = nearest(rays, CENTER, axis)
-    np.testing.assert_allclose(misses, exact, atol=1e-4)  # a tenth of a pixel
-    np.testing.assert_allclose(signed(far[:, None] * rays, CENTER, axis), misses, atol=1e-4)
+    np.testing.assert_allclose(distances, exact, atol=1e-4)  # a tenth of a pixel
+    np.testing.assert_allclose(signed(ranges[:, None] * rays, CENTER, axis), distances, atol=1e-4)
 
 
 @settings(max_examples=60)
 @given(degrees, st.floats(-90.0, 90.0))
 def test_rays_that_touch_have_distance_0(in_image: float, to_camera: float) -> None:
     axis = turned(in_image, to_camera)
-    misses, _ = nearest_on_rays(outline_rays(CENTER, axis), CENTER, axis, RADIUS, LENGTH)
-    np.testing.assert_allclose(misses, 0.0, atol=1e-4)
+    distances, _ = closest_approaches(silhouette_rays(CENTER, axis), body(CENTER, axis))
+    np.testing.assert_allclose(distances, 0.0, atol=1e-4)
 
 
 @settings(max_examples=60)
@@ -164,7 +180,7 @@ def test_rays_that_touch_have_distance_0(in_image: float, to_camera: float) -> N
 def test_the_signed_distance_is_the_textbooks(in_image: float, to_camera: float, seed: int) -> None:
     axis = turned(in_image, to_camera)
     for point in CENTER + 0.04 * np.random.default_rng(seed).normal(size=(20, 3)):
-        there, *slope = distance(*point, CENTER, axis, RADIUS, LENGTH / 2)
+        there, *slope = signed_distance(*point, CENTER, axis, RADIUS, LENGTH / 2)
         assert there == pytest.approx(float(signed(point[None], CENTER, axis)[0]), abs=1e-9)
         assert np.linalg.norm(slope) == pytest.approx(1.0)
 
@@ -172,24 +188,22 @@ def test_the_signed_distance_is_the_textbooks(in_image: float, to_camera: float,
 @pytest.mark.parametrize("to_camera", [0.0, 40.0, 80.0, 90.0])
 def test_readings_on_the_front_lie_no_deviation_off(to_camera: float) -> None:
     axis = turned(20.0, to_camera)
-    points = sight(CENTER, axis).points
-    np.testing.assert_allclose(
-        depth_misses(points, np.full(len(points), 0.001), CENTER, axis, RADIUS, LENGTH), 0, atol=1e-6
-    )
+    points = observed(CENTER, axis).points
+    np.testing.assert_allclose(depth_residuals(points, np.full(len(points), 0.001), body(CENTER, axis)), 0, atol=1e-6)
     behind = points * (1.0 + 0.002 / np.linalg.norm(points, axis=1))[:, None]
-    further = depth_misses(behind, np.full(len(points), 0.001), CENTER, axis, RADIUS, LENGTH)
+    further = depth_residuals(behind, np.full(len(points), 0.001), body(CENTER, axis))
     assert np.mean(further > 0.3) > 0.97  # at the rims a ray may hit the one or the other side
 
 
-def test_what_the_sight_leaves_open_stays_open() -> None:
-    """Readings from the middle of the side, and no outline: nothing tells where it lies along its axis."""
+def test_what_the_observation_leaves_open_stays_open() -> None:
+    """Readings from the middle of the side, and no silhouette: nothing tells where it lies along its axis."""
     axis = turned(0.0, 0.0)
-    whole = sight(CENTER, axis)
+    whole = observed(CENTER, axis)
     middle = np.abs((whole.points - CENTER) @ axis) < 0.02
-    part = Sight(
-        whole.points[middle], whole.deviations[middle], np.zeros((0, 3)), np.zeros(0), np.zeros(0, bool), 1.0, 1.0
+    part = Observation(
+        whole.points[middle], whole.point_deviations[middle], np.zeros((0, 3)), np.zeros(0), np.zeros(0, bool), 1.0, 1.0
     )
     along = [
-        np.sqrt(axis @ fit(s, CENTER, axis, RADIUS, LENGTH, COARSE).covariance[:3, :3] @ axis) for s in (whole, part)
+        np.sqrt(axis @ fit_cylinder(s, body(CENTER, axis), COARSE).covariance[:3, :3] @ axis) for s in (whole, part)
     ]
     assert along[0] < 0.001 < 0.03 < along[1]

@@ -9,9 +9,9 @@ from scene import LEFTWARDS, PLACE, Thing, blocks, plug, really, seen
 
 from regrasp.interfaces.cell import KnownCell
 from regrasp.interfaces.frame import RgbdFrame
-from regrasp.perception.camera.registration import FIXED
+from regrasp.perception.camera.registration import FIXED_CAMERA_ERRORS
 from regrasp.perception.pose.estimate import Estimate, NoEstimate
-from regrasp.perception.pose.fused.fused import Fused
+from regrasp.perception.pose.fused.fused import Fused, FusedParameters
 from regrasp.perception.pose.segmentation import NotSeen
 
 Vector = NDArray[np.float64]
@@ -34,8 +34,8 @@ def drawn(panels: list[Thing], seed: int, *others: Thing) -> tuple[RgbdFrame, Ve
     rng = np.random.default_rng(seed)
     center, axis = rng.uniform([0.26, -0.15, 0.20], [0.42, 0.25, 0.45]), rng.normal(size=3)
     axis /= np.linalg.norm(axis)
-    camera = really(REAR_POSE, FIXED, rng)
-    sensor = Sensor(scale=rng.normal(0.0, FIXED.scale))
+    camera = really(REAR_POSE, FIXED_CAMERA_ERRORS, rng)
+    sensor = Sensor(scale=rng.normal(0.0, FIXED_CAMERA_ERRORS.scale))
     return seen([*panels, *plug(center, axis), *others], center, sensor, seed, camera), center, axis
 
 
@@ -56,11 +56,11 @@ def screen(share: float, left: bool) -> Block:
 
 
 def test_anywhere_in_sight_it_is_found_to_millimetres(fused: Fused, panels: list[Thing]) -> None:
-    misses = []
+    errors = []
     for seed in range(25):
         frame, center, axis = drawn(panels, seed)
-        misses.append(off(fused.estimate(frame, REAR_POSE, axis=axis), center, axis))
-    position, angle = np.array(misses).T
+        errors.append(off(fused.estimate(frame, REAR_POSE, axis=axis), center, axis))
+    position, angle = np.array(errors).T
     assert np.mean(position) < 0.002
     assert np.max(position) < 0.006
     assert np.median(angle) < 1.0
@@ -72,11 +72,11 @@ def test_anywhere_in_sight_it_is_found_to_millimetres(fused: Fused, panels: list
 def test_a_half_hidden_one_is_not_drawn_to_its_visible_part(
     fused: Fused, panels: list[Thing], share: float, left: bool
 ) -> None:
-    misses = []
+    errors = []
     for seed in range(6):
         frame = seen([*panels, *plug(), screen(share, left)], seed=seed)
-        misses.append(off(fused.estimate(frame, REAR_POSE)))
-    position, angle = np.median(misses, axis=0)
+        errors.append(off(fused.estimate(frame, REAR_POSE)))
+    position, angle = np.median(errors, axis=0)
     assert (position < 0.008, angle < 4.0) == (True, True), (position, angle)
 
 
@@ -144,6 +144,14 @@ def test_a_flat_piece_on_a_panel_is_refused(fused: Fused, panels: list[Thing], k
     for seed in range(4):
         result = fused.estimate(seen([*panels, sticker, plug_before], at, seed=seed), REAR_POSE)
         assert isinstance(result, NoEstimate)
+
+
+def test_a_technique_takes_its_parameters(known: KnownCell, panels: list[Thing]) -> None:
+    strict = Fused(known, FusedParameters(min_readings=10_000))
+    result = strict.estimate(seen([*panels, *plug()]), REAR_POSE)
+    assert isinstance(result, NoEstimate)
+    assert result.reason is NotSeen.NO_DEPTH
+    assert "10000 are needed" in result.message
 
 
 def test_red_things_beside_it_are_not_mistaken(fused: Fused, panels: list[Thing]) -> None:
