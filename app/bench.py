@@ -48,7 +48,7 @@ def print_bench() -> None:
             "shipped trees checked / parsed by py_trees": tree_checks(),
             "tick of the recovery tree with logs / bare": tree_ticks(),
             "cable torques by numba / numpy and scipy": cable_torques(scenario.cell.hidden.cable.links),
-            f"848x480 picture by {world.renderer.name} / TinyRenderer": rendered_pictures(world),
+            f"848x480 picture by {world.renderer.name} / TinyRenderer": rendering_speed(world),
             **color_techniques(scenario.cell, 848),
             **color_techniques(scenario.cell, 640),
             "848x480 tag to pose / bare OpenCV calls": tag_techniques(848),
@@ -121,7 +121,7 @@ def cable_torques(links: int) -> tuple[Call, Call]:
     return lambda: spring_torques(rotations, rates, stiffness, damping), plain
 
 
-def rendered_pictures(world: World) -> tuple[Call, Call]:
+def rendering_speed(world: World) -> tuple[Call, Call]:
     """The rear camera's picture by the world's renderer and by PyBullet's software renderer."""
     tiny = make_renderer(world.visuals, "tiny")
     spec = world.cell.known.camera("rear")

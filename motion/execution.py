@@ -5,13 +5,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.devices import Arm, Clock, Gripper
 from regrasp.interfaces.trajectory import Trajectory
 from regrasp.motion.failure import PlanningError
 from regrasp.motion.planning.timing import TimingParameters, time_path
 from regrasp.motion.robots.arm_watch import ArmWatch, ArmWatchParameters, remaining_waypoints
-from regrasp.motion.robots.kinematics import FloatArray
 from regrasp.motion.task import MotionTask
 
 

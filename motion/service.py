@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.spatial.transform import RigidTransform
 
+from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.cell import KnownCell
 from regrasp.interfaces.devices import Arm, Clock, Gripper
@@ -20,7 +21,6 @@ from regrasp.motion.planning.carry_paths import CarryPathParameters, can_continu
 from regrasp.motion.planning.planner import PlannerParameters, plan
 from regrasp.motion.planning.straight import straight_line
 from regrasp.motion.robots.arm_offsets import JointOffsetParameters, joint_offsets
-from regrasp.motion.robots.kinematics import FloatArray
 from regrasp.motion.robots.spheres import JAW_OPENING
 from regrasp.motion.scene.collision import Clearances, CollisionModel
 from regrasp.motion.scene.planning_scene import NO_POINTS, PlanningScene, PlanningSceneParameters

@@ -8,10 +8,10 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import RigidTransform
 
+from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cell import KnownCell
 from regrasp.interfaces.devices import Camera, Clock
 from regrasp.interfaces.frame import RgbdFrame
-from regrasp.perception.arrays import FloatArray
 from regrasp.perception.camera.health import CameraHealth, CameraHealthParameters
 from regrasp.perception.camera.model import NEAREST_DEPTH, pixel_rays
 from regrasp.perception.camera.registration import Registration, RegistrationParameters, expected_errors, register

@@ -6,12 +6,12 @@ from regrasp.trees.graph import Node, collapsed, read_graph, recorded
 from regrasp.trees.inputs import check_inputs
 from regrasp.trees.load import TreeError, load_tree
 from regrasp.trees.paths import in_tree_order, node_paths
-from regrasp.trees.run_stats import Execution, NodeStats, executions, run_stats
+from regrasp.trees.run_stats import NodeExecution, NodeStats, executions, run_stats
 from regrasp.trees.show import show_tree
 
 __all__ = [
-    "Execution",
     "Node",
+    "NodeExecution",
     "NodeStats",
     "TreeError",
     "TreeFinding",

@@ -7,7 +7,7 @@ Change = tuple[float, str, str]  # simulated s, path, status: a line of the tick
 
 
 @dataclass(frozen=True, slots=True)
-class Execution:
+class NodeExecution:
     """One execution of a node, in simulated seconds.
 
     Status INVALID: its parent stopped it; RUNNING: it still ran at the log's end.
@@ -19,12 +19,12 @@ class Execution:
     status: str
 
 
-def executions(changes: Iterable[Change]) -> list[Execution]:
+def executions(changes: Iterable[Change]) -> list[NodeExecution]:
     """Every execution of every node in the order of their beginning, from the lines of a tick log in their order.
 
     A node that runs at the end of the log counts as running until the last line.
     """
-    made: list[Execution] = []
+    made: list[NodeExecution] = []
     running: dict[str, int] = {}  # of a path the index of its execution
     now = 0.0
     for now, path, status in changes:
@@ -32,7 +32,7 @@ def executions(changes: Iterable[Change]) -> list[Execution]:
             if status == "INVALID":
                 continue  # the reset of a node that had ended
             running[path] = len(made)
-            made.append(Execution(path, now, now, "RUNNING"))
+            made.append(NodeExecution(path, now, now, "RUNNING"))
         if status != "RUNNING":
             at = running.pop(path)
             made[at] = replace(made[at], ended=now, status=status)

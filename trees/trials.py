@@ -17,7 +17,7 @@ from regrasp.trees.scripted import MAX_TICKS, ScriptedTree
 
 
 @dataclass(frozen=True)
-class TrialParameters:
+class ScriptedTrialParameters:
     """How many trials there are, and how the scripts are drawn."""
 
     seeds: int = 10  # trials with drawn scripts; choice
@@ -27,7 +27,7 @@ class TrialParameters:
     max_stops: int = 100  # per trial; choice: each runs the tree anew
 
 
-_DEFAULTS = TrialParameters()
+_DEFAULTS = ScriptedTrialParameters()
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class ScriptedTrial:
 
 
 def trials(
-    path: Path, leaves: Mapping[str, type] | None = None, parameters: TrialParameters = _DEFAULTS
+    path: Path, leaves: Mapping[str, type] | None = None, parameters: ScriptedTrialParameters = _DEFAULTS
 ) -> Iterator[ScriptedTrial]:
     """The trials of a tree file; `leaves` and errors as for `ScriptedTree`."""
     returns = {at: leaf.RETURNS for at, leaf in ScriptedTrial("", path, {}, leaves).tree().leaves.items()}
@@ -63,7 +63,7 @@ def _ends(returns: frozenset[Status]) -> list[str]:
     return sorted(status.value.lower() for status in returns - {Status.RUNNING}) or ["running"]
 
 
-def _drawn(random: Random, returns: frozenset[Status], parameters: TrialParameters) -> str:
+def _drawn(random: Random, returns: frozenset[Status], parameters: ScriptedTrialParameters) -> str:
     fails, succeeds = _ends(returns)[0], _ends(returns)[-1]
     lengths = parameters.ticks if Status.RUNNING in returns else (1,)
     acts = [
@@ -84,7 +84,7 @@ def never_ends(path: Path, leaves: Mapping[str, type] | None = None) -> Iterator
 
 
 def left_by_a_stop(
-    path: Path, leaves: Mapping[str, type] | None = None, max_stops: int = TrialParameters.max_stops
+    path: Path, leaves: Mapping[str, type] | None = None, max_stops: int = ScriptedTrialParameters.max_stops
 ) -> Iterator[str]:
     """A paragraph for each trial and tick after which a stop of the tree leaves a leaf running or stops it wrongly."""
     for trial in trials(path, leaves):

@@ -29,7 +29,7 @@ ScenarioName = Annotated[
 Seed = Annotated[
     int | None, typer.Option(min=0, max=MAX_SEED, help="Draws every error, noise and jitter; default the scenario's.")
 ]
-Renderer = Annotated[
+RendererOption = Annotated[
     Literal["auto", "moderngl", "tiny"],
     typer.Option(
         help="What draws the cameras' pictures; auto takes OpenGL (moderngl) where it works, else PyBullet's."

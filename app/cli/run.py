@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import regrasp
-from regrasp.app.cli.options import EXIT_UNMET, LogLevel, Renderer, ScenarioName, Seed, Sets, WallLimitSeconds
+from regrasp.app.cli.options import EXIT_UNMET, LogLevel, RendererOption, ScenarioName, Seed, Sets, WallLimitSeconds
 from regrasp.app.cli.progress import shown_progress
 from regrasp.app.cli.run_every import run_every
 from regrasp.app.files.findings import Finding, Findings, shown
@@ -48,7 +48,7 @@ def run_scenario(
     ] = None,
     junit: Annotated[Path | None, typer.Option(metavar="FILE", help="With --all: write JUnit XML, too.")] = None,
     video: Annotated[bool, typer.Option("--video", help="Film the run into the record.")] = False,
-    renderer: Renderer = "auto",
+    renderer: RendererOption = "auto",
     wall_limit: WallLimitSeconds = None,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Check everything, say what would run, and run nothing.")

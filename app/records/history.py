@@ -7,13 +7,13 @@ from dataclasses import replace
 from regrasp.app.records.reader import Event, RunRecord
 from regrasp.app.records.result import Attempt
 from regrasp.interfaces.cause import Cause, CauseCode
-from regrasp.trees import Execution, executions
+from regrasp.trees import NodeExecution, executions
 
 
 class NodeHistory:
     """When each node of a record was executed, and which nodes are below which."""
 
-    def __init__(self, made: Sequence[Execution]) -> None:
+    def __init__(self, made: Sequence[NodeExecution]) -> None:
         self._starts: dict[str, list[float]] = {}
         self._below: dict[str, set[str]] = {}
         for one in made:
@@ -62,7 +62,7 @@ def attempts(record: RunRecord) -> Sequence[Attempt]:
     return [replace(one, ended=record.end) if one.status == "RUNNING" else one for one in told]
 
 
-def attempts_from_ticks(made: Sequence[Execution], events: Iterable[Event]) -> list[Attempt]:
+def attempts_from_ticks(made: Sequence[NodeExecution], events: Iterable[Event]) -> list[Attempt]:
     """The attempts that the result of a run with these executions and events would have (see `Attempts`)."""
     known = NodeHistory(made)
     ticks = {t: number for number, t in enumerate(sorted({t for one in made for t in (one.started, one.ended)}))}
@@ -93,7 +93,7 @@ def _alike(last: Attempt, now: Attempt) -> bool:
     return at_once and now.status in ("SUCCESS", "FAILURE") and (last.status, last.cause) == (now.status, now.cause)
 
 
-def _executions(record: RunRecord) -> list[Execution]:
+def _executions(record: RunRecord) -> list[NodeExecution]:
     return executions((tick.t, tick.path, tick.status) for tick in record.ticks)
 
 

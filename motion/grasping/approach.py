@@ -6,10 +6,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.spatial.transform import RigidTransform
 
+from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cell import Connector
 from regrasp.motion.failure import PlanningError
 from regrasp.motion.grasping.grasps import ApproachParameters, Grasp, GraspParameters, choose_grasp, grasp_candidates
-from regrasp.motion.robots.kinematics import FloatArray
 from regrasp.motion.scene.collision import Clearances, CollisionModel
 
 

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation, Slerp
 
+from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cell import KnownCell, pose_along
-from regrasp.motion.robots.kinematics import FloatArray
 
 
 @dataclass(frozen=True)

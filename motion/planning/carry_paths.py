@@ -6,10 +6,11 @@ from itertools import chain, product
 
 from scipy.spatial.transform import RigidTransform, Rotation, Slerp
 
+from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cell import KnownCell
 from regrasp.motion.planning.cable_path import CablePathParameters, natural_paths
 from regrasp.motion.planning.straight import straight_lines
-from regrasp.motion.robots.kinematics import ArmKinematics, FloatArray
+from regrasp.motion.robots.kinematics import ArmKinematics
 from regrasp.motion.scene.collision import CollisionModel
 
 

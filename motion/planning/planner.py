@@ -10,9 +10,10 @@ import ompl.base as ob
 import ompl.geometric as og
 import ompl.util as ou
 
+from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cause import CauseCode
 from regrasp.motion.failure import PlanningError
-from regrasp.motion.robots.kinematics import LOWER, UPPER, FloatArray
+from regrasp.motion.robots.kinematics import LOWER, UPPER
 from regrasp.motion.scene.collision import CollisionModel
 
 ou.setLogLevel(ou.LOG_NONE)

@@ -5,9 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation, Slerp
 
+from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cause import CauseCode
 from regrasp.motion.failure import PlanningError
-from regrasp.motion.robots.kinematics import ArmKinematics, FloatArray
+from regrasp.motion.robots.kinematics import ArmKinematics
 
 
 def straight_line(

@@ -6,8 +6,9 @@ from itertools import pairwise
 import numpy as np
 from scipy.interpolate import BPoly
 
+from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.trajectory import Trajectory
-from regrasp.motion.robots.kinematics import ACCELERATION_LIMIT, VELOCITY_LIMIT, FloatArray
+from regrasp.motion.robots.kinematics import ACCELERATION_LIMIT, VELOCITY_LIMIT
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import toppra.algorithm
 import toppra.constraint
 from scipy.interpolate import BPoly
 
-from regrasp.motion.robots.kinematics import FloatArray
+from regrasp.interfaces.arrays import FloatArray
 
 toppra.setup_logging("ERROR")
 

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
+from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cell import OPTICAL
 from regrasp.interfaces.frame import Intrinsics
-from regrasp.motion.robots.kinematics import FloatArray
 
 # Steps (right, up) from a main point to its subpoints: the right one first, then downwards and round.
 _SUBPOINTS = ((1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1), (0, 1), (1, 1))

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from regrasp.motion.robots.kinematics import AXES, ArmKinematics, FloatArray, world_spheres
+from regrasp.interfaces.arrays import FloatArray
+from regrasp.motion.robots.kinematics import AXES, ArmKinematics, world_spheres
 from regrasp.motion.robots.spheres import SPHERE_LINKS, spheres_at
 
 

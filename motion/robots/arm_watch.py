@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.fault import JOINT_NAMES
 from regrasp.interfaces.reading import JointReading
 from regrasp.interfaces.trajectory import Trajectory
-from regrasp.motion.robots.kinematics import FloatArray
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from eaik.IK_HP import HPRobot
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
-FloatArray = NDArray[np.float64]
+from regrasp.interfaces.arrays import FloatArray
 
 # Joint origins in the parent link, metres, and rotation axes (0 x, 1 y, 2 z).
 ORIGINS = np.array(

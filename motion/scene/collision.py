@@ -9,8 +9,9 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
+from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cell import Box
-from regrasp.motion.robots.kinematics import LOWER, TOOL_OFFSET, UPPER, ArmKinematics, FloatArray, world_spheres
+from regrasp.motion.robots.kinematics import LOWER, TOOL_OFFSET, UPPER, ArmKinematics, world_spheres
 from regrasp.motion.robots.spheres import CAMERA_ACROSS, CAMERA_RADIUS, JAW_OPENING, SPHERE_LINKS, spheres_at
 from regrasp.motion.scene.distance_grid import FREE_DISTANCE, DistanceGrid
 

@@ -6,10 +6,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.spatial.transform import RigidTransform
 
+from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cell import Connector, KnownCell, WristMount
 from regrasp.interfaces.devices import Arm, Gripper
 from regrasp.interfaces.frame import RgbdFrame
-from regrasp.motion.robots.kinematics import ArmKinematics, FloatArray, InverseKinematicsParameters
+from regrasp.motion.robots.kinematics import ArmKinematics, InverseKinematicsParameters
 from regrasp.motion.scene.collision import ArmBody, CollisionModel, CollisionParameters
 from regrasp.motion.scene.distance_grid import DistanceGrid
 

@@ -8,8 +8,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from regrasp.interfaces.arrays import ColorImage, FloatArray
 from regrasp.interfaces.frame import Intrinsics
-from regrasp.perception.arrays import ColorImage, FloatArray
 
 Channel = TypeVar("Channel", np.uint8, np.float32)
 

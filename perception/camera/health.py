@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from regrasp.interfaces.arrays import DepthImage
 from regrasp.interfaces.frame import RgbdFrame
-from regrasp.perception.arrays import DepthImage
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from regrasp.interfaces.arrays import DepthImage, FloatArray, Mask
 from regrasp.interfaces.frame import Intrinsics
-from regrasp.perception.arrays import DepthImage, FloatArray, Mask
 
 # Depth outside these limits (m) is no reading: RealSense cameras measure from 0.2 to 10.
 NEAREST_DEPTH, FARTHEST_DEPTH = 0.01, 50.0

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
+from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cell import Box, KnownCell, WristMount
 from regrasp.interfaces.frame import RgbdFrame
-from regrasp.perception.arrays import FloatArray
 from regrasp.perception.camera.model import pixel_rays, subsampled
 
 

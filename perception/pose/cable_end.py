@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from regrasp.interfaces.arrays import DepthImage, FloatArray
 from regrasp.interfaces.frame import Intrinsics
-from regrasp.perception.arrays import DepthImage, FloatArray
 from regrasp.perception.camera.model import project
 
 

@@ -4,8 +4,8 @@ import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial.transform import RigidTransform
 
+from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cell import KnownCell
-from regrasp.perception.arrays import FloatArray
 
 
 def cable_course(known: KnownCell, world_from_connector: RigidTransform, spacing: float = 0.01) -> FloatArray:

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
+from regrasp.interfaces.arrays import ColorImage, DepthImage, FloatArray
 from regrasp.interfaces.cell import KnownCell
 from regrasp.interfaces.frame import Intrinsics, RgbdFrame
-from regrasp.perception.arrays import ColorImage, DepthImage, FloatArray
 from regrasp.perception.camera.model import NEAREST_DEPTH, deproject, project
 from regrasp.perception.pose.estimate import DEFAULT_AXIS, Estimate, NoEstimate, pose_covariance
 from regrasp.perception.pose.rgbd import RgbdParameters, min_max_axis, seen_pose, without_outliers

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import RigidTransform
 
-from regrasp.perception.arrays import FloatArray
+from regrasp.interfaces.arrays import FloatArray
 from regrasp.perception.pose.segmentation import NotSeen
 
 # World frame. Decides the sign of the axis where nothing else does: plugs of the cell point to +y.

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 from scipy.stats import chi2
 
-from regrasp.perception.arrays import FloatArray
+from regrasp.interfaces.arrays import FloatArray
 from regrasp.perception.pose.estimate import Estimate
 
 

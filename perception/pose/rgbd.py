@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import RigidTransform
 
+from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cell import KnownCell
 from regrasp.interfaces.frame import RgbdFrame
-from regrasp.perception.arrays import FloatArray
 from regrasp.perception.camera.model import deproject
 from regrasp.perception.pose.estimate import DEFAULT_AXIS, Estimate, NoEstimate, pose_covariance
 from regrasp.perception.pose.segmentation import NoSegment, NotSeen, SegmentationParameters, segment

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from regrasp.perception.arrays import ColorImage, Mask
+from regrasp.interfaces.arrays import ColorImage, Mask
 
 HUE_STEPS, BLUE_HUE = 180, 120  # OpenCV's 8-bit hue counts half degrees
 

@@ -5,9 +5,9 @@ from typing import Literal, Protocol, get_args
 
 from scipy.spatial.transform import RigidTransform
 
+from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cell import KnownCell
 from regrasp.interfaces.frame import RgbdFrame
-from regrasp.perception.arrays import FloatArray
 from regrasp.perception.pose.detector import Detector
 from regrasp.perception.pose.estimate import Estimate, NoEstimate
 from regrasp.perception.pose.fiducial import Fiducial

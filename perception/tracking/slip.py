@@ -6,8 +6,8 @@ from typing import Literal
 
 import numpy as np
 
+from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.reading import GripperReading
-from regrasp.perception.arrays import FloatArray
 
 
 @dataclass(frozen=True)

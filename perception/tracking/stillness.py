@@ -7,8 +7,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from regrasp.interfaces.arrays import ColorImage
 from regrasp.interfaces.frame import RgbdFrame
-from regrasp.perception.arrays import ColorImage
 
 
 @dataclass(frozen=True)

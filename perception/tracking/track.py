@@ -6,7 +6,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from regrasp.perception.arrays import FloatArray
+from regrasp.interfaces.arrays import FloatArray
 from regrasp.perception.pose.estimate import Estimate, NoEstimate
 
 

@@ -8,11 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
-from regrasp.interfaces.arrays import Mask
+from regrasp.interfaces.arrays import DepthImage, Mask
 from regrasp.interfaces.cell import CameraSpec
 from regrasp.interfaces.hidden_world import Errors
-
-DepthImage = NDArray[np.float32]
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from hand import drive, kinematics, nearest, take_hold
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
+from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cell import Box, Cell
 from regrasp.interfaces.devices import Clock
 from regrasp.interfaces.scene import Obstacle, Prop, SceneSetup
@@ -22,7 +23,6 @@ from regrasp.sim.world import World
 
 DRIFT = 1e-4  # m in 3 s
 CREEP = 1e-3  # m in 2 s
-FloatArray = NDArray[np.float64]
 
 
 @pytest.fixture(scope="module")

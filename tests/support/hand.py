@@ -1,9 +1,9 @@
 """What the tests make a hand do: reach the connector, close on it, draw it along a line."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
+from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.trajectory import Trajectory
 from regrasp.motion.grasping.grasps import grasp_candidates
 from regrasp.motion.robots.kinematics import ArmKinematics, wrap
@@ -13,7 +13,6 @@ STANDOFF = 0.06  # m before the grasp
 SHALLOW = 0.006  # m nearer to the finger tips: keeps the pads' corners off the panel behind the plug
 GRIP_FORCE = 20.0  # N a finger
 GENTLE = 0.0005  # m: the jaw closes by so much at speed; from farther the blow alone throws the plug out of its socket
-FloatArray = NDArray[np.float64]
 
 
 def drive(world: World, arm: str, goal: FloatArray, seconds: float) -> None:

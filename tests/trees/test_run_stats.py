@@ -15,7 +15,7 @@ from random_trees import LEAVES, Dice, trees
 from regrasp.app.records.history import attempts_from_ticks
 from regrasp.app.run.attempts import Attempts
 from regrasp.app.run.tick_log import TickLog
-from regrasp.trees import Execution, TreeError, executions, load_tree, run_stats
+from regrasp.trees import NodeExecution, TreeError, executions, load_tree, run_stats
 
 TICK = 0.05
 
@@ -81,7 +81,7 @@ def test_each_round_of_a_loop_is_an_attempt_and_a_guard_s_ticks_are_one() -> Non
 def test_what_runs_when_the_log_ends_has_run_until_its_last_line() -> None:
     lines = [(0.0, "a", "RUNNING"), (0.0, "a/b", "RUNNING"), (2.0, "a/c", "SUCCESS")]
     assert executions(lines) == [
-        Execution("a", 0.0, 2.0, "RUNNING"),
-        Execution("a/b", 0.0, 2.0, "RUNNING"),
-        Execution("a/c", 2.0, 2.0, "SUCCESS"),
+        NodeExecution("a", 0.0, 2.0, "RUNNING"),
+        NodeExecution("a/b", 0.0, 2.0, "RUNNING"),
+        NodeExecution("a/c", 2.0, 2.0, "SUCCESS"),
     ]

@@ -21,7 +21,7 @@ FRESH = 0.2  # s until the camera shows the scene as it is: its first picture is
 
 
 @dataclass(frozen=True)
-class GraspParameters:
+class GraspTrialParameters:
     """When the connector counts as grasped."""
 
     retreat: float = 0.05  # m, straight back after the jaw has closed; choice
@@ -40,7 +40,7 @@ def grasp(
     scene: StudyScene,
     services: Services,
     pose: RigidTransform,
-    parameters: GraspParameters = GraspParameters(),
+    parameters: GraspTrialParameters = GraspTrialParameters(),
 ) -> str:
     """Let the right arm take the connector out of the stand: '' if it could, else why not.
 
@@ -65,7 +65,7 @@ def run_leaf(scene: StudyScene, services: Services, leaf: Leaf) -> str:
     return f"{cause.code.value}: {cause.message}"
 
 
-def _pull_out(services: Services, scene: StudyScene, parameters: GraspParameters) -> str:
+def _pull_out(services: Services, scene: StudyScene, parameters: GraspTrialParameters) -> str:
     motion, truth = services.motion, scene.truth
     start = truth.connector_pose().translation
     back = motion.tool(HANDLING_ARM).rotation.apply([-parameters.retreat, 0.0, 0.0])

@@ -6,9 +6,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from regrasp.interfaces.arrays import DepthImage, FloatArray, Mask
 from regrasp.interfaces.cell import CameraSpec
 from regrasp.interfaces.frame import Intrinsics, RgbdFrame
-from regrasp.perception.arrays import DepthImage, FloatArray, Mask
 from regrasp.perception.camera.model import FARTHEST_DEPTH, NEAREST_DEPTH
 from regrasp.perception.pose.fused.cylinder_fit import Observation
 from regrasp.perception.pose.fused.silhouette import SilhouetteParameters, find_silhouette

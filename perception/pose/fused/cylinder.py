@@ -9,7 +9,7 @@ convex, so along a ray it has one minimum: 0 for a ray that touches the silhouet
 import numba
 import numpy as np
 
-from regrasp.perception.arrays import FloatArray, Mask
+from regrasp.interfaces.arrays import FloatArray, Mask
 
 GOLDEN_RATIO = 0.6180339887498949
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from regrasp.perception.arrays import FloatArray, Mask
+from regrasp.interfaces.arrays import FloatArray, Mask
 from regrasp.perception.pose.fused import cylinder
 
 

@@ -10,9 +10,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.spatial.transform import RigidTransform
 
+from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cell import Box, KnownCell, pose_along
 from regrasp.interfaces.frame import RgbdFrame
-from regrasp.perception.arrays import FloatArray
 from regrasp.perception.camera.registration import (
     CameraErrors,
     Registration,

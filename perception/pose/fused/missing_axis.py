@@ -6,7 +6,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from regrasp.perception.arrays import FloatArray, Mask
+from regrasp.interfaces.arrays import FloatArray, Mask
 from regrasp.perception.camera.model import NEAREST_DEPTH
 from regrasp.perception.pose.fused.blob import Blob
 from regrasp.perception.pose.fused.cylinder_fit import Cylinder

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from regrasp.perception.arrays import FloatArray
+from regrasp.interfaces.arrays import FloatArray
 from regrasp.perception.pose.cable_end import CableEndParameters, cable_leaves
 from regrasp.perception.pose.fused.blob import Blob, rays_through
 from regrasp.perception.pose.fused.cylinder_fit import (

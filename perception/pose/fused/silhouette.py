@@ -12,7 +12,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from regrasp.perception.arrays import DepthImage, FloatArray, Mask
+from regrasp.interfaces.arrays import DepthImage, FloatArray, Mask
 
 CROSS_KERNEL = np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]], np.uint8)
 NEIGHBOURS = ((1, 0), (-1, 0), (0, 1), (0, -1))  # (right, down)

@@ -7,11 +7,11 @@ from toy_record import write_record
 
 from regrasp.app.records.history import attempts, attempts_from_ticks
 from regrasp.app.records.reader import Event, read_record
-from regrasp.trees import Execution, run_stats
+from regrasp.trees import NodeExecution, run_stats
 
 
 def test_a_cause_is_told_by_the_event_of_the_failure() -> None:
-    made = [Execution("a/b", 0.0, 1.0, "FAILURE"), Execution("a/stop", 1.0, 1.3, "FAILURE")]
+    made = [NodeExecution("a/b", 0.0, 1.0, "FAILURE"), NodeExecution("a/stop", 1.0, 1.3, "FAILURE")]
     values = {"code": "slipped", "message": "gap 3 mm"}
     events = [Event(1.0, "failed", "a/b", values), Event(1.3, "failed", "a/stop", values | {"of": "a/b"})]
     causes = [attempt.cause for attempt in attempts_from_ticks(made, events)]
@@ -20,7 +20,7 @@ def test_a_cause_is_told_by_the_event_of_the_failure() -> None:
 
 @pytest.mark.parametrize("values", [{}, {"code": "no such", "message": "x"}, {"code": "slipped", "message": 3}])
 def test_an_event_that_names_no_cause_names_none(values: dict[str, object]) -> None:
-    [attempt] = attempts_from_ticks([Execution("a", 0.0, 1.0, "FAILURE")], [Event(1.0, "failed", "a", values)])
+    [attempt] = attempts_from_ticks([NodeExecution("a", 0.0, 1.0, "FAILURE")], [Event(1.0, "failed", "a", values)])
     assert attempt.cause is None
 
 

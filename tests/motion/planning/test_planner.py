@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform
 
+from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.cell import Box
 from regrasp.motion.failure import PlanningError
 from regrasp.motion.planning.planner import PlannerParameters, plan
-from regrasp.motion.robots.kinematics import ArmKinematics, FloatArray
+from regrasp.motion.robots.kinematics import ArmKinematics
 from regrasp.motion.scene.collision import CollisionModel
 
 KIN = ArmKinematics(RigidTransform.identity())

@@ -6,9 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.trajectory import Trajectory
 from regrasp.motion.planning.timing import TimingParameters, time_path
-from regrasp.motion.robots.kinematics import ACCELERATION_LIMIT, FloatArray
+from regrasp.motion.robots.kinematics import ACCELERATION_LIMIT
 
 STOP_TIME = TimingParameters().stop_time
 paths = st.integers(2, 6).flatmap(lambda k: arrays(float, (k, 6), elements=st.floats(-2, 2, width=32)))

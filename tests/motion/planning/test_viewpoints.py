@@ -5,9 +5,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform
 
+from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cell import Box, KnownCell, WristMount
 from regrasp.motion.planning.viewpoints import SpiralParameters, Viewpoint, spiral
-from regrasp.motion.robots.kinematics import ArmKinematics, FloatArray
+from regrasp.motion.robots.kinematics import ArmKinematics
 from regrasp.motion.scene.collision import ArmBody, CollisionModel
 
 DISTANCE = SpiralParameters().distance

@@ -4,8 +4,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import RigidTransform, Rotation
 
+from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cell import OPTICAL
-from regrasp.motion.robots.kinematics import LOWER, TOOL_OFFSET, UPPER, ArmKinematics, FloatArray, wrap
+from regrasp.motion.robots.kinematics import LOWER, TOOL_OFFSET, UPPER, ArmKinematics, wrap
 
 BASE = RigidTransform.from_components([0.1, -0.2, 0.05], Rotation.from_euler("z", 0.4))
 KIN = ArmKinematics(BASE)

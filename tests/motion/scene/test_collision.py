@@ -6,8 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import RigidTransform
 
+from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cell import Box, KnownCell
-from regrasp.motion.robots.kinematics import LOWER, UPPER, ArmKinematics, FloatArray
+from regrasp.motion.robots.kinematics import LOWER, UPPER, ArmKinematics
 from regrasp.motion.robots.spheres import SPHERE_LINKS, SPHERES
 from regrasp.motion.scene.collision import ArmBody, CollisionModel
 from regrasp.motion.scene.distance_grid import DistanceGrid

@@ -7,15 +7,14 @@ import numpy as np
 import pytest
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 from scipy.stats import chi2
 
+from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cell import pose_along
 from regrasp.perception.pose.estimate import ROLL_VARIANCE, Estimate, pose_covariance
 from regrasp.perception.pose.fusion import FusionParameters, fuse
 
-FloatArray = NDArray[np.float64]
 PLACE, LEFT = np.array([0.4, 0.1, 0.3]), np.array([0.0, 1.0, 0.0])
 SEEDS = st.integers(0, 2**32 - 1)
 COMMON, FAR = FusionParameters().common_share, FusionParameters().max_mahalanobis_sq

@@ -5,10 +5,10 @@ from collections.abc import Iterator
 import numpy as np
 import pybullet as p
 import pytest
-from numpy.typing import NDArray
 from scipy.integrate import solve_bvp
 from scipy.spatial.transform import Rotation
 
+from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cell import Cell
 from regrasp.interfaces.hidden_world import Cable
 from regrasp.interfaces.scene import EARTH_GRAVITY
@@ -20,7 +20,6 @@ STILL = 0.03  # m/s
 SETTLE = 8.0  # s
 FREQUENCY = 0.05  # share of the beam's first frequency
 TINY = 1e-4  # kg
-FloatArray = NDArray[np.float64]
 
 
 def run(cable: CableBody, step: float, seconds: float) -> Iterator[int]:

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 import pybullet as p
 import pytest
-from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
+from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cell import Cell
 from regrasp.sim.cable.fixtures import BodyLink, ClipHold, ClipParameters, Hold, SocketHold
 from regrasp.sim.world import WorldParameters
@@ -16,7 +16,6 @@ STAND_FORCE = WorldParameters().stand_force
 RAMP = 2.0  # N/s
 LET_GO = 1.0  # N around the stated force
 SEATED = 0.0005  # m
-FloatArray = NDArray[np.float64]
 
 
 @dataclass

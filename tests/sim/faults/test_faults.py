@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 from hand import draw, start_to_draw, take_hold
-from numpy.typing import NDArray
 
+from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cell import Cell
 from regrasp.interfaces.fault import AnyFault, JawOpens, PlanningFindsNothing, When
 from regrasp.interfaces.scene import SceneSetup
@@ -12,7 +12,6 @@ from regrasp.sim.faults.effects import Effect
 from regrasp.sim.faults.faults import ScheduledFault, TriggerState
 from regrasp.sim.world import World
 
-FloatArray = NDArray[np.float64]
 SHARE = 0.02  # of the way, late: contacts are looked at every 8 ms
 OPEN_FOR = 1.0  # s
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pybullet as p
 import pytest
-from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
+from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cell import Cell
 from regrasp.interfaces.devices import Arm
 from regrasp.interfaces.hidden_world import Errors
@@ -21,7 +21,6 @@ TOOL_ERROR = 0.005  # m, and by how much the mean over 20 seeds may differ
 TOOL_ERROR_SPREAD = 0.3
 STOP_PLAY = 0.02  # rad past a joint's stop
 HOME = np.zeros(6)
-FloatArray = NDArray[np.float64]
 
 
 def make(cell: Cell, client: int, tool_error: float = 0.0, seed: int = 0) -> SimArm:
