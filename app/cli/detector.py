@@ -43,12 +43,13 @@ def train_detector(
 
     On random pictures of a cell; then it is evaluated. Needs the extra `train` (torch, onnx), some 20 minutes to draw
     the pictures and 80 to learn, and 15 GB of free memory (half with --pictures 16000). Ctrl-C keeps the best network
-    so far. To use it, put its detector.onnx in the place of perception/detector.onnx.
+    so far. To use it, put its detector.onnx in the place of perception/pose/detector.onnx.
 
     \b
     Examples:
       regrasp train-detector --out results/detector
-      regrasp train-detector --out results/more --start perception/detector.onnx
+      regrasp train-detector --out results/more \\
+        --start perception/pose/detector.onnx
     """
     wrong = folders.folder_findings(out)
     if (out / "detector.onnx").exists():
@@ -99,7 +100,7 @@ def evaluate_detector(
 
     \b
     Example:
-      regrasp evaluate-detector perception/detector.onnx --out evaluation.json
+      regrasp evaluate-detector perception/pose/detector.onnx --out evaluation.json
     """
     wrong = folders.file_findings(out, new=True) if out else []
     if out is not None and out.suffix.lower() == ".onnx":

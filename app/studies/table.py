@@ -28,9 +28,8 @@ def _draw_table(
     header: Sequence[str], lines: Sequence[Sequence[str]], widths: Sequence[int], min_first_width: int
 ) -> None:
     console = Console()
-    room = (
-        console.width - min(widths[0], min_first_width) - 4
-    )  # each column has 3 characters around it, the first has 4
+    # Each column has 3 characters around it, the first has 4.
+    room = console.width - min(widths[0], min_first_width) - 4
     shown = 1
     while shown < len(widths) and (room := room - widths[shown] - 3) >= 0:
         shown += 1

@@ -95,7 +95,7 @@ def test_a_demonstration_comes_out(
 
 def test_two_processes_with_one_seed_write_the_same_bytes(tmp_path: Path) -> None:
     """Cut at 20 s: unplugged, slipped, made room, and what a planner draws among it."""
-    command = [sys.executable, "-c", "from app.__main__ import main; main()", "run", "no_obstacle", "--quiet"]
+    command = [sys.executable, "-c", "from regrasp.app.__main__ import main; main()", "run", "no_obstacle", "--quiet"]
     runs = [
         subprocess.Popen(
             [*command, "--set", "limits.sim_seconds=20", "--out", str(tmp_path / name)],

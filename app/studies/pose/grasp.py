@@ -66,6 +66,7 @@ def run_leaf(scene: StudyScene, services: Services, leaf: Leaf) -> str:
 
 
 def _pull_out(services: Services, scene: StudyScene, parameters: GraspTrialParameters) -> str:
+    """Draw the closed jaw straight back: '' if the connector follows and stays held, else what went wrong."""
     motion, truth = services.motion, scene.truth
     start = truth.connector_pose().translation
     back = motion.tool(HANDLING_ARM).rotation.apply([-parameters.retreat, 0.0, 0.0])
