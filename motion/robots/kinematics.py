@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import FloatArray
+from regrasp.interfaces.geometry import rotation_about
 
 # Joint origins in the parent link, metres, and rotation axes (0 x, 1 y, 2 z).
 ORIGINS = np.array(
@@ -208,14 +209,9 @@ class ArmKinematics:
 
 
 def _rolled(tool_target: FloatArray, wanted: FloatArray, roll: float) -> FloatArray:
-    """The tool target turned by `roll` rad about the wanted optical axis through the wanted camera position.
-
-    Rodrigues' formula: R = I + sin(roll) K + (1 - cos(roll)) K^2, where K is the axis's skew-symmetric matrix.
-    """
-    x, y, z = wanted[:3, 2]
-    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    """The tool target turned by `roll` rad about the wanted optical axis through the wanted camera position."""
     turn = np.eye(4)
-    turn[:3, :3] = np.eye(3) + np.sin(roll) * cross + (1 - np.cos(roll)) * cross @ cross
+    turn[:3, :3] = rotation_about(wanted[:3, 2], roll)
     turn[:3, 3] = wanted[:3, 3] - turn[:3, :3] @ wanted[:3, 3]
     return turn @ tool_target
 

@@ -15,6 +15,7 @@ from scipy.spatial.transform import RigidTransform
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cell import Box, KnownCell, WristMount
 from regrasp.interfaces.frame import RgbdFrame
+from regrasp.interfaces.geometry import rotation_about, skew
 from regrasp.perception.camera.model import pixel_rays, subsampled
 
 
@@ -258,21 +259,6 @@ def _first_face(
 
 
 def _rotation_matrix(vector: FloatArray) -> FloatArray:
-    r"""The rotation matrix (3, 3) of a rotation vector (3,) rad, by Rodrigues' formula with the unit axis :math:`k`.
-
-    .. math:: R = I + \sin\theta [k]_\times + (1 - \cos\theta) [k]_\times^2
-    """
+    """The rotation matrix (3, 3) of a rotation vector (3,) rad."""
     angle = float(np.linalg.norm(vector))
-    if angle < 1e-12:
-        return np.eye(3)
-    k = skew(vector / angle)
-    return np.asarray(np.eye(3) + np.sin(angle) * k + (1.0 - np.cos(angle)) * k @ k)
-
-
-def skew(vectors: FloatArray) -> FloatArray:
-    """Matrices (..., 3, 3) that times w give v x w for each v of `vectors` (..., 3)."""
-    x, y, z = np.moveaxis(vectors, -1, 0)
-    out = np.zeros((*vectors.shape, 3))
-    out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -z, y, -x
-    out[..., 1, 0], out[..., 2, 0], out[..., 2, 1] = z, -y, x
-    return out
+    return np.eye(3) if angle < 1e-12 else rotation_about(vector / angle, angle)

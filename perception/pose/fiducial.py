@@ -17,8 +17,9 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cell import TAG_DICTIONARY, Clip, Connector, KnownCell, Tag, WristMount
 from regrasp.interfaces.frame import Intrinsics, RgbdFrame
+from regrasp.interfaces.geometry import skew
 from regrasp.perception.camera.model import pixel_rays, project
-from regrasp.perception.camera.registration import FIXED_CAMERA_ERRORS, WRIST_CAMERA_ERRORS, CameraErrors, skew
+from regrasp.perception.camera.registration import FIXED_CAMERA_ERRORS, WRIST_CAMERA_ERRORS, CameraErrors
 from regrasp.perception.pose.estimate import Estimate, NoEstimate
 from regrasp.perception.pose.segmentation import NotSeen
 
