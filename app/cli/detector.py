@@ -100,7 +100,7 @@ def evaluate_detector(
 
     \b
     Example:
-      regrasp evaluate-detector perception/pose/detector.onnx --out evaluation.json
+      regrasp evaluate-detector my/detector.onnx --out evaluation.json
     """
     wrong = folders.file_findings(out, new=True) if out else []
     if out is not None and out.suffix.lower() == ".onnx":

@@ -24,7 +24,7 @@ def test_the_examples_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsy
     for sentence in (
         "safe_stop True",
         "back_2",
-        "gravity is 'mars'",
+        "expected one of zero, earth",
         "interrupted recovery/mission/unplug",
         "NoEstimate",
     ):
