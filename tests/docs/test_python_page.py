@@ -24,7 +24,7 @@ def test_the_examples_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsy
     for sentence in (
         "safe_stop True",
         "back_2",
-        "expected one of zero, earth",
+        "no 'mars'; there are earth, zero",
         "interrupted recovery/mission/unplug",
         "NoEstimate",
     ):
