@@ -18,19 +18,19 @@ from regrasp.motion.scene.collision import CollisionModel
 
 pytest_plugins = ["pytester", "regrasp.app.pytest_plugin"]
 
-ROOMS = {"app", "behaviors", "interfaces", "motion", "perception", "scenarios", "sim", "trees"}
+PACKAGES = {"app", "behaviors", "interfaces", "motion", "perception", "scenarios", "sim", "trees"}
 
 
-class _NoBareRoom:
+class _NoBareImport:
     """Refuses `import sim`: the checkout's root lies on the path here, and a module would exist twice."""
 
     def find_spec(self, name: str, path: object = None, target: object = None) -> None:
         """As `importlib.abc.MetaPathFinder`."""
-        if name.partition(".")[0] in ROOMS:
+        if name.partition(".")[0] in PACKAGES:
             raise ModuleNotFoundError(f"no module {name}: import regrasp.{name}", name=name)
 
 
-sys.meta_path.insert(0, _NoBareRoom())
+sys.meta_path.insert(0, _NoBareImport())
 
 # A shell starts background jobs with Ctrl-C ignored, and what tests start would inherit that.
 signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -1,1 +1,1 @@
-"""The door: command line, scenario files, the episode loop, results and studies."""
+"""The application: command line, scenario files, the episode loop, results and studies."""

@@ -15,6 +15,8 @@ class Intrinsics:
     A point (x, y, z) of the optical frame (x right, y down, z forward) is projected to
 
     .. math:: u = f_x x / z + c_x, \quad v = f_y y / z + c_y
+
+    Raises ValueError unless width, height, fx and fy are positive.
     """
 
     width: int
@@ -24,9 +26,18 @@ class Intrinsics:
     cx: float
     cy: float
 
+    def __post_init__(self) -> None:
+        if not (self.width >= 1 and self.height >= 1 and self.fx > 0 and self.fy > 0):
+            raise ValueError(f"{self}: width, height, fx and fy must be positive")
+
     @classmethod
     def from_fov(cls, width: int, height: int, horizontal_fov: float) -> "Intrinsics":
-        """Intrinsics with square pixels and the principal point in the middle; `horizontal_fov` in radians."""
+        """Intrinsics with square pixels and the principal point in the middle; `horizontal_fov` in radians.
+
+        Raises ValueError unless it lies between 0 and pi.
+        """
+        if not 0.0 < horizontal_fov < np.pi:
+            raise ValueError(f"horizontal_fov is {horizontal_fov!r} rad; expected more than 0 and less than pi")
         f = 0.5 * width / float(np.tan(0.5 * horizontal_fov))
         return cls(width, height, f, f, (width - 1) / 2, (height - 1) / 2)
 
@@ -63,6 +74,8 @@ class RgbdFrame:
 
 
 def _expect(name: str, image: NDArray[np.generic], shape: tuple[int, ...], dtype: type[np.generic]) -> None:
+    if not isinstance(image, np.ndarray):
+        raise ValueError(f"{name} is a {type(image).__name__}; expected a numpy array {shape} {np.dtype(dtype)}")
     if image.shape != shape or image.dtype != dtype:
         wanted = f"{shape} {np.dtype(dtype)}"
         raise ValueError(f"{name} is {image.shape} {image.dtype}, the intrinsics and the format ask for {wanted}")

@@ -86,7 +86,7 @@ class Execution:
         """Steps that bring an arm along a joint path (k, 6) rad, at `speed` in (0, 1] of the joints' limits.
 
         An arm that falls behind is stopped and led on, slower each time. Raises PlanningError ARM_FAILED when it never
-        follows or reads what cannot be, and MOTION_BLOCKED when it ends off its goal.
+        follows or its encoder readings are implausible, and MOTION_BLOCKED when it ends off its goal.
         """
         moved = self._watches[arm].moved_alone(self._arms[arm].reading())
         if moved is not None:

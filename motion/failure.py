@@ -1,4 +1,4 @@
-"""The error of this room: no motion was found, or an arm cannot carry it out."""
+"""The error of motion planning and execution: no motion was found, or an arm cannot carry it out."""
 
 from regrasp.interfaces.cause import CauseCode
 

@@ -182,7 +182,7 @@ class Motion(PlanningScene):
             self.execution.halt(arm)
 
     def give_up(self, arm: str, code: CauseCode, message: str) -> PlanningError:
-        """Put an arm or its jaw out of order: every later request to it fails with this cause. The error to raise."""
+        """Disable an arm or its jaw: every later request to it fails with this cause. Returns the error to raise."""
         return self.execution.give_up(arm, code, message)
 
     def _check_shift(self, model: CollisionModel, path: FloatArray, length: float) -> None:

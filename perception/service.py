@@ -120,7 +120,7 @@ class Perception:
     def map_obstacles(self, camera: str) -> int:
         """Take the newest frame into the occupancy map, by the registered camera; the number of full voxels.
 
-        Only the rear camera's look guesses what lies behind a surface: looks from the side would put it beside.
+        Only the rear camera guesses what lies behind a surface: from the side the guess would lie beside the obstacle.
         """
         frame = self.frame(camera)
         if frame is not None:

@@ -5,8 +5,11 @@ docs/python.md shows it at work. What is not named in `__all__` may change witho
 
 from __future__ import annotations
 
+import os
+import sys
 from collections.abc import Sequence
 from pathlib import Path
+from threading import Lock
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 if TYPE_CHECKING:  # at run time `__getattr__` brings these when they are asked for: `import regrasp` costs nothing
@@ -73,6 +76,9 @@ class StopRequest(Protocol):
         """Whether the run shall stop."""
 
 
+_running = Lock()  # py_trees keeps one blackboard a process
+
+
 def load_scenario(scenario: str | Path, overrides: Sequence[str] = (), case: str | None = None) -> Scenario:
     """Read and check one case of a scenario, with the cell and the tree that it names.
 
@@ -83,17 +89,20 @@ def load_scenario(scenario: str | Path, overrides: Sequence[str] = (), case: str
 
     Raises:
         Findings: something in the files or the overrides is wrong; `items` names all of it with file and line.
+        TypeError: an argument is of another type.
     """
     from regrasp.app.scenario.load import load_scenario
 
-    return load_scenario(str(scenario), overrides, case)
+    if not (case is None or isinstance(case, str)):
+        raise TypeError(f"case is {case!r}; expected a case's name, such as 'gravity=earth'")
+    return load_scenario(_name(scenario), _texts(overrides), case)
 
 
 def load_cases(scenario: str | Path, overrides: Sequence[str] = ()) -> list[Scenario]:
     """Read and check every case of a scenario; arguments and errors as in `load_scenario`."""
     from regrasp.app.scenario.load import cases
 
-    return cases(str(scenario), overrides)
+    return cases(_name(scenario), _texts(overrides))
 
 
 def run(
@@ -108,7 +117,7 @@ def run(
     on_event: OnEvent | None = None,
     stop: StopRequest | None = None,
 ) -> Result:
-    """Run a scenario to its end, in this process. One run at a time: py_trees keeps one blackboard a process.
+    """Run a scenario to its end, in this process, which does one run at a time.
 
     Args:
         scenario: a loaded one, or what `load_scenario` takes.
@@ -125,13 +134,24 @@ def run(
     Raises:
         Findings: the scenario is wrong, or the folder cannot take a record.
         Interrupted: Ctrl-C; the record is complete. While the world is still being built, a plain KeyboardInterrupt.
+        RuntimeError: another run is under way in this process.
+        TypeError, ValueError: another argument is wrong.
         Exception: what a callback raised, once the record is complete.
     """
     from regrasp.app.interrupts import late_imports
+    from regrasp.app.records.folders import run_folder_findings
 
     loaded = load_scenario(scenario) if isinstance(scenario, (str, Path)) else scenario
-    if video and out is None:
+    folder = None if out is None else Path(out)
+    _check_run(loaded, seed, renderer, on_tick, on_event, stop)
+    if video and folder is None:
         raise ValueError("video is filmed into the record; name a folder with out")
+    if folder is not None and (found := run_folder_findings(folder)):
+        from regrasp.app.files.findings import Findings
+
+        raise Findings(found)
+    if gui and not has_display():
+        raise ValueError("gui needs a display, and DISPLAY is not set; film with video")
     with late_imports():
         from regrasp.app.run.episode import run_episode  # brings the planner, the compiler and the physics: seconds
         from regrasp.app.run.observers import Observers
@@ -151,10 +171,12 @@ def run(
         if stop is not None and stop.is_set():
             raise KeyboardInterrupt
 
+    if not _running.acquire(blocking=False):
+        raise RuntimeError("a run is under way in this process; start another process for a second one")
     try:
         result = run_episode(
             loaded,
-            None if out is None else Path(out),
+            folder,
             seed=loaded.file.seed if seed is None else seed,
             video=video,
             gui=gui,
@@ -162,11 +184,47 @@ def run(
             observers=Observers(tick=tick, event=lambda event: call(on_event, event)),
         )
     finally:
+        _running.release()
         if failures:
             raise failures[0]
     if result.outcome in ("interrupted", "wall_limit") and not (stop is not None and stop.is_set()):
         raise Interrupted(result)
     return result
+
+
+def has_display() -> bool:
+    """Whether PyBullet's window can be shown here."""
+    return sys.platform != "linux" or bool(os.environ.get("DISPLAY"))
+
+
+def _check_run(scenario: Any, seed: Any, renderer: Any, on_tick: Any, on_event: Any, stop: Any) -> None:
+    """Raises TypeError or ValueError for arguments of `run` that would fail later, or not at all."""
+    from regrasp.app.scenario.load import Scenario
+    from regrasp.app.scenario.schema import MAX_SEED
+
+    if not isinstance(scenario, Scenario):
+        raise TypeError(f"scenario is {scenario!r}; expected a name, a path or what load_scenario returns")
+    if seed is not None and (not isinstance(seed, int) or isinstance(seed, bool) or not 0 <= seed <= MAX_SEED):
+        raise ValueError(f"seed is {seed!r}; expected a whole number from 0 to {MAX_SEED}")
+    if renderer not in ("auto", "moderngl", "tiny"):
+        raise ValueError(f"renderer is {renderer!r}; expected auto, moderngl or tiny")
+    for name, callback in {"on_tick": on_tick, "on_event": on_event}.items():
+        if not (callback is None or callable(callback)):
+            raise TypeError(f"{name} is {callback!r}; expected a function")
+    if not (stop is None or callable(getattr(stop, "is_set", None))):
+        raise TypeError(f"stop is {stop!r}; expected a threading.Event")
+
+
+def _name(scenario: Any) -> str:
+    if not isinstance(scenario, (str, Path)):
+        raise TypeError(f"scenario is {scenario!r}; expected a name or a path")
+    return str(scenario)
+
+
+def _texts(overrides: Any) -> Sequence[str]:
+    if isinstance(overrides, str) or not all(isinstance(text, str) for text in overrides):
+        raise TypeError(f"overrides is {overrides!r}; expected a list of texts, such as ['gravity=earth']")
+    return tuple(overrides)
 
 
 def read_record(folder: str | Path) -> RunRecord:
@@ -192,7 +250,7 @@ def load_cell(cell: str | Path = "thesis", overrides: Sequence[str] = ()) -> Cel
     from regrasp.app.files.resources import resolve
     from regrasp.app.scenario.cell_file import load_cell
 
-    assignments, wrong = parse_overrides(overrides)
+    assignments, wrong = parse_overrides(_texts(overrides))
     if wrong:
         from regrasp.app.files.findings import Findings
 
@@ -214,9 +272,12 @@ def load_frame(
 
     Raises:
         Findings: a file cannot be read, or they do not fit together.
+        ValueError: `depth_unit` is not positive.
     """
     from regrasp.app.frames.frame_files import read_frame
 
+    if not depth_unit > 0:
+        raise ValueError(f"depth_unit is {depth_unit!r}; expected metres, more than 0")
     return read_frame(Path(rgb), None if depth is None else Path(depth), Path(intrinsics), unit=depth_unit)
 
 
@@ -225,7 +286,7 @@ def estimate_pose(
     world_from_camera: RigidTransform | None = None,
     *,
     technique: Literal["rgbd", "fiducial", "detector", "fused"] = "fused",
-    cell: Cell | None = None,
+    cell: Cell | str | Path = "thesis",
 ) -> Estimate | NoEstimate:
     """Find the connector in a frame.
 
@@ -234,20 +295,25 @@ def estimate_pose(
         world_from_camera: where the camera stands (x right, y down, z forward). Without it the pose is told in the
             camera's frame, and the cell's floor and panels are not used.
         technique: how; app/studies/pose/POSE.md compares them.
-        cell: says how long, how thick and of which colour the connector is; by default the cell "thesis".
+        cell: says how long, how thick and of which colour the connector is; or what `load_cell` takes.
 
     Returns:
         A pose with its covariance, or the reason why there is none.
 
     Raises:
-        ValueError: the cell lacks what the technique needs, such as a tag on the connector.
+        ValueError: no such technique, or the cell lacks what it needs, such as a tag on the connector.
+        TypeError: an argument is of another type.
     """
     from scipy.spatial.transform import RigidTransform
 
     from regrasp.app.frames.perceive import without_boxes
     from regrasp.perception.pose.technique import make_technique
 
-    known = (cell or load_cell()).known
+    known = (load_cell(cell) if isinstance(cell, (str, Path)) else cell).known
+    if world_from_camera is not None and not (
+        isinstance(world_from_camera, RigidTransform) and world_from_camera.single
+    ):
+        raise TypeError(f"world_from_camera is {world_from_camera!r}; expected one scipy RigidTransform")
     if world_from_camera is None:
         return make_technique(technique, without_boxes(known)).estimate(frame, RigidTransform.identity())
     return make_technique(technique, known).estimate(frame, world_from_camera)

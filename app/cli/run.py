@@ -2,7 +2,6 @@
 
 import math
 import os
-import sys
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -72,7 +71,7 @@ def run_scenario(
     overrides = [*(sets or []), *([] if seed is None else [f"seed={seed}"])]
     twice = seed is not None and any(text.partition("=")[0].strip() == "seed" for text in sets or [])
     wrong = [Finding("--seed", 0, "the seed is given by --set, too; leave one out")] if twice else []
-    wrong += [] if not gui or _display() else [_NO_DISPLAY]
+    wrong += [] if not gui or regrasp.has_display() else [_NO_DISPLAY]
     if every:
         wrong += _given("is for a single case; leave --all out", case=case, gui=gui, log_level=log_level)
         if dry_run:
@@ -159,10 +158,6 @@ def _given(message: str, **options: object) -> list[Finding]:
 _NO_DISPLAY = Finding(
     "--gui", 0, "there is no display here (DISPLAY is not set); run without it, and film with --video"
 )
-
-
-def _display() -> bool:
-    return sys.platform != "linux" or bool(os.environ.get("DISPLAY"))
 
 
 def exit_code(result: "Result") -> int:

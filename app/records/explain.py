@@ -15,7 +15,7 @@ REPORT_WIDTH = 100  # columns of a page in a test report
 def explanation(record: RunRecord, width: int, last_events: int = 8) -> str:
     """The page, in lines of about `width` columns, without control characters.
 
-    Of a run without a result the `last_events` last events are shown.
+    For a run without a result it shows the last `last_events` events.
     """
     page = _unfinished(record, width, last_events) if record.result is None else _finished(record, record.result, width)
     return "\n".join(printable(line).rstrip() for line in page) + "\n"

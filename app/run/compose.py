@@ -1,4 +1,4 @@
-"""Who gets what: the world of a scenario and seed, the robot's services in it, the tree over them, the judge beside."""
+"""Puts a run together: the world of a scenario and seed, the robot's services, the tree, and the judge."""
 
 from dataclasses import dataclass
 from typing import Any

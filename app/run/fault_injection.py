@@ -1,4 +1,4 @@
-"""Injects the faults of the robot's software, and tells the world of entered nodes, at which other faults begin."""
+"""Injects faults into the robot's services, and reports entered nodes to the world, whose faults they may trigger."""
 
 from collections.abc import Callable, Iterable
 from typing import Any

@@ -1,4 +1,4 @@
-"""Who looks on while an episode runs."""
+"""Callbacks while an episode runs."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,1 +1,1 @@
-"""What each task brings to the door: its judge and its words."""
+"""Per task: what counts as success, and what the record tells of the robot's belief."""

@@ -47,8 +47,8 @@ class MakeRoom(HandLeaf):
 class WaitUntilStill(HandLeaf):
     """RUNNING while the rear camera sees anything move; FAILURE after `time_limit` seconds.
 
-    A thing that came into the cell meanwhile is then mapped. Without a sound rear camera it waits as long as a cable
-    swings at most. Without any sound camera it ends in FAILURE: the end could not be found.
+    A thing that came into the cell meanwhile is then mapped. Without a working rear camera it waits the longest
+    swing time. Without any working camera it ends in FAILURE: the end could not be found.
     """
 
     parameters: ClassVar[WaitUntilStillParameters] = WaitUntilStillParameters()

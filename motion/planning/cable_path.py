@@ -1,6 +1,6 @@
 """Paths on which a held connector keeps to the shapes that its cable takes by itself.
 
-A cable clamped at its plugged end is stiff along itself. A hand that takes a short cut buckles it, with ten newtons and
+A cable clamped at its plugged end is axially stiff. A hand that takes a short cut buckles it, with ten newtons and
 half a newton metre at the stiffness of the Earth tests, and the connector turns in the jaw. A hand that keeps the free
 end's distance and direction feels a tenth of that.
 """

@@ -37,7 +37,7 @@ class ArmWatch:
         self._resting_at = joints
 
     def moved_alone(self, reading: JointReading) -> str | None:
-        """A sentence when the arm is no longer where it was left, else None."""
+        """A message if the arm is no longer where it was left, else None."""
         if self._resting_at is None:
             return None
         return self._beyond(
@@ -45,7 +45,7 @@ class ArmWatch:
         )
 
     def jumped(self, reading: JointReading) -> str | None:
-        """A sentence when this reading and the one before it contradict each other, else None.
+        """A message if this reading and the one before it contradict each other, else None.
 
         Between two readings a joint turns no further than the faster of its two velocities allows.
         """
@@ -58,7 +58,7 @@ class ArmWatch:
         return self._beyond(excess, self._parameters.jump, "more than it turned")
 
     def off_trajectory(self, reading: JointReading, trajectory: Trajectory, elapsed: float) -> str | None:
-        """A sentence when the arm is not where the trajectory is after `elapsed` s, else None."""
+        """A message if the arm is not where the trajectory is after `elapsed` s, else None."""
         error = reading.positions - trajectory.sample(elapsed)[0]
         return self._beyond(error, self._parameters.tracking_error, "off its trajectory")
 
@@ -67,7 +67,7 @@ class ArmWatch:
         if abs(error[worst]) <= limit:
             return None
         joint = JOINT_NAMES[worst].replace("_", " ")
-        return f"the {self._name} arm's {joint} reads {abs(error[worst]):.2f} rad {what}, limit {limit:.2f}"
+        return f"the {self._name} arm's {joint} reads {abs(error[worst]):.3f} rad {what}, limit {limit:.3f}"
 
 
 def remaining_waypoints(path: FloatArray, reached: FloatArray) -> FloatArray:

@@ -11,7 +11,7 @@ FREE_DISTANCE = 10.0  # metres; what a grid says where nothing is occupied
 
 @dataclass(frozen=True, eq=False)
 class DistanceGrid:
-    """Distances (m) to the nearest occupied voxel's centre; nowhere inside a voxel more than the true distance.
+    """Distances (m) to the nearest occupied voxel's centre; what is looked up never exceeds the true distance.
 
     `distance` (nx, ny, nz) float32 m; `lower` (3,) m is the corner of voxel (0, 0, 0) in the world; `h` m is a voxel's
     edge. Outside the grid nothing is known to be occupied. Unseen space counts as free unless it is marked as occupied.

@@ -47,7 +47,7 @@ class RegistrationParameters:
     behind_distance: float = 0.03  # m behind a face, from which the camera seems to look through it
     max_behind_share: float = 0.2  # of the readings on faces; noise makes no such share
     min_readings: int = 30  # fewer correct nothing
-    depth_noise: float = 0.0035  # m at the panels, 0.86 m away: 0.004, less an eighth that the weights make up for
+    depth_noise: float = 0.0035  # m at the panels, 0.86 m away; an eighth under the true 0.004: robust weights widen it
     fixed_errors: CameraErrors = FIXED_CAMERA_ERRORS  # to expect of a camera that is fixed in the cell
     wrist_errors: CameraErrors = WRIST_CAMERA_ERRORS  # to expect of a camera that an arm carries
 

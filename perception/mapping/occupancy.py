@@ -83,8 +83,8 @@ class Occupancy:
         """Take in a frame. Depth readings near the `ignore` spheres, which stand for the arms, are no obstacles.
 
         Each voxel in view is compared with the reading on its pixel: before it the voxel is free, at it a surface.
-        With `guess_behind`, voxels up to the assumed depth behind it count as full until a look shows otherwise. A look
-        overrules a guess, and another look unless that was from much closer.
+        With `guess_behind`, voxels up to the assumed depth behind it count as full until a reading shows otherwise. A
+        reading replaces a guess, and an older reading unless that was taken from much closer.
         """
         step = self._parameters.pixel_step
         k = subsampled(frame.intrinsics, step)

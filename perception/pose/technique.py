@@ -46,4 +46,6 @@ def make_technique(name: TechniqueName, known: KnownCell) -> Technique:
         "detector": Detector,
         "fused": Fused,
     }
+    if name not in makers:
+        raise ValueError(f"no technique {name!r}; there are {', '.join(TECHNIQUES)}")
     return makers[name](known)

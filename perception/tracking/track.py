@@ -31,7 +31,7 @@ class TrackState(StrEnum):
 
 @dataclass(frozen=True)
 class TrackHealth:
-    """The thesis's three checks: the connector's frame exists, is fresh, is live. `reason` is a sentence."""
+    """The thesis's three checks: a pose exists, it is fresh, and it is live (it changes from frame to frame)."""
 
     exists: bool
     fresh: bool

@@ -13,7 +13,7 @@ class PhaseParameters:
     """When a phase has begun."""
 
     carried_distance: float = 0.10  # m from the socket: the held connector counts as carried; about its own length
-    lost_seconds: float = 0.2  # without a touch of any pad, clip or socket: it is really lost, not regripped
+    lost_seconds: float = 0.2  # without contact with a pad, clip or socket; a shorter gap is a regrip
     still_speed: float = 0.01  # m/s; a connector no faster than this ...
     still_seconds: float = 1.0  # ... for so long has settled
 

@@ -38,7 +38,7 @@ class DepthNoise:
     camera in front of a static scene. Draws are keyed by seed, camera and frame number.
 
     The rest of the noise is the sum of two periodic tiles of unit-variance smooth Gaussian noise, each shifted by a
-    random offset in each frame. Over the frames a pixel so samples the whole tiles: mean 0 and variance 1 as with
+    random offset in each frame. Over many frames each pixel samples the whole tiles: mean 0 and variance 1 as with
     independent draws. Two frames are independent unless the shifts of a tile come within some 8 pixels of each other
     (1 pair in 2,000).
     """

@@ -7,6 +7,7 @@ import threading
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import regrasp
@@ -96,6 +97,75 @@ def test_what_a_callback_raises_comes_out(resting: regrasp.Scenario, tmp_path: P
 def test_a_film_wants_a_folder(resting: regrasp.Scenario) -> None:
     with pytest.raises(ValueError, match="name a folder with out"):
         regrasp.run(resting, video=True)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "sentence"),
+    [
+        ({"seed": -1}, "seed is -1; expected a whole number from 0"),
+        ({"seed": True}, "seed is True; expected a whole number"),
+        ({"seed": "x"}, "seed is 'x'; expected a whole number"),
+        ({"renderer": "vulkan"}, "renderer is 'vulkan'; expected auto, moderngl or tiny"),
+        ({"on_tick": 3}, "on_tick is 3; expected a function"),
+        ({"stop": True}, "stop is True; expected a threading.Event"),
+    ],
+)
+def test_a_wrong_argument_is_told_before_anything_is_made(
+    resting: regrasp.Scenario, tmp_path: Path, wrong: dict[str, Any], sentence: str
+) -> None:
+    with pytest.raises((TypeError, ValueError), match=sentence):
+        regrasp.run(resting, out=tmp_path / "run", **wrong)
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_folder_that_cannot_take_a_record_is_told(resting: regrasp.Scenario, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("mine")
+    with pytest.raises(regrasp.Findings, match="is no folder; name another place"):
+        regrasp.run(resting, out=tmp_path / "file" / "run")
+    with pytest.raises(regrasp.Findings, match="file"):
+        regrasp.run(resting, out=tmp_path / "file")
+
+
+def test_a_window_wants_a_display(resting: regrasp.Scenario, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("regrasp.has_display", lambda: False)
+    with pytest.raises(ValueError, match="gui needs a display"):
+        regrasp.run(resting, gui=True)
+
+
+def test_a_second_run_in_the_same_process_is_refused(resting: regrasp.Scenario) -> None:
+    def another(_seconds: float, _leaf: str) -> None:
+        regrasp.run(resting)
+
+    with pytest.raises(RuntimeError, match="start another process"):
+        regrasp.run(resting, on_tick=another)
+    assert regrasp.run(resting).succeeded
+
+
+def test_wrong_types_are_told() -> None:
+    with pytest.raises(TypeError, match=r"overrides is 'gravity=earth'; expected a list of texts"):
+        regrasp.load_scenario("no_obstacle", "gravity=earth")
+    with pytest.raises(TypeError, match="case is 3"):
+        regrasp.load_scenario("no_obstacle", case=3)  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match="scenario is None"):
+        regrasp.run(None)  # type: ignore[arg-type]
+
+
+def test_a_pose_is_asked_for_with_right_arguments() -> None:
+    camera = regrasp.Intrinsics.from_fov(64, 48, 1.2)
+    frame = regrasp.RgbdFrame("mine", 0, 0.0, np.zeros((48, 64, 3), np.uint8), np.zeros((48, 64), np.float32), camera)
+    assert isinstance(regrasp.estimate_pose(frame, cell="thesis"), regrasp.NoEstimate)
+    with pytest.raises(ValueError, match="no technique 'nope'; there are rgbd, fiducial, detector, fused"):
+        regrasp.estimate_pose(frame, technique="nope")  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="tag"):
+        regrasp.estimate_pose(frame, technique="fiducial")
+    with pytest.raises(TypeError, match="expected one scipy RigidTransform"):
+        regrasp.estimate_pose(frame, np.eye(4))  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="less than pi"):
+        regrasp.Intrinsics.from_fov(640, 480, 70.0)
+    with pytest.raises(ValueError, match="must be positive"):
+        regrasp.Intrinsics(640, 480, -600.0, 600.0, 320.0, 240.0)
+    with pytest.raises(ValueError, match="depth is a NoneType; expected a numpy array"):
+        regrasp.RgbdFrame("mine", 0, 0.0, np.zeros((48, 64, 3), np.uint8), None, camera)  # type: ignore[arg-type]
 
 
 def test_wrong_values_of_a_cell_are_told() -> None:

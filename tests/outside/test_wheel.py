@@ -87,8 +87,8 @@ def test_all_that_is_shipped_is_there(environment: Path, project: Path) -> None:
     assert "unplug" in run(project, environment / "regrasp", "trees", "show", "recovery")
 
 
-def test_every_file_of_the_rooms_is_in_the_wheel(environment: Path) -> None:
+def test_every_file_of_ours_is_in_the_wheel(environment: Path) -> None:
     installed = Path(sysconfig.get_path("purelib", vars={"base": str(environment.parent)})) / "regrasp"
-    rooms = {path.name for path in (ROOT / "regrasp").iterdir() if path.is_symlink()}
-    wanted = [name for name in tracked() if name.partition("/")[0] in rooms]
+    packages = {path.name for path in (ROOT / "regrasp").iterdir() if path.is_symlink()}
+    wanted = [name for name in tracked() if name.partition("/")[0] in packages]
     assert [name for name in wanted if not (installed / name).is_file()] == []

@@ -1,1 +1,1 @@
-"""The cable task: its judge, and the robot's belief for the record."""
+"""The cable task: expectations, the judge of them by ground truth, and the robot's belief for the record."""

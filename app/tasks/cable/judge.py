@@ -21,7 +21,7 @@ class JudgeParameters:
 
     hold_seconds: float = 0.5  # with both pads in touch: a hand that closes beside its middle may push it away again
     slide_distance: float = 0.003  # m in the jaw ...
-    slide_seconds: float = 0.5  # ... within this time: a squeezed connector crept so for 1 s before it sprang out
+    slide_seconds: float = 0.5  # ... within this time: a squeezed connector slid so slowly for 1 s, then slipped out
 
 
 class GripWatch:
@@ -52,7 +52,7 @@ class Judge:
         self._was_held = False
         self._held_since: float | None = None  # since when both pads touch it
         self._grip = GripWatch(parameters)
-        self._unheld_at: float | None = None  # since when both pads touch it no more, or when it began to slide before
+        self._unheld_at: float | None = None  # when it lost a pad's contact or, if that was earlier, began to slide
         self._untouched_at: float | None = None  # since when no pad touches it
         self._still_since: float | None = None
         self.grasps = 0  # how often the hand has grasped it

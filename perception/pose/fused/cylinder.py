@@ -60,8 +60,8 @@ def _point_residual(
 ) -> tuple[float, float]:
     """How far (m) a reading lies behind the body on its ray, and the deviation of that.
 
-    `gradient` (3,) becomes minus its derivative by the body's centre. If the ray misses the body, the residual is the
-    reading's distance from the body.
+    `gradient` (3,) receives the negative derivative with respect to the body's centre. If the ray misses the body, the
+    residual is the reading's distance from the body.
     """
     out = np.sqrt(point[0] ** 2 + point[1] ** 2 + point[2] ** 2)
     x, y, z = point[0] / out, point[1] / out, point[2] / out

@@ -22,7 +22,7 @@ class PlausibilityParameters:
     """Limits of a plausible fit. Of 140 renders in all poses, up to 70 % hidden, 139 stay within all of them."""
 
     max_silhouette_residual: float = 0.5  # px, median over the silhouette
-    max_stray_share: float = 0.3  # of the silhouette, more than a pixel off: a cable before the body makes as much
+    max_stray_share: float = 0.3  # of the silhouette, more than a pixel off: a cable in front causes this much
     max_median_depth_residual: float = 1.2  # deviations, median of the depth residuals
     max_depth_residual_p80: float = 2.2  # deviations, 80th percentile of the depth residuals
     # rad; choice: a cylinder seen so nearly along its axis shows a disc, as a ball does
@@ -35,7 +35,7 @@ class PlausibilityParameters:
     end_distance: float = 0.004  # m; silhouette points so near to an end belong to it
     min_end_points: int = 4  # silhouette points that show that the end is in sight
     min_side_points: int = 3  # silhouette points on either side of the axis that show how thick the body is
-    # Radii, of the visible length. Connectors that are 70 % hidden have readings on 19 mm, bits of other things on 17.
+    # Radii, of the visible length. Connectors that are 70 % hidden show 19 mm, fragments of other objects 17 mm.
     min_length_radii: float = 1.8
 
 
@@ -94,7 +94,7 @@ def visible_ends(
 ) -> tuple[bool, list[bool | None]]:
     """Whether an end is in sight, so that the length gives the centre; and whether the cable leaves either end.
 
-    The ends are the one against the axis, and the one along it; see `cable_leaves` for None.
+    Order: the end at minus the axis, then the end at plus the axis. None: the frame does not tell; see `cable_leaves`.
     """
     along = _from_center(blob, body, fit_parameters) @ body.axis
     seen, leaves = [], []

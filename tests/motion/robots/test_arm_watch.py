@@ -26,7 +26,7 @@ def turn(seconds: float, angle: float) -> Trajectory:
 def test_an_arm_off_its_trajectory_is_said_with_joint_and_numbers(off: float, said: bool) -> None:
     sentence = ArmWatch("right").off_trajectory(reading(1.0, 0.5 + off), turn(2.0, 1.0), 1.0)
     assert bool(sentence) == said
-    assert not said or (sentence and "right arm's elbow reads 0.09 rad off its trajectory" in sentence)
+    assert not said or (sentence and "right arm's elbow reads 0.088 rad off its trajectory" in sentence)
 
 
 def test_a_reading_that_jumps_further_than_the_joint_turned_is_said() -> None:

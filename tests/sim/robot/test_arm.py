@@ -121,7 +121,7 @@ def test_a_joint_driven_on_stops_at_the_models_limit(arm: SimArm, joint: int, si
     arm.follow(ease(true_joints(arm), goal, 1.5))
     run(arm, 1.8)
     assert true_joints(arm)[joint] == pytest.approx(limit, abs=STOP_PLAY)
-    # What the motion room plans within lies within.
+    # What motion plans within lies within.
     assert side * limit > side * (UPPER if side > 0 else LOWER)[joint] - STOP_PLAY
 
 

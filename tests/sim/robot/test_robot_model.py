@@ -16,7 +16,7 @@ from regrasp.sim.robot.model import ARM_COLOR, CAMERA_SIZE, finger_position, pad
 
 PAD = 0.006  # m
 OFFSET = (0.02, 0.0, 0.06)  # m
-NEAR = 5e-4  # m: the motion room's kinematics against the URDF's
+NEAR = 5e-4  # m: motion's kinematics against the URDF's
 
 
 @pytest.fixture(scope="module")
