@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from numbers import Integral
 from pathlib import Path
 from threading import Lock
 from typing import TYPE_CHECKING, Any, Literal, Protocol
@@ -156,40 +157,57 @@ def run(
         from regrasp.app.run.episode import run_episode  # brings the planner, the compiler and the physics: seconds
         from regrasp.app.run.observers import Observers
 
-    failures: list[Exception] = []
-
-    def call(callback: Any, *values: Any) -> None:
-        try:
-            if callback is not None and not failures:
-                callback(*values)
-        except Exception as error:
-            failures.append(error)
-            raise KeyboardInterrupt from error  # which ends the run, and blames no leaf
-
-    def tick(seconds: float, leaf: str) -> None:
-        call(on_tick, seconds, leaf)
-        if stop is not None and stop.is_set():
-            raise KeyboardInterrupt
-
+    callbacks = _Callbacks(on_tick, on_event, stop)
     if not _running.acquire(blocking=False):
         raise RuntimeError("a run is under way in this process; start another process for a second one")
     try:
         result = run_episode(
             loaded,
             folder,
-            seed=loaded.file.seed if seed is None else seed,
+            seed=loaded.file.seed if seed is None else int(seed),
             video=video,
             gui=gui,
             renderer=renderer,
-            observers=Observers(tick=tick, event=lambda event: call(on_event, event)),
+            observers=Observers(tick=callbacks.tick, event=callbacks.event),
         )
     finally:
         _running.release()
-        if failures:
-            raise failures[0]
-    if result.outcome in ("interrupted", "wall_limit") and not (stop is not None and stop.is_set()):
+        if callbacks.error is not None:
+            raise callbacks.error
+    if result.outcome in ("interrupted", "wall_limit") and not callbacks.stopped():
         raise Interrupted(result)
     return result
+
+
+class _Callbacks:
+    """A caller's callbacks. What one raises is kept in `error` and ends the run as Ctrl-C does: it blames no leaf."""
+
+    def __init__(self, on_tick: Progress | None, on_event: OnEvent | None, stop: StopRequest | None) -> None:
+        self._on_tick, self._on_event, self._stop = on_tick, on_event, stop
+        self.error: Exception | None = None
+
+    def stopped(self) -> bool:
+        """Whether the caller has asked for the end."""
+        return self._stop is not None and self._stop.is_set()
+
+    def tick(self, seconds: float, leaf: str) -> None:
+        """After each tick of the tree."""
+        self._call(self._on_tick, seconds, leaf)
+        if self.stopped():
+            raise KeyboardInterrupt
+
+    def event(self, event: Mapping[str, Any]) -> None:
+        """With each event of the run."""
+        self._call(self._on_event, event)
+
+    def _call(self, callback: Callable[..., None] | None, *values: Any) -> None:
+        if callback is None or self.error is not None:
+            return
+        try:
+            callback(*values)
+        except Exception as error:
+            self.error = error
+            raise KeyboardInterrupt from error
 
 
 def has_display() -> bool:
@@ -204,7 +222,8 @@ def _check_run(scenario: Any, seed: Any, renderer: Any, on_tick: Any, on_event: 
 
     if not isinstance(scenario, Scenario):
         raise TypeError(f"scenario is {scenario!r}; expected a name, a path or what load_scenario returns")
-    if seed is not None and (not isinstance(seed, int) or isinstance(seed, bool) or not 0 <= seed <= MAX_SEED):
+    whole = isinstance(seed, Integral) and seed is not True and seed is not False
+    if seed is not None and not (whole and 0 <= seed <= MAX_SEED):
         raise ValueError(f"seed is {seed!r}; expected a whole number from 0 to {MAX_SEED}")
     if renderer not in ("auto", "moderngl", "tiny"):
         raise ValueError(f"renderer is {renderer!r}; expected auto, moderngl or tiny")
