@@ -74,7 +74,7 @@ def test_an_arm_that_does_not_follow_is_led_on_slower_and_then_given_up(
     rig.arms["right"].stuck = 0.0
     remarks: list[str] = []
     rig.motion.execution.on_anomaly = remarks.append
-    with pytest.raises(PlanningError, match=r"off its trajectory, limit 0.08, 3 times") as error:
+    with pytest.raises(PlanningError, match=r"off its trajectory, limit 0.080, 3 times") as error:
         rig.run(work(rig.motion))
     assert error.value.code is CauseCode.ARM_FAILED
     assert rig.arms["right"].stops == 3
@@ -113,7 +113,7 @@ def test_an_encoder_that_jumps_while_the_arm_rests_is_noticed_before_it_moves(ri
     rig.run(rig.motion.move("right", ASIDE[None]))
     rig.arms["right"].at = ASIDE + 0.3 * np.eye(6)[0]
     rig.arms["right"]._begun = None
-    with pytest.raises(PlanningError, match=r"waist reads 0.30 rad from where it was left") as error:
+    with pytest.raises(PlanningError, match=r"waist reads 0.300 rad from where it was left") as error:
         rig.run(rig.motion.move("right", READY[None]))
     assert error.value.code is CauseCode.ARM_FAILED
     assert len(rig.arms["right"].followed) == 1
