@@ -18,6 +18,22 @@ class PhaseParameters:
     still_seconds: float = 1.0  # ... for so long has settled
 
 
+class ConditionTimer:
+    """For how long a condition has held without a break; `since` is the second it began at, None while it fails."""
+
+    def __init__(self) -> None:
+        self.since: float | None = None
+
+    def update(self, now: float, holds: bool) -> float:
+        """Seconds that the condition has held, given whether it does at second `now`; 0 while it fails."""
+        if not holds:
+            self.since = None
+            return 0.0
+        if self.since is None:
+            self.since = now
+        return now - self.since
+
+
 class PhaseWatch:
     """Notes in `began` at which simulated second each phase first began. `start` (3,) m is where the plug sits."""
 
@@ -25,8 +41,7 @@ class PhaseWatch:
         self._start, self._parameters = start, parameters
         self.began: dict[Phase, float] = {}
         self._held = False
-        self._untouched_since: float | None = None
-        self._still_since: float | None = None
+        self._untouched, self._still = ConditionTimer(), ConditionTimer()
 
     def step(
         self, now: float, position: FloatArray, speed: float, pads: tuple[bool, bool], plugged: bool, stowed: bool
@@ -43,26 +58,12 @@ class PhaseWatch:
             self._begin("carried", now)
         if "lost" not in self.began:
             self._held = self._held or all(pads)
-            self._watch_loss(now, any(pads) or stowed or not self._held)
+            untouched = self._held and not any(pads) and not stowed
+            if self._untouched.update(now, untouched) >= self._parameters.lost_seconds:
+                self._begin("lost", now)
         elif all(pads):
             self._begin("regrasped", now)
-        elif "settled" not in self.began:
-            self._watch_settling(now, speed)
-
-    def _watch_loss(self, now: float, kept: bool) -> None:
-        if kept:
-            self._untouched_since = None
-        elif self._untouched_since is None:
-            self._untouched_since = now
-        elif now - self._untouched_since >= self._parameters.lost_seconds:
-            self._begin("lost", now)
-
-    def _watch_settling(self, now: float, speed: float) -> None:
-        if speed > self._parameters.still_speed:
-            self._still_since = None
-        elif self._still_since is None:
-            self._still_since = now
-        elif now - self._still_since >= self._parameters.still_seconds:
+        elif self._still.update(now, speed <= self._parameters.still_speed) >= self._parameters.still_seconds:
             self._begin("settled", now)
 
     def _begin(self, phase: Phase, now: float) -> None:

@@ -100,3 +100,10 @@ def test_a_technique_that_no_cell_has_is_a_finding_without_a_cell(tmp_path: Path
     assert "technique='fuzed' is unknown; did you mean 'fused'?" in shell("regrasp trees check tree.xml").stderr
     (tmp_path / "tree.xml").write_text(tree.replace("fuzed", "fiducial"))
     assert shell("regrasp trees check tree.xml").returncode == 0
+
+
+def test_a_script_beside_the_checkout_imports_it() -> None:
+    """There a folder named regrasp, the checkout, must not hide the package."""
+    program = "import regrasp; print(regrasp.run.__name__)"
+    told = subprocess.run([sys.executable, "-c", program], cwd=ROOT.parent, capture_output=True, text=True)
+    assert (told.stdout, told.stderr) == ("run\n", "")

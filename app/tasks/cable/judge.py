@@ -11,7 +11,7 @@ from regrasp.app.records.result import Expectation, Slip
 from regrasp.app.tasks.cable.expectations import Expect
 from regrasp.behaviors.services import Belief
 from regrasp.interfaces.arrays import FloatArray
-from regrasp.sim.cable.phase import PhaseParameters
+from regrasp.sim.cable.phase import ConditionTimer, PhaseParameters
 from regrasp.sim.ground_truth import GroundTruth
 
 
@@ -30,17 +30,15 @@ class GripWatch:
     def __init__(self, parameters: JudgeParameters = JudgeParameters()) -> None:
         self._parameters = parameters
         self._offsets: deque[tuple[float, FloatArray]] = deque()
-        self.sliding_since: float | None = None  # since which second it slides; None while it does not
+        self.sliding = ConditionTimer()
 
     def update(self, now: float, offset: FloatArray) -> None:
         """Take the connector's position (3,) m in the hand's frame at second `now`."""
         self._offsets.append((now, offset))
         while self._offsets[0][0] < now - self._parameters.slide_seconds:
             self._offsets.popleft()
-        if float(np.linalg.norm(offset - self._offsets[0][1])) < self._parameters.slide_distance:
-            self.sliding_since = None
-        elif self.sliding_since is None:
-            self.sliding_since = now
+        moved = float(np.linalg.norm(offset - self._offsets[0][1]))
+        self.sliding.update(now, moved >= self._parameters.slide_distance)
 
 
 class Judge:
@@ -50,11 +48,10 @@ class Judge:
         self._truth, self._expect, self._parameters = truth, expect, parameters
         self._now = 0.0
         self._was_held = False
-        self._held_since: float | None = None  # since when both pads touch it
+        self._held = ConditionTimer()  # both pads touch it
         self._grip = GripWatch(parameters)
         self._unheld_at: float | None = None  # when it lost a pad's contact or, if that was earlier, began to slide
-        self._untouched_at: float | None = None  # since when no pad touches it
-        self._still_since: float | None = None
+        self._untouched, self._still = ConditionTimer(), ConditionTimer()  # after a hold
         self.grasps = 0  # how often the hand has grasped it
         self.losses: list[float] = []  # seconds
         self.settled_pixels: int | None = None  # of the connector in the rear image when it had settled after a loss
@@ -67,25 +64,25 @@ class Judge:
         if self._truth.held():
             self._watch_hold(now)
             return
-        self._held_since = None
+        self._held.update(now, False)
         if self._was_held and not self._truth.stowed():
             if self._unheld_at is None:
-                self._unheld_at = now if self._grip.sliding_since is None else self._grip.sliding_since
-            if self._truth.touched():
-                self._untouched_at = None
-            else:
-                self._untouched_at = now if self._untouched_at is None else self._untouched_at
-                if now - self._untouched_at >= PhaseParameters.lost_seconds:
-                    self.losses.append(self._unheld_at)
-                    self._was_held, self._grip = False, GripWatch(self._parameters)
+                self._unheld_at = now if self._grip.sliding.since is None else self._grip.sliding.since
+            if self._untouched.update(now, not self._truth.touched()) >= PhaseParameters.lost_seconds:
+                self.losses.append(self._unheld_at)
+                self._was_held, self._grip = False, GripWatch(self._parameters)
         if self.losses and not self._was_held and self.settled_pixels is None:
-            self._watch_settling(now)
+            slow = self._truth.connector_speed() <= PhaseParameters.still_speed
+            if self._still.update(now, slow) >= PhaseParameters.still_seconds:
+                self.settled_pixels = self._truth.connector_pixels("rear")
 
     def _watch_hold(self, now: float) -> None:
-        self._held_since = now if self._held_since is None else self._held_since
+        held_seconds = self._held.update(now, True)
         self._grip.update(now, self._truth.connector_in_hand())
-        self._unheld_at = self._untouched_at = self._still_since = None
-        if not self._was_held and now - self._held_since >= self._parameters.hold_seconds:
+        self._unheld_at = None
+        self._untouched.update(now, False)
+        self._still.update(now, False)
+        if not self._was_held and held_seconds >= self._parameters.hold_seconds:
             self.grasps += 1
             self._was_held = True
 
@@ -134,14 +131,6 @@ class Judge:
         delays = [None if s.detected_at is None else s.detected_at - s.released_at for s in self.slips(belief)]
         known = [delay for delay in delays if delay is not None]
         return max(known, default=0.0) if len(known) == len(delays) else None
-
-    def _watch_settling(self, now: float) -> None:
-        if self._truth.connector_speed() > PhaseParameters.still_speed:
-            self._still_since = None
-        elif self._still_since is None:
-            self._still_since = now
-        elif now - self._still_since >= PhaseParameters.still_seconds:
-            self.settled_pixels = self._truth.connector_pixels("rear")
 
 
 def _at_most(name: str, value: float | None, limit: float | None) -> Iterator[Expectation]:

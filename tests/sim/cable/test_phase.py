@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from regrasp.sim.cable.phase import PhaseParameters, PhaseWatch
+from regrasp.sim.cable.phase import ConditionTimer, PhaseParameters, PhaseWatch
 
 START = np.array([0.4, 0.1, 0.4])
 DT = 0.05
@@ -54,3 +54,12 @@ def test_its_parameters_say_when_an_end_is_lost() -> None:
     patient = Told(PhaseParameters(lost_seconds=2.0))
     assert "lost" not in patient.go(0.5, away=0.2).go(1.5, away=0.3, pads=NONE).watch.began
     assert patient.go(1.0, away=0.3, pads=NONE).watch.began["lost"] == pytest.approx(2.5, abs=DT + 1e-9)
+
+
+def test_a_condition_s_time_begins_anew_after_a_break() -> None:
+    timer = ConditionTimer()
+    told = [
+        timer.update(now, holds) for now, holds in [(1.0, True), (1.5, True), (2.0, False), (2.5, True), (3.0, True)]
+    ]
+    assert told == [0.0, 0.5, 0.0, 0.0, 0.5]
+    assert timer.since == 2.5
