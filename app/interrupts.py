@@ -41,6 +41,22 @@ class StopRequests:
 
 
 _program: StopRequests | None = None  # of the `stoppable` program, if this is one
+_raised: type[KeyboardInterrupt] | None = None  # what the last signal to stop has raised in this process
+
+
+def _interrupt(kind: type[KeyboardInterrupt] = KeyboardInterrupt) -> NoReturn:
+    global _raised
+    _raised = kind
+    raise kind
+
+
+def raise_if_swallowed() -> None:
+    """Raise once more what a signal has raised; for a loop that only goes on because the exception was lost.
+
+    Python drops an exception that comes in a finaliser or in a callback from a C++ library.
+    """
+    if _raised is not None:
+        raise _raised
 
 
 @contextmanager
@@ -49,12 +65,13 @@ def stoppable() -> Iterator[None]:
 
     When the context ends they are ignored: by then the record is written, and the program's exit code shall count.
     """
-    global _program
-    requests = _program = StopRequests()
+    global _program, _raised
+    requests, _raised = StopRequests(), None
+    _program = requests
 
     def stop(_number: int, _frame: FrameType | None) -> None:
         if requests.is_new():
-            raise KeyboardInterrupt
+            _interrupt()
 
     heard = [number for number in STOPPING if signal.getsignal(number) is not signal.SIG_IGN]
     for number in heard:
@@ -70,10 +87,10 @@ def listen_to_parent() -> None:
     """In a child process: react to SIGTERM (the parent was stopped), to the parent's death, and to the wall limit."""
 
     def stop(_number: int, _frame: FrameType | None) -> NoReturn:
-        raise KeyboardInterrupt
+        _interrupt()
 
     def too_long(_number: int, _frame: FrameType | None) -> NoReturn:
-        raise WallLimit
+        _interrupt(WallLimit)
 
     signal.signal(signal.SIGTERM, stop)
     signal.signal(WALL_LIMIT_SIGNAL, too_long)

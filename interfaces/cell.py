@@ -25,6 +25,7 @@ from regrasp.interfaces.fields import (
     Vector,
 )
 from regrasp.interfaces.frame import Intrinsics
+from regrasp.interfaces.geometry import axes_along
 from regrasp.interfaces.hidden_world import HiddenWorld
 
 ArmName = Literal["left", "right"]
@@ -35,11 +36,7 @@ def pose_along(position: Vector, axis: Vector) -> RigidTransform:
 
     For an axis within 8 degrees of the vertical the world's x axis takes the place of up.
     """
-    x = np.asarray(axis, float) / np.linalg.norm(axis)
-    up = np.array([0.0, 0.0, 1.0]) if abs(x[2]) < 0.99 else np.array([1.0, 0.0, 0.0])
-    y = np.cross(up, x)
-    y /= np.linalg.norm(y)
-    return RigidTransform.from_components(position, Rotation.from_matrix(np.column_stack([x, y, np.cross(x, y)])))
+    return RigidTransform.from_components(position, Rotation.from_matrix(axes_along(np.array([axis], float))[0]))
 
 
 class Box(Model):

@@ -14,6 +14,18 @@ def skew(vectors: FloatArray) -> FloatArray:
     return out
 
 
+def axes_along(directions: FloatArray) -> FloatArray:
+    """Rotations (n, 3, 3) whose x axes point along `directions` (n, 3), of any length, z as far up as that allows.
+
+    For a direction within 8 degrees of the vertical the world's x axis takes the place of up.
+    """
+    x = directions / np.linalg.norm(directions, axis=1, keepdims=True)
+    up = np.where(np.abs(x[:, 2:]) < 0.99, [0.0, 0.0, 1.0], [1.0, 0.0, 0.0])
+    y = np.cross(up, x)
+    y /= np.linalg.norm(y, axis=1, keepdims=True)
+    return np.stack([x, y, np.cross(x, y)], axis=2)
+
+
 def rotation_about(axis: FloatArray, angle: float) -> FloatArray:
     r"""The rotation matrix (3, 3) by `angle` rad about a unit axis k (3,), by Rodrigues' formula.
 

@@ -1,8 +1,7 @@
 """A joint trajectory: a path with times."""
 
+from bisect import bisect_right
 from dataclasses import dataclass
-
-import numpy as np
 
 from regrasp.interfaces.arrays import FloatArray
 
@@ -33,7 +32,7 @@ class Trajectory:
             return self.positions[0], self.velocities[0]
         if t >= self.times[-1]:
             return self.positions[-1], self.velocities[-1]
-        i = int(np.searchsorted(self.times, t, side="right")) - 1
+        i = bisect_right(self.times, t) - 1
         h = float(self.times[i + 1] - self.times[i])
         s = (t - float(self.times[i])) / h
         p0, p1 = self.positions[i], self.positions[i + 1]

@@ -95,7 +95,7 @@ class Motion(PlanningScene):
             model, q, kin = self.start_model(arm, held), self.joints(arm), self.kinematics[arm]
             clearances, carry = self.parameters.clearances, self.parameters.carry
             candidates = carry_paths(self.known, kin, q, goals, held, carry)
-            paths = [path for path in candidates if can_continue(kin, path[-1], onward, carry.step)]
+            paths = (path for path in candidates if can_continue(kin, path[-1], onward, carry.step))
             wide = self.model(arm, held=held, opening=JAW_OPENING)
             path = first_free((wide, model), clearances.near_margins, paths)
             if path is None:

@@ -98,14 +98,17 @@ def lay_cable(
 
     The path eases in and out by :math:`3 s^2 - 2 s^3`. `step` is the physics step in s.
     """
-    start, _, _ = cable.connector_state()
+    start = cable.connector_state().pose
     hold = Hold(BodyLink(client, cable.body, cable.connector_link), start)
     turn = Slerp([0, 1], Rotation.concatenate([start.rotation, goal.rotation]))
     steps = round(parameters.move_seconds / step)
+    s = np.arange(1, steps + 1) / steps
+    s = s * s * (3 - 2 * s)
+    way = RigidTransform.from_components(np.outer(1 - s, start.translation) + np.outer(s, goal.translation), turn(s))
+    positions, quaternions = way.translation.tolist(), way.rotation.as_quat().tolist()
     for i in range(steps + round(parameters.settle_seconds / step)):
-        s = min(1.0, (i + 1) / steps)
-        s = s * s * (3 - 2 * s)
-        hold.move(RigidTransform.from_components((1 - s) * start.translation + s * goal.translation, turn(s)))
+        if i < steps:
+            hold.move(positions[i], quaternions[i])
         cable.apply_springs()
         p.stepSimulation(physicsClientId=client)
     return hold

@@ -5,6 +5,7 @@ step, socket; then, at intervals, contacts and the triggers of faults. Cameras e
 fixed steps, so nothing depends on who reads them and how often.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -76,7 +77,8 @@ class World:
     ) -> None:
         self.cell, self.gravity, self._parameters = cell, gravity, parameters
         self.client: int = p.connect(p.GUI if gui else p.DIRECT)
-        self.step_seconds = 1.0 / cell.hidden.step_rate
+        self._step_rate = cell.hidden.step_rate
+        self.step_seconds = 1.0 / self._step_rate
         self._steps = 0
         errors_rng, light_rng = (np.random.default_rng(s) for s in np.random.SeedSequence([seed, 1]).spawn(2))
         configure(self.client, cell.hidden, gravity)
@@ -90,7 +92,7 @@ class World:
         self.socket = self._plug(setup.connector_at)
         self.clip = self._build_clip()
         self.contact_peaks: dict[str, float] = {}
-        self._connector, self._velocity, self._rate = self.cable.connector_state()
+        self._connector = self.cable.connector_state()
         self.visuals = Visuals(self.client)
         self.renderer = make_renderer(self.visuals, renderer)
         self.light = self._draw_light(light_rng)
@@ -102,6 +104,8 @@ class World:
         ]
         self._triggers = TriggerState()
         self._start = cell.known.socket(PLUGGED_INTO).world_from_plug(cell.known.connector.length).translation
+        self._way = cell.known.clip.world_from_seat.translation - self._start
+        self._way_sq = float(self._way @ self._way)
         self._phase = PhaseWatch(self._start, parameters.phase)
         for arm in self.arms.values():
             arm.restart_clock()
@@ -157,11 +161,11 @@ class World:
 
     def connector_pose(self) -> RigidTransform:
         """True world_from_connector after the last step."""
-        return self._connector
+        return self._connector.pose
 
     def connector_velocity(self) -> FloatArray:
         """True velocity (3,) m/s of the connector's centre."""
-        return self._velocity
+        return np.array(self._connector.velocity)
 
     def _step(self) -> None:
         for arm in self.arms.values():
@@ -169,10 +173,10 @@ class World:
         for fault in self.faults:
             fault.step(self.now())
         self.cable.apply_springs()
-        self.clip.step(self._connector, self._velocity, self._rate)
+        self.clip.step(self._connector)
         p.stepSimulation(physicsClientId=self.client)
         self._steps += 1
-        self._connector, self._velocity, self._rate = self.cable.connector_state()
+        self._connector = self.cable.connector_state()
         self.socket.step()
         if self._steps % self._parameters.contact_interval == 0:
             self._watch_contacts()
@@ -187,18 +191,17 @@ class World:
             fault.watch(self._triggers)
 
     def _update_triggers(self) -> None:
-        position, plugged = self._connector.translation, self.socket.holds
+        position, plugged = np.array(self._connector.position), self.socket.holds
         pads = (False, False) if plugged else self.pads_touching("right")
-        speed = float(np.linalg.norm(self._velocity))
+        speed = math.hypot(*self._connector.velocity)
         self._phase.step(self.now(), position, speed, pads, plugged, self.clip.holds)
-        way = self.cell.known.clip.world_from_seat.translation - self._start
         held = all(pads) and not plugged
-        self._triggers.carried = float((position - self._start) @ way) / float(way @ way) if held else None
+        self._triggers.carried = float((position - self._start) @ self._way) / self._way_sq if held else None
         self._triggers.phases = self._phase.began
 
     def _expose(self) -> None:
-        rate = self.cell.hidden.step_rate
-        due = [c for c in self.cameras.values() if self._steps * c.spec.rate % rate < c.spec.rate]
+        rate = self._step_rate
+        due = [c for c in self.cameras.values() if self._steps * c.rate % rate < c.rate]
         if due:
             poses = self.visuals.snapshot()
             for camera in due:
@@ -279,7 +282,7 @@ class World:
             if isinstance(mount, WristMount):
                 mounting = _wrist_mounting(self.arms[mount.arm], mount, error)
             else:
-                mounting = CameraMounting(_constant(mount.world_from_camera * error))
+                mounting = _fixed_mounting(mount.world_from_camera * error)
             cameras[spec.name] = SimCamera(
                 spec=spec,
                 renderer=self.renderer,
@@ -293,8 +296,12 @@ class World:
 
 
 def _wrist_mounting(arm: SimArm, mount: WristMount, error: RigidTransform) -> CameraMounting:
-    return CameraMounting(lambda: arm.wrist_pose() * mount.wrist_from_camera * error, lambda: arm.reading().positions)
+    def expose() -> Callable[[], RigidTransform]:
+        wrist = arm.deferred_wrist_pose()
+        return lambda: wrist() * mount.wrist_from_camera * error
+
+    return CameraMounting(expose, lambda: arm.reading().positions)
 
 
-def _constant(pose: RigidTransform) -> Callable[[], RigidTransform]:
-    return lambda: pose
+def _fixed_mounting(world_from_camera: RigidTransform) -> CameraMounting:
+    return CameraMounting(lambda: lambda: world_from_camera)

@@ -9,7 +9,7 @@ from typing import Any
 import py_trees
 from py_trees.common import Status
 
-from regrasp.app.interrupts import WallLimit
+from regrasp.app.interrupts import WallLimit, raise_if_swallowed
 from regrasp.app.records.record import Progress, Record
 from regrasp.app.records.result import Link, Outcome, Result
 from regrasp.app.run.compose import Episode, assemble, build_world
@@ -120,6 +120,7 @@ def _loop(episode: Episode, scenario: Scenario, film: Film, on_tick: Progress) -
         leaf = active_leaf(root)
         film.show(leaf)
         on_tick(world.now(), leaf)
+        raise_if_swallowed()
         if root.status is Status.SUCCESS:
             return Ending("stowed")
         if root.status is Status.FAILURE:

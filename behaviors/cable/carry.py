@@ -11,9 +11,11 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from regrasp.behaviors.cable.hand import HANDLING_ARM, HandLeaf
 from regrasp.behaviors.leaf import LeafFailed, LeafSteps
 from regrasp.interfaces.cause import CauseCode
+from regrasp.interfaces.cell import Clip
 from regrasp.motion.failure import PlanningError
 from regrasp.motion.planning.straight import straight_line
 from regrasp.motion.robots.kinematics import ArmKinematics
+from regrasp.motion.robots.poses import angle_between
 from regrasp.motion.scene.collision import CollisionModel
 from regrasp.motion.task import MotionTask
 from regrasp.perception.pose.estimate import Estimate
@@ -68,26 +70,27 @@ class Carry(HandLeaf):
         model, near = motion.model(HANDLING_ARM, held=held), motion.model(HANDLING_ARM, clip=False)
         kin = motion.kinematics[HANDLING_ARM]
         goals = []
-        for roll in np.linspace(-np.pi, np.pi, parameters.rolls, endpoint=False):
-            seated = clip.world_from_seat * RigidTransform.from_rotation(Rotation.from_euler("x", roll)) * held.inv()
-            before = seated * RigidTransform.from_translation([-parameters.insert_distance, 0.0, 0.0])
+        for seated in _seated_poses(clip, held, np.linspace(-np.pi, np.pi, parameters.rolls, endpoint=False)):
+            before = seated.copy()
+            before[:3, 3] -= parameters.insert_distance * seated[:3, 0]
             starts = (q for q in kin.ik(before) if model.free(q, parameters.margin))
             if any(_straight_in(kin, near, q, seated, parameters) for q in starts):
                 goals.append(before)
         if not goals:
             raise LeafFailed(CauseCode.OUT_OF_REACH, "no free hand pose brings the held connector into the clip")
-        now = motion.tool(HANDLING_ARM).rotation.inv()
-        return sorted(goals, key=lambda pose: float((now * pose.rotation).magnitude()))
+        now = kin.tool_matrix(motion.joints(HANDLING_ARM))
+        goals.sort(key=lambda pose: angle_between(now, pose))
+        return [RigidTransform.from_matrix(pose) for pose in goals]
 
 
 def _straight_in(
     kin: ArmKinematics,
     near: CollisionModel,
     q: NDArray[np.float64],
-    seated: RigidTransform,
+    seated: NDArray[np.float64],
     parameters: CarryParameters,
 ) -> bool:
-    """Whether a free straight path leads from joints (6,) to the pose that seats the connector."""
+    """Whether a free straight path leads from joints (6,) to the pose (4, 4) that seats the connector."""
     try:
         return near.path_free(straight_line(kin, q, seated, parameters.line_step), parameters.margin)
     except PlanningError:
@@ -146,11 +149,17 @@ class Insert(HandLeaf):
 
     def _seated(self, held: RigidTransform) -> RigidTransform:
         """world_from_tool that seats the held connector, with the roll that turns the hand least."""
-        tool, seat = self.services.motion.tool(HANDLING_ARM), self.services.known.clip.world_from_seat
-        angles = np.linspace(-np.pi, np.pi, self.parameters.rolls)
-        rolls = [RigidTransform.from_rotation(Rotation.from_euler("x", angle)) for angle in angles]
-        poses = [seat * roll * held.inv() for roll in rolls]
-        return min(poses, key=lambda pose: float((tool.rotation.inv() * pose.rotation).magnitude()))
+        tool, clip = self.services.motion.tool(HANDLING_ARM).as_matrix(), self.services.known.clip
+        poses = _seated_poses(clip, held, np.linspace(-np.pi, np.pi, self.parameters.rolls))
+        return RigidTransform.from_matrix(min(poses, key=lambda pose: angle_between(tool, pose)))
+
+
+def _seated_poses(clip: Clip, held: RigidTransform, rolls: NDArray[np.float64]) -> NDArray[np.float64]:
+    """world_from_tool (n, 4, 4) that seat the connector, `held` (tool_from_connector), turned by `rolls` (n,) rad."""
+    turns = np.zeros((len(rolls), 4, 4))
+    turns[:, :3, :3] = Rotation.from_euler("x", rolls[:, None]).as_matrix()
+    turns[:, 3, 3] = 1.0
+    return np.asarray(clip.world_from_seat.as_matrix() @ turns @ held.inv().as_matrix())
 
 
 def _turned_in_the_jaw(held: RigidTransform, seen: RigidTransform) -> RigidTransform:

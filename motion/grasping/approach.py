@@ -8,8 +8,15 @@ from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cell import Connector
-from regrasp.motion.failure import PlanningError
-from regrasp.motion.grasping.grasps import ApproachParameters, Grasp, GraspParameters, choose_grasp, grasp_candidates
+from regrasp.motion.grasping.grasps import (
+    ApproachParameters,
+    Grasp,
+    GraspParameters,
+    WaysIn,
+    first_grasp,
+    grasp_candidates,
+    no_grasp,
+)
 from regrasp.motion.scene.collision import Clearances, CollisionModel
 
 
@@ -54,16 +61,16 @@ def find_approaches(
     All keep the greatest of the near margins with which any candidate works. `model` and `near` as in `choose_grasp`.
     Raises PlanningError with a tally when no candidate works with any margin.
     """
+    ways = WaysIn(model.kinematics, parameters.standoff)
     for near_margin in clearances.near_margins:
         approach = ApproachParameters(parameters.standoff, clearances.margin, near_margin)
         paths: list[FloatArray] = []
         left = candidates
         while left and len(paths) < parameters.max_approaches:
-            try:
-                choice = choose_grasp(model.kinematics, model, q, left, near, approach)
-            except PlanningError:
+            choice, troubles = first_grasp(ways, model, q, left, near, approach)
+            if choice is None:
                 if not paths and near_margin == clearances.near_margins[-1]:
-                    raise
+                    raise no_grasp(troubles)
                 break
             paths += choice.paths
             left = left[left.index(choice.grasp) + 1 :]

@@ -3,15 +3,17 @@
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial.transform import RigidTransform, Rotation
+from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cause import CauseCode
 from regrasp.motion.failure import PlanningError
-from regrasp.motion.planning.straight import straight_line
+from regrasp.motion.planning.straight import straight_lines
 from regrasp.motion.robots.kinematics import ArmKinematics
+from regrasp.motion.robots.poses import multiply, rotation_matrix
 from regrasp.motion.robots.spheres import JAW_OPENING
 from regrasp.motion.scene.collision import CollisionModel
 
@@ -43,10 +45,15 @@ class ApproachParameters:
 
 @dataclass(frozen=True, eq=False)
 class Grasp:
-    """A pose of the tool at which the jaws close on the connector; `cost` is in rad off the preferred yaw."""
+    """A pose (4, 4) of the tool at which the jaws close on the connector; `cost` is in rad off the preferred yaw."""
 
-    world_from_tool: RigidTransform
+    pose: FloatArray
     cost: float
+
+    @property
+    def world_from_tool(self) -> RigidTransform:
+        """The pose as a transform."""
+        return RigidTransform.from_matrix(self.pose)
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,14 +91,16 @@ def grasp_candidates(
     grasps = []
     for yaw in parameters.yaws:
         for roll in parameters.rolls:
-            square = Rotation.from_rotvec(roll * axis).apply(forward)
-            x = np.cos(yaw) * square + np.sin(yaw) * axis
+            square = rotation_matrix(roll * axis) @ forward
+            x, across = np.cos(yaw) * square + np.sin(yaw) * axis, np.cross(axis, square)
             for flip in (1.0, -1.0):
-                y = flip * np.cross(axis, square)
-                rotation = Rotation.from_matrix(np.column_stack([x, y, np.cross(x, y)]))
+                y = flip * across
+                pose = np.eye(4)
+                pose[:3, :3] = np.column_stack([x, y, flip * np.cross(x, across)])
+                pose[:3, 3] = centre - shallow * x
                 cost = abs(yaw - parameters.preferred_yaw) + parameters.roll_cost * abs(roll)
                 cost = cost + parameters.flip_cost * (flip < 0)
-                grasps.append(Grasp(RigidTransform.from_components(centre - shallow * x, rotation), cost))
+                grasps.append(Grasp(pose, cost))
     return sorted(grasps, key=lambda g: g.cost)
 
 
@@ -119,37 +128,92 @@ def choose_grasp(
     straight path in. `q_now` (6,) rad orders the branches. Raises PlanningError with a tally of what was wrong with the
     candidates: OUT_OF_REACH when all were, else NO_COLLISION_FREE_GOAL.
     """
-    troubles: Counter[str] = Counter()
+    ways = WaysIn(kin, parameters.standoff)
+    choice, troubles = first_grasp(ways, model, q_now, candidates, near or model, parameters)
+    if choice is None:
+        raise no_grasp(troubles)
+    return choice
+
+
+class WaysIn:
+    """The joint paths to grasps from their standoffs, each worked out once: they are tried with several margins."""
+
+    def __init__(self, kin: ArmKinematics, standoff: float) -> None:
+        self._kin, self._standoff = kin, standoff
+        self._joints: dict[Grasp, FloatArray] = {}
+        self._paths: dict[tuple[Grasp, int], FloatArray | None] = {}
+
+    def joints(self, grasp: Grasp) -> FloatArray:
+        """The joints (n, 6) rad at the grasp, one row for each branch of the inverse kinematics."""
+        if grasp not in self._joints:
+            self._joints[grasp] = self._kin.ik(grasp.pose)
+        return self._joints[grasp]
+
+    def path(self, grasp: Grasp, branch: int) -> FloatArray | None:
+        """The path (k, 6) rad straight in to row `branch` of `joints`, None if there is none."""
+        if (grasp, branch) not in self._paths:
+            back = np.eye(4)
+            back[0, 3] = -self._standoff
+            path = straight_lines(self._kin, self.joints(grasp)[branch], [multiply(grasp.pose, back)])
+            self._paths[grasp, branch] = None if path is None else path[::-1]
+        return self._paths[grasp, branch]
+
+
+class Trouble(NamedTuple):
+    """What is wrong with a candidate: a phrase with a place for what stands at `q` (6,) rad too near in `model`."""
+
+    phrase: str
+    model: CollisionModel | None = None
+    q: FloatArray | None = None
+
+    def __str__(self) -> str:
+        known = self.model is not None and self.q is not None
+        return self.phrase.format(self.model.nearest(self.q)[1]) if known else self.phrase  # type: ignore[union-attr,arg-type]
+
+
+def first_grasp(
+    ways: WaysIn,
+    model: CollisionModel,
+    q_now: FloatArray,
+    candidates: Sequence[Grasp],
+    near: CollisionModel,
+    parameters: ApproachParameters,
+) -> tuple[GraspChoice | None, list[Trouble]]:
+    """`choose_grasp` without an exception: the first candidate that works, and what was wrong with those before it."""
+    troubles: list[Trouble] = []
     for grasp in candidates:
-        paths, trouble = _approaches(kin, model, near or model, grasp, parameters)
+        paths, trouble = _approaches(ways, model, near, grasp, parameters)
         if paths:
             paths.sort(key=lambda path: float(np.abs(path[0] - q_now).max()))
-            return GraspChoice(grasp, tuple(paths))
-        troubles[trouble] += 1
-    code = CauseCode.OUT_OF_REACH if set(troubles) <= {_OUT_OF_REACH} else CauseCode.NO_COLLISION_FREE_GOAL
-    tally = ", ".join(f"{n} {trouble}" for trouble, n in troubles.most_common())
-    raise PlanningError(code, f"{len(candidates)} grasp candidates: {tally}")
+            return GraspChoice(grasp, tuple(paths)), troubles
+        troubles.append(trouble)
+    return None, troubles
+
+
+def no_grasp(troubles: Sequence[Trouble]) -> PlanningError:
+    """The error with a tally of what was wrong with all candidates."""
+    tally = Counter(map(str, troubles))
+    code = CauseCode.OUT_OF_REACH if set(tally) <= {_OUT_OF_REACH} else CauseCode.NO_COLLISION_FREE_GOAL
+    said = ", ".join(f"{n} {trouble}" for trouble, n in tally.most_common())
+    return PlanningError(code, f"{len(troubles)} grasp candidates: {said}")
 
 
 def _approaches(
-    kin: ArmKinematics, model: CollisionModel, near: CollisionModel, grasp: Grasp, parameters: ApproachParameters
-) -> tuple[list[FloatArray], str]:
+    ways: WaysIn, model: CollisionModel, near: CollisionModel, grasp: Grasp, parameters: ApproachParameters
+) -> tuple[list[FloatArray], Trouble]:
     """Joint paths from standoff to grasp, one for each branch that works, and what was wrong with the last other."""
-    back = grasp.world_from_tool * RigidTransform.from_translation([-parameters.standoff, 0.0, 0.0])
-    paths, trouble = [], _OUT_OF_REACH
-    for q in kin.ik(grasp.world_from_tool):
+    paths, trouble = [], Trouble(_OUT_OF_REACH)
+    for branch, q in enumerate(ways.joints(grasp)):
         if not near.free(q, parameters.near_margin):
-            trouble = f"in collision with {near.nearest(q)[1]}"
+            trouble = Trouble("in collision with {}", near, q)
             continue
-        try:
-            path = straight_line(kin, q, back)[::-1]
-        except PlanningError:
-            trouble = "without a straight way in"
-            continue
-        if not model.free(path[0], parameters.margin):
-            trouble = f"with a standoff too near to {model.nearest(path[0])[1]}"
+        path = ways.path(grasp, branch)
+        if path is None:
+            trouble = Trouble("without a straight way in")
+        elif not model.free(path[0], parameters.margin):
+            trouble = Trouble("with a standoff too near to {}", model, path[0])
         elif not near.path_free(path, parameters.near_margin):
-            trouble = "with something in the straight way in"
+            trouble = Trouble("with something in the straight way in")
         else:
             paths.append(path)
     return paths, trouble

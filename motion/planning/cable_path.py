@@ -9,10 +9,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import RigidTransform, Rotation, Slerp
 
 from regrasp.interfaces.arrays import FloatArray
-from regrasp.interfaces.cell import KnownCell, pose_along
+from regrasp.interfaces.cell import KnownCell
+from regrasp.interfaces.geometry import axes_along
+from regrasp.motion.robots.poses import inverse, multiply, rotation_matrix, rotation_vector
 
 
 @dataclass(frozen=True)
@@ -24,8 +25,10 @@ class CablePathParameters:
     detours: tuple[float | None, ...] = (None, 0.0, 0.05, 0.10)
 
 
-def natural_pose(known: KnownCell, deflection: FloatArray) -> RigidTransform:
-    r"""world_from_connector at the end of a cable that a force bends by `deflection` (3,) m off its straight course.
+def natural_poses(known: KnownCell, deflections: FloatArray) -> FloatArray:
+    r"""world_from_connector (n, 4, 4) at the end of a cable that a force bends by `deflections` (n, 3) m.
+
+    They are measured from the cable's straight course.
 
     Cantilever with a load at its end (Euler-Bernoulli beam, second order in the slope). For a deflection d at the
     distance D along the straight course, the slope at the end and the cable's length L are
@@ -35,21 +38,24 @@ def natural_pose(known: KnownCell, deflection: FloatArray) -> RigidTransform:
     anchor, course = known.cable_anchor
     length = known.cable_length
     # Beyond L^2 / 2.4 no D solves the second equation.
-    d2 = min(float(deflection @ deflection), 0.4 * length**2)
-    along = 0.5 * (length + np.sqrt(length**2 - 2.4 * d2))
-    direction = course + 1.5 * deflection / along
-    direction = direction / np.linalg.norm(direction)
-    centre = anchor + along * course + deflection + 0.5 * known.connector.length * direction
-    return pose_along(_triple(centre), _triple(direction))
+    d2 = np.minimum((deflections**2).sum(axis=1), 0.4 * length**2)
+    along = 0.5 * (length + np.sqrt(length**2 - 2.4 * d2))[:, None]
+    poses = np.zeros((len(deflections), 4, 4))
+    poses[:, :3, :3] = axes_along(course + 1.5 * deflections / along)
+    poses[:, :3, 3] = anchor + along * course + deflections + 0.5 * known.connector.length * poses[:, :3, 0]
+    poses[:, 3, 3] = 1.0
+    return poses
 
 
 def natural_paths(
     known: KnownCell,
-    start: RigidTransform,
-    goal: RigidTransform,
+    start: FloatArray,
+    goal: FloatArray,
     parameters: CablePathParameters = CablePathParameters(),
-) -> Iterator[list[RigidTransform]]:
-    """Paths of a held connector, poses world_from_connector from `start` (left out) to `goal`: direct, then detours.
+) -> Iterator[FloatArray]:
+    """Paths (n, 4, 4) of a held connector, world_from_connector from `start` (left out) to `goal`, both (4, 4).
+
+    The direct path comes first, then the detours.
 
     Seen along the cable's straight course a path is direct, or rises first and then goes across, or rises nearer to the
     panel.
@@ -60,32 +66,28 @@ def natural_paths(
         yield _natural_path(known, start, goal, via, parameters.poses)
 
 
-def _natural_path(
-    known: KnownCell, start: RigidTransform, goal: RigidTransform, via: FloatArray, count: int
-) -> list[RigidTransform]:
+def _natural_path(known: KnownCell, start: FloatArray, goal: FloatArray, via: FloatArray, count: int) -> FloatArray:
     """`count` poses from `start` to `goal` along the cable's natural shapes, with deflection `via` (3,) m half-way.
 
     The start's offset from its natural pose fades early, and the goal's comes late: a cable that hangs straight buckles
     with far more force than a bent one that is pressed by the same length.
     """
     begin, end = _deflection(known, start), _deflection(known, goal)
-    first = natural_pose(known, begin).inv() * start
-    last = natural_pose(known, end).inv() * goal
-    turn = Slerp([0.0, 1.0], Rotation.concatenate([first.rotation, last.rotation]))
-    poses = []
-    for s in np.linspace(0.0, 1.0, count + 1)[1:]:
-        shift = (1 - s) ** 3 * first.translation + s**3 * last.translation
-        deflection = begin + 2 * s * (via - begin) if s < 0.5 else via + (2 * s - 1) * (end - via)
-        poses.append(natural_pose(known, deflection) * RigidTransform.from_components(shift, turn(s)))
-    return poses
+    ends = natural_poses(known, np.array([begin, end]))
+    first, last = multiply(inverse(ends[0]), start), multiply(inverse(ends[1]), goal)
+    turn = rotation_vector(multiply(inverse(first), last)[:3, :3])
+    s = np.linspace(0.0, 1.0, count + 1)[1:]
+    share = s[:, None]
+    offsets = np.zeros((count, 4, 4))
+    offsets[:, :3, :3] = [first[:3, :3] @ rotation_matrix(part * turn) for part in s]
+    offsets[:, :3, 3] = (1 - share) ** 3 * first[:3, 3] + share**3 * last[:3, 3]
+    offsets[:, 3, 3] = 1.0
+    deflections = np.where(share < 0.5, begin + 2 * share * (via - begin), via + (2 * share - 1) * (end - via))
+    return np.asarray(natural_poses(known, deflections) @ offsets)
 
 
-def _deflection(known: KnownCell, connector: RigidTransform) -> FloatArray:
-    """How far (3,) m the cable's end lies off the straight course."""
+def _deflection(known: KnownCell, connector: FloatArray) -> FloatArray:
+    """How far (3,) m the end of the cable at the connector's pose (4, 4) lies off the straight course."""
     anchor, course = known.cable_anchor
-    end = connector.apply([-0.5 * known.connector.length, 0.0, 0.0]) - anchor
+    end = connector[:3, 3] - 0.5 * known.connector.length * connector[:3, 0] - anchor
     return np.asarray(end - (end @ course) * course)
-
-
-def _triple(v: FloatArray) -> tuple[float, float, float]:
-    return float(v[0]), float(v[1]), float(v[2])

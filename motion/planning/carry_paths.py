@@ -1,16 +1,18 @@
 """Joint paths that carry a held connector to a goal, the preferred first."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import chain, product
 
-from scipy.spatial.transform import RigidTransform, Rotation, Slerp
+import numpy as np
+from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cell import KnownCell
 from regrasp.motion.planning.cable_path import CablePathParameters, natural_paths
 from regrasp.motion.planning.straight import straight_lines
 from regrasp.motion.robots.kinematics import ArmKinematics
+from regrasp.motion.robots.poses import inverse, multiply, poses_between
 from regrasp.motion.scene.collision import CollisionModel
 
 
@@ -35,13 +37,14 @@ def carry_paths(
 
     First along the natural shapes of the cable, then straight or in a flat arch. Whether a path is free is not checked.
     """
-    tool, connector_from_tool = kin.tool(q), held.inv()
+    tool, tool_from_connector, ends = kin.tool_matrix(q), held.as_matrix(), [goal.as_matrix() for goal in goals]
+    connector_from_tool, connector = inverse(tool_from_connector), multiply(tool, tool_from_connector)
     natural = (
-        [pose * connector_from_tool for pose in path]
-        for goal in goals
-        for path in natural_paths(known, tool * held, goal * held, parameters.cable)
+        path @ connector_from_tool
+        for end in ends
+        for path in natural_paths(known, connector, multiply(end, tool_from_connector), parameters.cable)
     )
-    direct = (_arch(tool, goal, lift) for goal in goals for lift in parameters.lifts)
+    direct = (_arch(tool, end, lift) for end in ends for lift in parameters.lifts)
     for poses in chain(natural, direct):
         path = straight_lines(kin, q, poses, parameters.step)
         if path is not None:
@@ -50,28 +53,36 @@ def carry_paths(
 
 def can_continue(kin: ArmKinematics, q: FloatArray, onward: Sequence[RigidTransform], step: float = 0.02) -> bool:
     """Whether the tool at joints (6,) can go on in straight lines to the poses `onward`, given in its own frame."""
-    tool = kin.tool(q)
-    return straight_lines(kin, q, [tool * pose for pose in onward], step) is not None
+    tool = kin.tool_matrix(q)
+    return straight_lines(kin, q, [multiply(tool, pose.as_matrix()) for pose in onward], step) is not None
 
 
 def first_free(
-    models: Sequence[CollisionModel], margins: Sequence[float], paths: Sequence[FloatArray]
+    models: Sequence[CollisionModel], margins: Sequence[float], paths: Iterable[FloatArray]
 ) -> FloatArray | None:
     """The first path that is free in the first model by the first margin (m), else by the next; None if there is none.
 
-    Where a path begins is not checked.
+    Where a path begins is not checked. Later paths are only taken from `paths` when they are needed.
     """
+    taken: list[FloatArray] = []
+    source = iter(paths)
+
+    def take() -> Iterator[FloatArray]:
+        for path in source:
+            taken.append(path)
+            yield path
+
     for model, margin in product(models, margins):
-        for path in paths:
+        for path in chain(list(taken), take()):
             if model.path_free(path[1:], margin):
                 return path
     return None
 
 
-def _arch(start: RigidTransform, goal: RigidTransform, lift: float) -> list[RigidTransform]:
-    """Poses from start (left out) to goal, through the middle raised by `lift` m if there is any."""
+def _arch(start: FloatArray, goal: FloatArray, lift: float) -> list[FloatArray]:
+    """Poses (4, 4) from start (left out) to goal, through the middle raised by `lift` m if there is any."""
     if not lift:
         return [goal]
-    middle = 0.5 * (start.translation + goal.translation) + [0.0, 0.0, lift]
-    turn = Slerp([0.0, 1.0], Rotation.concatenate([start.rotation, goal.rotation]))(0.5)
-    return [RigidTransform.from_components(middle, turn), goal]
+    middle = poses_between(start, goal, np.inf, np.inf, 2)[0]
+    middle[2, 3] += lift
+    return [middle, goal]

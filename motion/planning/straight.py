@@ -1,59 +1,87 @@
 """Straight lines of the tool (Cartesian paths)."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable
+from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import RigidTransform, Rotation, Slerp
+from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cause import CauseCode
 from regrasp.motion.failure import PlanningError
 from regrasp.motion.robots.kinematics import ArmKinematics
+from regrasp.motion.robots.poses import poses_between
 
 
 def straight_line(
     kin: ArmKinematics,
     q0: FloatArray,
-    goal: RigidTransform,
+    goal: RigidTransform | FloatArray,
     step: float = 0.005,
     turn_step: float = 0.05,
     max_joint_step: float = 0.3,
 ) -> FloatArray:
     """Joint path (k, 6) rad from `q0` (6,) that moves the tool in a straight line to `goal` (world_from_tool).
 
-    Waypoints lie at most `step` metres and `turn_step` rad of rotation apart; the rotation turns evenly (slerp). More
-    than `max_joint_step` rad of one joint between two waypoints would be a change to another branch of the inverse
-    kinematics. Raises PlanningError OUT_OF_REACH where no solution continues the path.
+    The goal may be a matrix (4, 4). Waypoints lie at most `step` metres and `turn_step` rad of rotation apart; the
+    rotation turns evenly (slerp). More than `max_joint_step` rad of one joint between two waypoints would be a change
+    to another branch of the inverse kinematics. Raises PlanningError OUT_OF_REACH where no solution continues the path.
     """
-    q0 = np.asarray(q0, float)
-    start = kin.tool(q0)
-    displacement = goal.translation - start.translation
-    length = float(np.linalg.norm(displacement))
-    turn = float((start.rotation.inv() * goal.rotation).magnitude())
-    count = max(1, int(np.ceil(max(length / step, turn / turn_step) - 1e-9)))
-    rotations = Slerp([0.0, 1.0], Rotation.concatenate([start.rotation, goal.rotation]))
-    path = [q0]
-    for s in np.linspace(0.0, 1.0, count + 1)[1:]:
-        pose = RigidTransform.from_components(start.translation + s * displacement, rotations(s))
-        branches = kin.ik(pose)
-        change = np.abs(branches - path[-1]).max(axis=1, initial=0.0)
-        if not len(branches) or change.min() > max_joint_step:
-            why = "out of reach" if not len(branches) else f"a joint would jump by {change.min():.2f} rad"
-            at = np.array2string(pose.translation, precision=3)
-            message = f"straight line of {length:.3f} m stops after {s * length:.3f} m at {at}: {why}"
-            raise PlanningError(CauseCode.OUT_OF_REACH, message)
-        path.append(branches[change.argmin()])
-    return np.array(path)
+    target = goal if isinstance(goal, np.ndarray) else goal.as_matrix()
+    found = _follow_line(kin, q0, target, step, turn_step, max_joint_step)
+    if isinstance(found, _Stop):
+        raise PlanningError(CauseCode.OUT_OF_REACH, str(found))
+    return found
 
 
 def straight_lines(
-    kin: ArmKinematics, q: FloatArray, poses: Sequence[RigidTransform], step: float
+    kin: ArmKinematics, q: FloatArray, poses: Iterable[FloatArray], step: float = 0.005
 ) -> FloatArray | None:
-    """Joint path (k, 6) rad from `q` (6,) in straight lines through poses world_from_tool; None where it stops."""
-    path = q[None]
-    try:
-        for pose in poses:
-            path = np.vstack([path, straight_line(kin, path[-1], pose, step)[1:]])
-    except PlanningError:
-        return None
+    """Joint path (k, 6) rad from `q` (6,) in straight lines through poses (4, 4) of the tool; None where it stops."""
+    path = [q[None]]
+    for pose in poses:
+        found = _follow_line(kin, path[-1][-1], pose, step)
+        if isinstance(found, _Stop):
+            return None
+        path.append(found[1:])
+    return np.concatenate(path)
+
+
+@dataclass(frozen=True)
+class _Stop:
+    """Where a line of `length` m cannot go on: after a `share` of it, `at` (3,) m; `jump` is in rad, None: no IK."""
+
+    length: float
+    share: float
+    at: FloatArray
+    jump: float | None
+
+    def __str__(self) -> str:
+        why = "out of reach" if self.jump is None else f"a joint would jump by {self.jump:.2f} rad"
+        at, length = np.array2string(self.at, precision=3), self.length
+        return f"straight line of {length:.3f} m stops after {self.share * length:.3f} m at {at}: {why}"
+
+
+def _follow_line(
+    kin: ArmKinematics,
+    q0: FloatArray,
+    goal: FloatArray,
+    step: float,
+    turn_step: float = 0.05,
+    max_joint_step: float = 0.3,
+) -> FloatArray | _Stop:
+    """`straight_line` without an exception."""
+    start = kin.tool_matrix(q0)
+    poses = poses_between(start, goal, step, turn_step)
+    path = np.empty((len(poses) + 1, 6))
+    path[0] = q0
+    for n, pose in enumerate(poses):
+        branches = kin.ik(pose)
+        change = np.abs(branches - path[n]).max(axis=1, initial=0.0)
+        nearest = change.argmin() if len(change) else None
+        if nearest is None or change[nearest] > max_joint_step:
+            length = float(np.linalg.norm(goal[:3, 3] - start[:3, 3]))
+            jump = None if nearest is None else float(change[nearest])
+            return _Stop(length, (n + 1) / len(poses), pose[:3, 3], jump)
+        path[n + 1] = branches[nearest]
     return path

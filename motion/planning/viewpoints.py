@@ -103,7 +103,7 @@ def _in_view(point: FloatArray, world_from_camera: RigidTransform, camera: Intri
 
 def closer_views(
     world_from_connector: RigidTransform, parameters: CloseViewParameters = CloseViewParameters()
-) -> list[RigidTransform]:
+) -> Iterator[RigidTransform]:
     """Viewpoints for a closer look at a connector whose pose is known roughly: world_from_camera, the best first.
 
     They lie on the arms' side (towards -x) and look as square to the connector's axis as may be: there its whole length
@@ -111,14 +111,11 @@ def closer_views(
     """
     center = world_from_connector.translation
     axis = world_from_connector.rotation.apply([1.0, 0.0, 0.0])
-    views = []
-    for distance in parameters.distances:
-        for yaw in np.deg2rad(parameters.yaws_deg):
-            for pitch in np.deg2rad(parameters.pitches_deg):
-                # ZY: first down by the pitch, then left by the yaw
-                turn = Rotation.from_euler("ZY", [yaw, pitch])
-                sight = turn.apply([1.0, 0.0, 0.0])
-                detour = abs(distance - parameters.distances[0])
-                cost = abs(float(sight @ axis)) + parameters.distance_cost * detour
-                views.append((cost, RigidTransform.from_components(center - distance * sight, turn * OPTICAL)))
-    return [pose for _, pose in sorted(views, key=lambda view: view[0])]
+    grid = np.meshgrid(parameters.distances, np.deg2rad(parameters.yaws_deg), np.deg2rad(parameters.pitches_deg))
+    distances, yaws, pitches = (values.transpose(1, 0, 2).ravel() for values in grid)
+    turns = Rotation.from_euler("ZY", np.column_stack([yaws, pitches]))  # first down by the pitch, then left by the yaw
+    sights = turns.apply([1.0, 0.0, 0.0])
+    costs = np.abs(sights @ axis) + parameters.distance_cost * np.abs(distances - parameters.distances[0])
+    order = np.argsort(costs, kind="stable")
+    views = RigidTransform.from_components(center - distances[:, None] * sights, turns * OPTICAL)
+    return (views[int(i)] for i in order)

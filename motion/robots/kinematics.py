@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import FloatArray
-from regrasp.interfaces.geometry import rotation_about
+from regrasp.motion.robots.poses import multiply, rotation_matrix
 
 # Joint origins in the parent link, metres, and rotation axes (0 x, 1 y, 2 z).
 ORIGINS = np.array(
@@ -81,6 +81,7 @@ def world_spheres(base: FloatArray, q: FloatArray, links: NDArray[np.int64], loc
     return out
 
 
+@nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
 def wrap(q: FloatArray) -> FloatArray:
     """Angles brought into [-pi, pi)."""
     return (q + np.pi) % (2 * np.pi) - np.pi
@@ -99,6 +100,58 @@ def _reaches(base: FloatArray, q: FloatArray, target: FloatArray, max_distance: 
     return position < max_distance**2 and rotation < 8 * np.sin(max_angle / 2) ** 2
 
 
+@nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
+def _with_straight_wrist(base: FloatArray, raw: FloatArray, target: FloatArray) -> FloatArray:
+    """The solution `raw` (6,) with a straight wrist, where the solver only gives a least-squares orientation."""
+    arm = np.array([raw[0], raw[1], raw[2], 0.0, 0.0, 0.0])
+    forearm = link_frames_in(base, arm)[3]
+    sine, cosine = 0.0, 0.0
+    for r in range(3):
+        sine += forearm[r, 2] * target[r, 1] - forearm[r, 1] * target[r, 2]
+        cosine += forearm[r, 1] * target[r, 1] + forearm[r, 2] * target[r, 2]
+    arm[5] = np.arctan2(sine, cosine)
+    return wrap(arm)
+
+
+@nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
+def _is_new(row: FloatArray, rows: FloatArray, count: int, distinct: float) -> bool:
+    """Whether no row of the first `count` differs from this one by `distinct` rad at most in each joint."""
+    same = False
+    for other in range(count):
+        same = same or np.max(np.abs(wrap(row - rows[other]))) <= distinct
+    return not same
+
+
+@nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
+def _solutions(
+    base: FloatArray, raw: FloatArray, target: FloatArray, max_distance: float, max_angle: float, distinct: float
+) -> FloatArray:
+    """The solver's answers `raw` (n, 6) that bring the tool to a target (4, 4), wrapped, without repetitions."""
+    out, count = np.empty_like(raw), 0
+    for row in range(raw.shape[0]):
+        q = wrap(raw[row])
+        if not _reaches(base, q, target, max_distance, max_angle):
+            q = _with_straight_wrist(base, q, target)
+            if not _reaches(base, q, target, max_distance, max_angle):
+                continue
+        if _is_new(q, out, count, distinct):
+            out[count] = q
+            count += 1
+    return out[:count]
+
+
+@nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
+def _within_limits(rows: FloatArray) -> FloatArray:
+    """The rows within the joint limits, rounding errors aside."""
+    out, count = np.empty_like(rows), 0
+    for row in range(rows.shape[0]):
+        inside = np.minimum(np.maximum(rows[row], LOWER), UPPER)
+        if np.all(np.abs(inside - rows[row]) < _ROUNDING):
+            out[count] = inside
+            count += 1
+    return out[:count]
+
+
 class ArmKinematics:
     """One arm whose base frame stands at `base` (world_from_base)."""
 
@@ -112,22 +165,30 @@ class ArmKinematics:
 
     def link_frames(self, q: FloatArray) -> FloatArray:
         """World frames (7, 4, 4) of the base and the six links, for joints (6,) rad."""
-        return link_frames_in(self.base, np.asarray(q, float))
+        return np.asarray(link_frames_in(self.base, np.asarray(q, float)))
 
     def tool(self, q: FloatArray) -> RigidTransform:
         """world_from_tool: x forward along the gripper, y the direction in which the fingers close."""
-        return RigidTransform.from_matrix(self._tool_matrix(q))
+        return RigidTransform.from_matrix(self.tool_matrix(q))
+
+    def tool_matrix(self, q: FloatArray) -> FloatArray:
+        """`tool` as a matrix (4, 4)."""
+        frame: FloatArray = self.link_frames(q)[6]
+        frame[:3, 3] += frame[:3, :3] @ TOOL_OFFSET
+        return frame
 
     def wrist(self, q: FloatArray) -> RigidTransform:
         """world_from_wrist: the link before the last joint; a wrist camera is fixed on it."""
         return RigidTransform.from_matrix(self.link_frames(q)[5])
 
-    def ik(self, world_from_tool: RigidTransform) -> FloatArray:
+    def ik(self, world_from_tool: RigidTransform | FloatArray) -> FloatArray:
         """All joint vectors (n, 6) rad within the limits that bring the tool to a pose; (0, 6) when there is none.
 
-        Every row is checked by forward kinematics (0.1 mm, 1 mrad): the solver also answers for poses out of reach.
+        The pose may be a matrix (4, 4). Every row is checked by forward kinematics (0.1 mm, 1 mrad): the solver also
+        answers for poses out of reach.
         """
-        return _within_limits(self._solve(world_from_tool.as_matrix()))
+        target = world_from_tool if isinstance(world_from_tool, np.ndarray) else world_from_tool.as_matrix()
+        return np.asarray(_within_limits(self._solve(target)))
 
     def ik_view(self, world_from_camera: RigidTransform, wrist_from_camera: RigidTransform) -> FloatArray:
         """Joint vectors (n, 6) rad that bring a wrist camera to a place and direction of view, upright images first.
@@ -142,34 +203,13 @@ class ArmKinematics:
             raise ValueError(f"the camera must look along the wrist link's x axis, not along {mount[:3, 2]}")
         found = [q for q in self._view_solutions(wanted, mount) if self._sees(q, wanted, mount)]
         found.sort(key=lambda q: -float(self._camera_up(q, mount) @ -wanted[:3, 1]))
-        return _within_limits(self._distinct(found))
-
-    def _tool_matrix(self, q: FloatArray) -> FloatArray:
-        frame: FloatArray = self.link_frames(q)[6]
-        frame[:3, 3] += frame[:3, :3] @ TOOL_OFFSET
-        return frame
+        return np.asarray(_within_limits(self._distinct(found)))
 
     def _solve(self, target: FloatArray) -> FloatArray:
         """`ik` of a (4, 4) matrix without regard to the joint limits."""
-        good = []
-        for raw in self._solver.IK(self._base_inverse @ target).Q:
-            q = wrap(np.asarray(raw, float))
-            if not self._reaches(q, target):
-                q = self._straight_wrist(q, target)
-                if not self._reaches(q, target):
-                    continue
-            good.append(q)
-        return self._distinct(good)
-
-    def _reaches(self, q: FloatArray, target: FloatArray) -> bool:
-        return bool(_reaches(self.base, q, target, self._parameters.position, self._parameters.angle))
-
-    def _straight_wrist(self, raw: FloatArray, target: FloatArray) -> FloatArray:
-        """The solution `raw` (6,) with a straight wrist, where the solver only gives a least-squares orientation."""
-        arm = np.array([raw[0], raw[1], raw[2], 0.0, 0.0, 0.0])
-        turn = self.link_frames(arm)[3, :3, :3].T @ target[:3, :3]
-        arm[5] = np.arctan2(turn[2, 1] - turn[1, 2], turn[1, 1] + turn[2, 2])
-        return wrap(arm)
+        raw = np.array(self._solver.IK(multiply(self._base_inverse, target)).Q, float).reshape(-1, 6)
+        limits = self._parameters
+        return np.asarray(_solutions(self.base, raw, target, limits.position, limits.angle, limits.distinct))
 
     def _view_solutions(self, wanted: FloatArray, mount: FloatArray) -> Iterator[FloatArray]:
         """Fixed-point iteration over the camera's roll: a solution's last joint says by how much the roll is off."""
@@ -201,21 +241,17 @@ class ArmKinematics:
 
     def _distinct(self, rows: list[FloatArray]) -> FloatArray:
         """The rows as (n, 6) without repetitions, order kept."""
-        kept: list[FloatArray] = []
+        kept, count = np.empty((len(rows), 6)), 0
         for row in rows:
-            if all(np.abs(wrap(row - other)).max() > self._parameters.distinct for other in kept):
-                kept.append(row)
-        return np.array(kept).reshape(-1, 6)
+            if _is_new(row, kept, count, self._parameters.distinct):
+                kept[count] = row
+                count += 1
+        return kept[:count]
 
 
 def _rolled(tool_target: FloatArray, wanted: FloatArray, roll: float) -> FloatArray:
     """The tool target turned by `roll` rad about the wanted optical axis through the wanted camera position."""
     turn = np.eye(4)
-    turn[:3, :3] = rotation_about(wanted[:3, 2], roll)
+    turn[:3, :3] = rotation_matrix(roll * wanted[:3, 2])
     turn[:3, 3] = wanted[:3, 3] - turn[:3, :3] @ wanted[:3, 3]
-    return turn @ tool_target
-
-
-def _within_limits(rows: FloatArray) -> FloatArray:
-    inside = np.clip(rows, LOWER, UPPER)
-    return inside[np.all(np.abs(inside - rows) < _ROUNDING, axis=1)]
+    return np.asarray(multiply(turn, tool_target))

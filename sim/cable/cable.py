@@ -14,7 +14,10 @@ explicit step can bear, is needed too: without it the springs gain energy (measu
 Rayleigh's mass-proportional term.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
 
 import numba
 import numpy as np
@@ -38,25 +41,40 @@ class CableParameters:
     joint_damping: float = 0.6  # share of the damping at which an explicit step overshoots
 
 
+class BodyState(NamedTuple):
+    """Where a body's frame is in the world and how it moves, as PyBullet gives it."""
+
+    position: Sequence[float]  # m
+    quaternion: Sequence[float]  # x, y, z, w
+    velocity: Sequence[float]  # m/s
+    rate: Sequence[float]  # rad/s
+
+    @property
+    def pose(self) -> RigidTransform:
+        """world_from_body."""
+        return RigidTransform.from_components(self.position, Rotation.from_quat(self.quaternion))
+
+
 @numba.njit(cache=True)
-def spring_torques(rotations: FloatArray, rates: FloatArray, stiffness: FloatArray, damping: FloatArray) -> FloatArray:
+def spring_torques(states: FloatArray, stiffness: FloatArray, damping: FloatArray) -> FloatArray:
     r"""Joint torques (n, 3) N m of linear spring-dampers on the joints' rotation vectors :math:`\theta`.
 
     .. math:: \tau = -k \theta - d \omega
 
-    `rotations` (n, 4) are the joints' quaternions x, y, z, w; `rates` (n, 3) rad/s. Rates and torques are in the child
+    `states` (n, 7) are the joints' quaternions x, y, z, w and their rates in rad/s. Rates and torques are in the child
     links' frames. `stiffness` (n,) is in N m/rad, `damping` (n,) in N m s/rad.
     """
-    torques = np.empty_like(rates)
-    for i in range(rotations.shape[0]):
-        x, y, z, w = rotations[i]
+    torques = np.empty((states.shape[0], 3))
+    for i in range(states.shape[0]):
+        x, y, z, w = states[i, :4]
+        rates = states[i, 4:]
         if w < 0.0:
             x, y, z, w = -x, -y, -z, -w
         sine = np.sqrt(x * x + y * y + z * z)
         factor = 2.0 if sine < 1e-9 else 2.0 * np.arctan2(sine, w) / sine
-        torques[i, 0] = -stiffness[i] * factor * x - damping[i] * rates[i, 0]
-        torques[i, 1] = -stiffness[i] * factor * y - damping[i] * rates[i, 1]
-        torques[i, 2] = -stiffness[i] * factor * z - damping[i] * rates[i, 2]
+        torques[i, 0] = -stiffness[i] * factor * x - damping[i] * rates[0]
+        torques[i, 1] = -stiffness[i] * factor * y - damping[i] * rates[1]
+        torques[i, 2] = -stiffness[i] * factor * z - damping[i] * rates[2]
     return torques
 
 
@@ -89,23 +107,26 @@ class CableBody:
 
     def apply_springs(self) -> None:
         """Set the joint torques for the next step from the present joint rotations and rates."""
-        states = p.getJointStatesMultiDof(self.body, range(self.links), physicsClientId=self.client)
-        rotations = np.array([s[0] for s in states])
-        rates = np.array([s[1] for s in states])
-        torques = spring_torques(rotations, rates, self.stiffness, self.damping)
+        joints, no_turns = self._joints
+        states = p.getJointStatesMultiDof(self.body, joints, physicsClientId=self.client)
+        torques = spring_torques(np.array([s[0] + s[1] for s in states]), self.stiffness, self.damping)
         p.setJointMotorControlMultiDofArray(
             self.body,
-            range(self.links),
+            joints,
             p.TORQUE_CONTROL,
-            targetPositions=[_IDENTITY] * self.links,
+            targetPositions=no_turns,
             forces=torques.tolist(),
             physicsClientId=self.client,
         )
 
-    def connector_state(self) -> tuple[RigidTransform, FloatArray, FloatArray]:
-        """Pose world_from_connector, velocity (3,) m/s of its centre, angular velocity (3,) rad/s; all in the world."""
-        s = p.getLinkState(self.body, self.connector_link, 1, 1, physicsClientId=self.client)
-        return RigidTransform.from_components(s[4], Rotation.from_quat(s[5])), np.array(s[6]), np.array(s[7])
+    def connector_state(self) -> BodyState:
+        """The present state of the connector's frame; the velocity is that of its centre."""
+        return BodyState(*p.getLinkState(self.body, self.connector_link, 1, 1, physicsClientId=self.client)[4:8])
+
+    @cached_property
+    def _joints(self) -> tuple[list[int], list[list[float]]]:
+        """The spherical joints, and a target rotation for each, which PyBullet wants but torque control ignores."""
+        return list(range(self.links)), [_IDENTITY] * self.links
 
 
 def build_cable(

@@ -3,15 +3,18 @@
 Both are physical models with stated numbers. Neither depends on the gripper, so neither helps the robot.
 """
 
+import math
 from collections import deque
 from dataclasses import dataclass
 
+import numba
 import numpy as np
 import pybullet as p
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cell import Clip
+from regrasp.sim.cable.cable import BodyState
 
 
 @dataclass(frozen=True)
@@ -66,12 +69,12 @@ class Hold:
         p.changeConstraint(self._constraint, maxForce=self._max_force, physicsClientId=link.client)
         self._forces: deque[FloatArray] = deque(maxlen=parameters.force_window)
 
-    def move(self, to: RigidTransform) -> None:
-        """Move the constraint to the pose `to`, and the link with it; for laying the cable before a run."""
+    def move(self, position: list[float], quaternion: list[float]) -> None:
+        """Move the constraint to that pose in the world, and the link with it; for laying the cable before a run."""
         p.changeConstraint(
             self._constraint,
-            to.translation.tolist(),
-            jointChildFrameOrientation=to.rotation.as_quat().tolist(),
+            position,
+            jointChildFrameOrientation=quaternion,
             maxForce=self._max_force,
             physicsClientId=self._client,
         )
@@ -140,52 +143,67 @@ class ClipHold:
         parameters: ClipParameters = ClipParameters(),
     ) -> None:
         self._target, self._clip, self._dt, self._parameters = link, clip, step, parameters
-        self._seat = clip.world_from_seat
-        self._axis = self._seat.rotation.apply([1.0, 0.0, 0.0])
+        self._seat: FloatArray = clip.world_from_seat.translation
+        self._axis: FloatArray = clip.world_from_seat.rotation.apply([1.0, 0.0, 0.0])
         self._cos = float(np.cos(np.deg2rad(clip.capture_angle_deg)))
-        self._stiffness = clip.hold_force / parameters.lip_travel
-        self._torsion = parameters.lip_torque / float(np.sin(np.deg2rad(clip.capture_angle_deg)))
-        self._damping = float(np.sqrt(self._stiffness * mass))
-        self._torsion_damping = float(np.sqrt(self._torsion * inertia))
+        stiffness = clip.hold_force / parameters.lip_travel
+        torsion = parameters.lip_torque / float(np.sin(np.deg2rad(clip.capture_angle_deg)))
+        self._force = np.array([stiffness, clip.hold_force, np.sqrt(stiffness * mass)])
+        self._torque = np.array([torsion, parameters.lip_torque, np.sqrt(torsion * inertia)])
         self._resting = 0.0
         self._armed = True
         self.holds = False
 
-    def step(self, connector: RigidTransform, velocity: FloatArray, rate: FloatArray) -> None:
-        """Take, pull or release the connector; call before every physics step.
-
-        `connector` is its pose in the world, `velocity` (3,) m/s that of its centre, `rate` (3,) rad/s its rotation.
-        """
-        offset = self._seat.translation - connector.translation
-        distance = float(np.linalg.norm(offset))
-        axis = connector.rotation.apply([1.0, 0.0, 0.0])
-        if self.holds and distance > self._clip.capture_distance:
-            self.holds, self._armed = False, False
-        if self.holds:
-            self._pull(connector, offset, velocity, axis, rate)
+    def step(self, connector: BodyState) -> None:
+        """Take, pull or release the connector; call before every physics step."""
+        distance = math.dist(self._seat, connector.position)
+        if distance > self._clip.capture_distance:
+            if self.holds:
+                self.holds, self._armed = False, False
+            self._armed = self._armed or distance > self._parameters.rearm_distance * self._clip.capture_distance
+            self._resting = 0.0
             return
-        self._armed = self._armed or distance > self._parameters.rearm_distance * self._clip.capture_distance
-        inside = self._armed and distance < self._clip.capture_distance and float(axis @ self._axis) > self._cos
-        resting = inside and float(np.linalg.norm(velocity)) < self._parameters.click_speed
+        if self.holds:
+            self._pull(connector)
+            return
+        aligned = float(_x_axis(np.array(connector.quaternion)) @ self._axis) > self._cos
+        resting = self._armed and aligned and math.hypot(*connector.velocity) < self._parameters.click_speed
         self._resting = self._resting + self._dt if resting else 0.0
         if self._resting >= self._parameters.click_seconds:
             self.holds, self._resting = True, 0.0
 
-    def _pull(
-        self, connector: RigidTransform, offset: FloatArray, velocity: FloatArray, axis: FloatArray, rate: FloatArray
-    ) -> None:
-        force = _limited(self._stiffness * offset, self._clip.hold_force) - self._damping * velocity
-        turning = rate - axis * float(rate @ axis)
-        torque = (
-            _limited(self._torsion * np.cross(axis, self._axis), self._parameters.lip_torque)
-            - self._torsion_damping * turning
-        )
-        at, target = connector.translation.tolist(), self._target
+    def _pull(self, connector: BodyState) -> None:
+        force, torque = _lip_wrench(np.concatenate(connector), self._seat, self._axis, self._force, self._torque)
+        at, target = connector.position, self._target
         client = target.client
         p.applyExternalForce(target.body, target.link, force.tolist(), at, p.WORLD_FRAME, physicsClientId=client)
         p.applyExternalTorque(target.body, target.link, torque.tolist(), p.WORLD_FRAME, physicsClientId=client)
 
 
+@numba.njit(cache=True)
+def _lip_wrench(
+    state: FloatArray, seat: FloatArray, seat_axis: FloatArray, force: FloatArray, torque: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """The lips' force (3,) N and torque (3,) N m on a connector, in the world.
+
+    `state` (13,) is the connector's position, quaternion, velocity and rate; `seat` (3,) m and `seat_axis` (3,) the
+    seat's position and x axis. `force` (3,) and `torque` (3,) are stiffness, limit and damping in their units.
+    """
+    axis, velocity, rate = _x_axis(state[3:7]), state[7:10], state[10:13]
+    pull = _limited(force[0] * (seat - state[:3]), force[1]) - force[2] * velocity
+    turning = rate - axis * np.sum(rate * axis)
+    turn = _limited(torque[0] * np.cross(axis, seat_axis), torque[1]) - torque[2] * turning
+    return pull, turn
+
+
+@numba.njit(cache=True)
+def _x_axis(quaternion: FloatArray) -> FloatArray:
+    """The x axis (3,) of the frame that a quaternion x, y, z, w (4,) of any length turns."""
+    x, y, z, w = quaternion / np.sqrt(np.sum(quaternion * quaternion))
+    return np.array([x * x - y * y - z * z + w * w, 2 * (x * y + z * w), 2 * (x * z - y * w)])
+
+
+@numba.njit(cache=True)
 def _limited(vector: FloatArray, limit: float) -> FloatArray:
-    size = float(np.linalg.norm(vector))
+    size = np.sqrt(np.sum(vector * vector))
     return vector if size <= limit else vector * (limit / size)

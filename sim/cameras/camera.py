@@ -21,11 +21,12 @@ from regrasp.sim.render.renderer import Renderer
 class CameraMounting:
     """What carries a camera.
 
-    `true_pose` gives world_from_camera with the calibration's error in it. `joints` gives the encoder readings (6,) rad
-    of the arm that carries the camera; it is None for a fixed camera.
+    `expose` notes where the carrier is now; what it returns works out world_from_camera then, with the calibration's
+    error in it: most exposures are never drawn. `joints` gives the encoder readings (6,) rad of the arm that carries
+    the camera; it is None for a fixed camera.
     """
 
-    true_pose: Callable[[], RigidTransform]
+    expose: Callable[[], Callable[[], RigidTransform]]
     joints: Callable[[], FloatArray] | None = None
 
 
@@ -36,7 +37,7 @@ class _Exposure:
     number: int
     stamp: float
     poses: NDArray[np.float32]
-    world_from_camera: RigidTransform
+    world_from_camera: Callable[[], RigidTransform]
     joints: FloatArray | None
     light: LightState
     noise_number: int  # the number that keys the noise; a repeated picture has that of the first
@@ -65,14 +66,14 @@ class SimCamera:
         latency: float,
     ) -> None:
         self.name: str = spec.name
-        self.spec = spec
+        self.spec, self.rate = spec, spec.rate
         self._intrinsics = spec.intrinsics
         self._visuals = renderer.visuals
         self._renderer, self.light, self._noise = renderer, light, noise
         self.drops: Callable[[], bool] | None = None
         self.frozen = self.without_depth = False
         self.transmission = 1.0
-        self._true_pose, self._joints, self._now, self._latency = mounting.true_pose, mounting.joints, now, latency
+        self._mounting, self._now, self._latency = mounting, now, latency
         self._exposures: deque[_Exposure] = deque(maxlen=int(np.ceil(latency * spec.rate)) + 2)
         self._count = 0
         self._frame: RgbdFrame | None = None
@@ -82,14 +83,14 @@ class SimCamera:
         """Take a frame now. `poses` is the present `Visuals.snapshot`, which cameras that expose together share."""
         poses = self._visuals.snapshot() if poses is None else poses
         self._count += 1
-        joints = None if self._joints is None else np.array(self._joints(), float)
+        joints = None if self._mounting.joints is None else self._mounting.joints().copy()
         if self.drops is not None and self.drops():
             return
         if self.frozen and self._exposures:
             exposure = replace(self._exposures[-1], number=self._count, stamp=self._now(), joints=joints)
         else:
-            seen = (poses, self._true_pose(), joints, self.light, self._count, self.transmission, self.without_depth)
-            exposure = _Exposure(self._count, self._now(), *seen)
+            seen = (poses, self._mounting.expose(), joints, self.light)
+            exposure = _Exposure(self._count, self._now(), *seen, self._count, self.transmission, self.without_depth)
         self._exposures.append(exposure)
 
     def latest(self) -> RgbdFrame | None:
@@ -106,8 +107,8 @@ class SimCamera:
 
     def static_frames(self, count: int) -> Iterator[RgbdFrame]:
         """The next `count` frames of a static scene: the picture is drawn once, the depth noise for each frame."""
-        now, poses, joints = self._now(), self._visuals.snapshot(), self._joints() if self._joints else None
-        image = self._renderer.render(poses, self._true_pose(), self._intrinsics, self.light)
+        now, poses, joints = self._now(), self._visuals.snapshot(), self._mounting.joints and self._mounting.joints()
+        image = self._renderer.render(poses, self.true_pose(), self._intrinsics, self.light)
         for i in range(count):
             number, stamp = self._count + 1 + i, now + i / self.spec.rate
             depth = self._noise.apply(image.depth, number)
@@ -115,14 +116,14 @@ class SimCamera:
 
     def segmentation(self, poses: NDArray[np.float32], intrinsics: Intrinsics) -> NDArray[np.int32]:
         """Ground truth: the `VisualItem.id` (H, W) that each pixel of a camera at this one's true pose would show."""
-        return self._renderer.render(poses, self._true_pose(), intrinsics, self.light).ids
+        return self._renderer.render(poses, self.true_pose(), intrinsics, self.light).ids
 
     def true_pose(self) -> RigidTransform:
         """Ground truth: world_from_camera with the calibration's error in it."""
-        return self._true_pose()
+        return self._mounting.expose()()
 
     def _draw(self, exposure: _Exposure) -> tuple[RgbdFrame, NDArray[np.int32]]:
-        image = self._renderer.render(exposure.poses, exposure.world_from_camera, self._intrinsics, exposure.light)
+        image = self._renderer.render(exposure.poses, exposure.world_from_camera(), self._intrinsics, exposure.light)
         rgb, depth = image.rgb, self._noise.apply(image.depth, exposure.noise_number)
         if exposure.transmission < 1.0:
             rgb = (rgb * exposure.transmission).astype(np.uint8)

@@ -5,9 +5,11 @@ have the opposite sign.
 """
 
 import tempfile
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+import numba
 import numpy as np
 import pybullet as p
 from scipy.spatial.transform import RigidTransform, Rotation
@@ -79,6 +81,8 @@ class SimArm:
         self.offsets = self._draw_offsets(hidden.errors.arm_tool, rng)
         self._speed_share = np.ones(6)  # of `MAX_JOINT_SPEED`, for each joint; less by a fault
         self._encoder_slip = np.zeros(6)  # rad that the encoders read too much, by a fault
+        self._late_joints = False  # whether the last command was more than some servo can do in a step
+        self._gains = [parameters.position_gain] * 6, [parameters.velocity_gain] * 6, STALL_TORQUES.tolist()
         self._trajectory: Trajectory | None = None
         self._started = 0.0
         self._servo: FloatArray = np.array(spec.sleep, float)
@@ -131,10 +135,13 @@ class SimArm:
         """See `regrasp.interfaces.devices.Arm`."""
         return self._trajectory is not None
 
-    def wrist_pose(self) -> RigidTransform:
-        """True world_from_wrist (link before the last joint): x along the gripper, z up when all joints are zero."""
+    def deferred_wrist_pose(self) -> Callable[[], RigidTransform]:
+        """What works out the present true world_from_wrist when it is called, now or later.
+
+        The wrist is the link before the last joint: x along the gripper, z up when all joints are zero.
+        """
         s = p.getLinkState(self.body, self.links["wrist_link"], 0, 1, physicsClientId=self.client)
-        return RigidTransform.from_components(s[4], Rotation.from_quat(s[5]) * _WRIST_FROM_URDF.inv())
+        return lambda: RigidTransform.from_components(s[4], Rotation.from_quat(s[5]) * _WRIST_FROM_URDF.inv())
 
     def tool_pose(self) -> RigidTransform:
         """True world_from_tool: x along the fingers, y along the closing direction, origin midway between the pads."""
@@ -157,35 +164,35 @@ class SimArm:
         if self._trajectory is not None:
             t = self.now() + self._dt - self._started
             q, v = self._trajectory.sample(t)
-            if t >= self._trajectory.duration and float(np.max(np.abs(q - self._target))) <= MAX_JOINT_SPEED * self._dt:
-                self._trajectory, v = None, np.zeros(6)
-            # A servo turns no faster than its rated speed; it follows a faster trajectory late.
-            wanted = q - self._target
-            step = np.clip(wanted, -MAX_JOINT_SPEED * self._dt, MAX_JOINT_SPEED * self._dt)
-            self._drive(self._target + step, np.where(step == wanted, v, step / self._dt))
-        elif self._late(self._target).any():
+            ended, q, v = _servo_target(self._target, q, v, t >= self._trajectory.duration, self._dt)
+            if ended:
+                self._trajectory = None
+            self._drive(q, v)
+        elif self._late_joints and self._late(self._target).any():
             self._drive(self._target, np.zeros(6))
         self.gripper.step()
         self._steps += 1
 
     def _drive(self, q: FloatArray, v: FloatArray) -> None:
         late = self._late(q)
-        if late.any():
+        self._late_joints = bool(late.any())
+        if self._late_joints:
             reach = self._speed_share * MAX_JOINT_SPEED * self._dt
             self._servo = np.where(late, self._servo + np.clip(q - self._servo, -reach, reach), q)
             v = np.where(late, 0.0, v)
         else:
             self._servo = q
         self._target = q
+        position_gains, velocity_gains, torques = self._gains
         p.setJointMotorControlArray(
             self.body,
             self.joints,
             p.POSITION_CONTROL,
             targetPositions=(JOINT_SIGNS * (self._servo + self.offsets)).tolist(),
             targetVelocities=(JOINT_SIGNS * v).tolist(),
-            positionGains=[self._parameters.position_gain] * 6,
-            velocityGains=[self._parameters.velocity_gain] * 6,
-            forces=STALL_TORQUES.tolist(),
+            positionGains=position_gains,
+            velocityGains=velocity_gains,
+            forces=torques,
             physicsClientId=self.client,
         )
 
@@ -216,6 +223,29 @@ class SimArm:
         """Tool position (3,) m in the world with the joints set to `q` (6,) rad."""
         self._reset_joints(q)
         return self.tool_pose().translation
+
+
+@numba.njit(cache=True)
+def _servo_target(
+    before: FloatArray, q: FloatArray, v: FloatArray, over: bool, dt: float
+) -> tuple[bool, FloatArray, FloatArray]:
+    """The servos' next targets, (6,) rad and rad/s, on the way from `before` (6,) rad to a trajectory's `q` and `v`.
+
+    A servo turns no faster than its rated speed; it follows a faster trajectory late. `over`: the trajectory's time is
+    over. The first value says whether the servos are at its end, too.
+    """
+    reach = MAX_JOINT_SPEED * dt
+    ended = over and np.max(np.abs(q - before)) <= reach
+    position, velocity = np.empty(6), np.empty(6)
+    for i in range(6):
+        wanted = q[i] - before[i]
+        step = min(max(wanted, -reach), reach)
+        position[i] = before[i] + step
+        if step != wanted:
+            velocity[i] = step / dt
+        else:
+            velocity[i] = 0.0 if ended else v[i]
+    return ended, position, velocity
 
 
 def _camera_offset(cell: Cell, arm: ArmName) -> tuple[float, float, float] | None:

@@ -92,6 +92,15 @@ def test_six_signals_at_once_leave_a_whole_record(start: Started, number: int) -
     assert (result()["outcome"], result()["cause"]["node"]) == ("interrupted", "hang")
 
 
+def test_a_run_ends_even_if_a_library_swallows_the_interrupt(start: Started) -> None:
+    process = start("Swallows")
+    until(goes_on, process)
+    process.send_signal(signal.SIGTERM)
+    process.communicate(timeout=PATIENCE)
+    assert process.returncode == 130
+    assert result()["outcome"] == "interrupted"
+
+
 def test_a_second_ctrl_c_ends_a_leaf_that_hangs_in_its_first_tick_and_names_it(start: Started) -> None:
     process = start("Hangs")
     until(at_work, process)

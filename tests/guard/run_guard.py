@@ -61,7 +61,7 @@ class StateTrace:
         for arm in world.arms.values():
             reading = arm.reading()
             yield from (reading.positions, reading.velocities, reading.efforts, [arm.gripper.reading().gap])
-        yield from world.cable.connector_state()[1:]
+        yield from world.cable.connector_state()[2:]
         yield world.connector_pose().as_matrix()
         if (last := services.perception.track.last) is not None:
             yield from (last.position, [last.stamp])

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from arm_surface import surface
 from fake_devices import TICK, FakeGripper, Rig
+from natural import natural_pose
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
@@ -12,7 +13,6 @@ from regrasp.interfaces.cell import KnownCell, pose_along
 from regrasp.interfaces.frame import Intrinsics, RgbdFrame
 from regrasp.motion.execution import ExecutionParameters, JawParameters
 from regrasp.motion.failure import PlanningError
-from regrasp.motion.planning.cable_path import natural_pose
 from regrasp.motion.service import Motion, MotionParameters
 from regrasp.motion.task import MotionTask
 

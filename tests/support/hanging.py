@@ -1,5 +1,6 @@
 """`python hanging.py ARGUMENTS...`: the command line with leaves that hang, in this process and in its children."""
 
+import contextlib
 import signal
 import time
 from typing import Any, ClassVar
@@ -42,7 +43,20 @@ class Goes(Leaf):
         return Status.RUNNING
 
 
-behaviors.LEAVES = {"Hangs": Hangs, "HangsDeaf": HangsDeaf, "Goes": Goes}
+class Swallows(Leaf):
+    """Goes on for ever; an exception that a signal raises in its tick is lost, as in a finaliser."""
+
+    INPUT_PORTS: ClassVar[dict[str, Any]] = {}
+    OUTPUT_PORTS: ClassVar[dict[str, Any]] = {}
+
+    def work(self) -> Status:
+        """See the class."""
+        with contextlib.suppress(KeyboardInterrupt):
+            time.sleep(0.2)
+        return Status.RUNNING
+
+
+behaviors.LEAVES = {"Hangs": Hangs, "HangsDeaf": HangsDeaf, "Goes": Goes, "Swallows": Swallows}
 
 if __name__ == "__main__":
     from regrasp.app.__main__ import main

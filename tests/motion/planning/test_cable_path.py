@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from natural import natural_pose, natural_ways
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from regrasp.interfaces.cell import KnownCell
-from regrasp.motion.planning.cable_path import natural_paths, natural_pose
 
 sideways = st.tuples(st.floats(-0.15, 0.15), st.floats(-0.15, 0.2)).map(lambda xz: np.array([xz[0], 0.0, xz[1]]))
 turns = st.tuples(*[st.floats(-0.2, 0.2)] * 3)
@@ -44,7 +44,7 @@ def test_every_way_ends_at_the_goal_in_small_steps(
 ) -> None:
     off = RigidTransform.from_components(shift, Rotation.from_rotvec(turn))
     start, goal = natural_pose(known, begin) * off, natural_pose(known, end) * off
-    ways = list(natural_paths(known, start, goal))
+    ways = list(natural_ways(known, start, goal))
     assert len(ways) > 1
     for way in ways:
         assert way[-1].translation == pytest.approx(goal.translation, abs=1e-6)
@@ -57,7 +57,7 @@ def test_every_way_ends_at_the_goal_in_small_steps(
 @given(sideways, sideways)
 def test_between_natural_shapes_the_direct_way_is_natural(known: KnownCell, begin: np.ndarray, end: np.ndarray) -> None:
     anchor, course = known.cable_anchor
-    direct = next(iter(natural_paths(known, natural_pose(known, begin), natural_pose(known, end))))
+    direct = next(iter(natural_ways(known, natural_pose(known, begin), natural_pose(known, end))))
     for pose in direct:
         place = cable_end(known, pose) - anchor
         expected = natural_pose(known, place - (place @ course) * course)

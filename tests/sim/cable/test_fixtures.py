@@ -9,6 +9,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cell import Cell
+from regrasp.sim.cable.cable import BodyState
 from regrasp.sim.cable.fixtures import BodyLink, ClipHold, ClipParameters, Hold, SocketHold
 from regrasp.sim.world import WorldParameters
 
@@ -30,10 +31,9 @@ class Plug:
     def link(self) -> BodyLink:
         return BodyLink(self.client, self.body, -1)
 
-    def state(self) -> tuple[RigidTransform, FloatArray, FloatArray]:
-        position, turn = p.getBasePositionAndOrientation(self.body, physicsClientId=self.client)
-        velocity, rate = p.getBaseVelocity(self.body, physicsClientId=self.client)
-        return RigidTransform.from_components(position, Rotation.from_quat(turn)), np.array(velocity), np.array(rate)
+    def state(self) -> BodyState:
+        place = p.getBasePositionAndOrientation(self.body, physicsClientId=self.client)
+        return BodyState(*place, *p.getBaseVelocity(self.body, physicsClientId=self.client))
 
     def put(self, pose: RigidTransform, velocity: FloatArray | None = None) -> None:
         p.resetBasePositionAndOrientation(
@@ -47,9 +47,9 @@ class Plug:
         for _ in range(round(seconds / self.step)):
             state = self.state()
             if clip is not None:
-                clip.step(*state)
+                clip.step(state)
             if force is not None:
-                at = state[0].translation.tolist()
+                at = state.position
                 p.applyExternalForce(self.body, -1, force.tolist(), at, p.WORLD_FRAME, physicsClientId=self.client)
             p.stepSimulation(physicsClientId=self.client)
 
@@ -103,7 +103,7 @@ def test_it_takes_an_end_that_rests_in_its_mouth(
     plug.advance(1.5, clip)
     assert clip.holds == caught
     if caught:
-        off = cell.known.clip.world_from_seat.inv() * plug.state()[0]
+        off = cell.known.clip.world_from_seat.inv() * plug.state().pose
         assert float(np.linalg.norm(off.translation)) < SEATED
         assert float(off.rotation.apply([1, 0, 0])[0]) > np.cos(np.deg2rad(1.0))
 
@@ -114,7 +114,7 @@ def test_it_does_not_take_a_passing_end(cell: Cell, plug: Plug, clip: ClipHold, 
     closest = np.inf
     for _ in range(round(0.1 / speed / 0.01)):
         plug.advance(0.01, clip)
-        off = plug.state()[0].translation - cell.known.clip.world_from_seat.translation
+        off = plug.state().pose.translation - cell.known.clip.world_from_seat.translation
         closest = min(closest, float(np.linalg.norm(off)))
         assert not clip.holds
     assert closest < 0.01  # m: it did pass through the mouth
@@ -133,7 +133,7 @@ DIRECTIONS = [(1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.6, -0.8)]
 def test_it_holds_ten_newtons(cell: Cell, plug: Plug, clip: ClipHold, direction: tuple[float, float, float]) -> None:
     seated(cell, plug, clip)
     plug.advance(3.0, clip, 10.0 * np.asarray(direction))
-    off = plug.state()[0].translation - cell.known.clip.world_from_seat.translation
+    off = plug.state().pose.translation - cell.known.clip.world_from_seat.translation
     assert clip.holds
     np.testing.assert_allclose(
         off, 10.0 / cell.known.clip.hold_force * ClipParameters().lip_travel * np.asarray(direction), atol=2e-4
@@ -173,7 +173,7 @@ def test_a_socket_lets_go_at_its_pull_out_force(plug: Plug, force: float, stays:
     for _ in range(480):
         plug.advance(plug.step, force=np.array([0.0, -force, 0.0]))
         socket.step()
-    moved = float(np.linalg.norm(plug.state()[0].translation))
+    moved = float(np.linalg.norm(plug.state().pose.translation))
     assert socket.holds == stays
     assert (moved < 1e-4) == stays  # m
 
@@ -196,4 +196,4 @@ def test_a_stand_lets_go_at_its_force_whichever_way(
         plug.advance(plug.step, force=share * STAND_FORCE * np.asarray(direction))
         stand.step()
     assert stand.holds == stays
-    assert (float(np.linalg.norm(plug.state()[0].translation)) < 1e-4) == stays  # m
+    assert (float(np.linalg.norm(plug.state().pose.translation)) < 1e-4) == stays  # m

@@ -1,4 +1,4 @@
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import pybullet as p
@@ -55,8 +55,12 @@ class Rig:
         renderer, light = make_renderer(self.visuals), LightState((-0.5, 0.3, 1.0), 0.45, 0.55)
         noise = DepthNoise(SPEC, ERRORS, seed=1)
         joints = lambda: self.joints  # noqa: E731
-        mounting = CameraMounting(lambda: self.pose, joints)
+        mounting = CameraMounting(self.expose, joints)
         return SimCamera(SPEC, renderer, light, noise, mounting, lambda: self.time, LATENCY)
+
+    def expose(self) -> Callable[[], RigidTransform]:
+        pose = self.pose
+        return lambda: pose
 
     def move(self, left: float) -> None:
         p.resetBasePositionAndOrientation(self.ball, [0, left, 0], [0, 0, 0, 1], physicsClientId=self.client)
