@@ -2,6 +2,9 @@
 
 from bisect import bisect_right
 from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
 
 from regrasp.interfaces.arrays import FloatArray
 
@@ -33,15 +36,18 @@ class Trajectory:
         if t >= self.times[-1]:
             return self.positions[-1], self.velocities[-1]
         i = bisect_right(self.times, t) - 1
-        h = float(self.times[i + 1] - self.times[i])
-        s = (t - float(self.times[i])) / h
-        p0, p1 = self.positions[i], self.positions[i + 1]
-        m0, m1 = h * self.velocities[i], h * self.velocities[i + 1]
-        position = (
-            (2 * s**3 - 3 * s**2 + 1) * p0
-            + (s**3 - 2 * s**2 + s) * m0
-            + (3 * s**2 - 2 * s**3) * p1
-            + (s**3 - s**2) * m1
-        )
-        velocity = ((6 * s**2 - 6 * s) * (p0 - p1) + (3 * s**2 - 4 * s + 1) * m0 + (3 * s**2 - 2 * s) * m1) / h
-        return position, velocity
+        begin = self.times[i]
+        s = float((t - begin) / (self.times[i + 1] - begin))
+        both = np.array((1.0, s, s * s, s * s * s)) @ self._polynomials[i]
+        return both[:6], both[6:]
+
+    @cached_property
+    def _polynomials(self) -> FloatArray:
+        """Coefficients (n - 1, 4, 12) of 1, s, s^2 and s^3 in each interval: of the position, then of the velocity."""
+        h = np.diff(self.times)[:, None]
+        rise = self.positions[1:] - self.positions[:-1]
+        m0, m1 = h * self.velocities[:-1], h * self.velocities[1:]
+        square, cube = 3 * rise - 2 * m0 - m1, m0 + m1 - 2 * rise
+        position = np.stack([self.positions[:-1], m0, square, cube], axis=1)
+        velocity = np.stack([m0, 2 * square, 3 * cube, np.zeros_like(cube)], axis=1) / h[:, None]
+        return np.concatenate([position, velocity], axis=2)

@@ -2,6 +2,8 @@
 
 from collections.abc import Callable, Iterator
 
+from regrasp.interfaces.wall_time import counts_as
+
 
 class MotionTask:
     """A motion of an arm or its jaw under way; every `poll` does one step of it.
@@ -12,6 +14,7 @@ class MotionTask:
     def __init__(self, steps: Iterator[None], stop: Callable[[], None]) -> None:
         self._steps, self._stop = steps, stop
 
+    @counts_as("planning")
     def poll(self) -> bool:
         """Whether it is done. Raises PlanningError with the cause when it cannot be done."""
         try:

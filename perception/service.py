@@ -12,6 +12,7 @@ from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cell import KnownCell
 from regrasp.interfaces.devices import Camera, Clock
 from regrasp.interfaces.frame import RgbdFrame
+from regrasp.interfaces.wall_time import counts_as
 from regrasp.perception.camera.health import CameraHealth, CameraHealthParameters
 from regrasp.perception.camera.model import NEAREST_DEPTH, pixel_rays
 from regrasp.perception.camera.registration import Registration, RegistrationParameters, expected_errors, register
@@ -70,6 +71,7 @@ class Perception:
         """The newest frame; None before the first."""
         return self._cameras[camera].latest()
 
+    @counts_as("perception")
     def look(self, camera: str) -> Estimate | NoEstimate | None:
         """The connector's pose by the newest frame, or why there is none; None before the first frame.
 
@@ -95,6 +97,7 @@ class Perception:
         """Look by this technique from now on. Raises ValueError if the cell lacks what it needs."""
         self._technique, self._results = make_technique(technique, self._known), {}
 
+    @counts_as("perception")
     def trouble(self, camera: str) -> str | None:
         """Why a camera is not to be trusted now, in a sentence; None when all is well."""
         health, newest = self._health[camera], self._cameras[camera].latest()
@@ -102,6 +105,7 @@ class Perception:
             health.feed(newest)
         return health.trouble(self._clock.now())
 
+    @counts_as("perception")
     def surface(self, camera: str, since: float) -> FloatArray | None:
         """Points (n, 3) m, world, that the newest frame shows, by the registered camera.
 
@@ -117,6 +121,7 @@ class Perception:
         seen = (depth > NEAREST_DEPTH) & (depth < self._parameters.surface_range)  # NaN compares false
         return np.asarray(registered.world_from_camera.apply(rays[seen] * depth[seen, None]))
 
+    @counts_as("perception")
     def map_obstacles(self, camera: str) -> int:
         """Take the newest frame into the occupancy map, by the registered camera; the number of full voxels.
 
@@ -130,6 +135,7 @@ class Perception:
             self.occupancy.integrate(scaled, pose, arms, guess_behind=camera == "rear")
         return len(self.occupancy.occupied_points())
 
+    @counts_as("perception")
     def map_new_obstacle(self, camera: str) -> int:
         """As `map_obstacles` if the newest frame shows an obstacle that is not mapped; its number of voxels, else 0.
 

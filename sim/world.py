@@ -16,6 +16,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cell import PLUGGED_INTO, Cell, WristMount
 from regrasp.interfaces.scene import Gravity, SceneSetup
+from regrasp.interfaces.wall_time import counts_as
 from regrasp.sim.build import (
     OUT_OF_SIGHT,
     LayingParameters,
@@ -57,6 +58,7 @@ class WorldParameters:
 
 
 NOTHING_ADDED = SceneSetup()
+_simulate = counts_as("physics")(p.stepSimulation)
 
 
 class World:
@@ -116,6 +118,7 @@ class World:
         """Seconds since the run began."""
         return self._steps * self.step_seconds
 
+    @counts_as("step loop")
     def advance(self, seconds: float) -> None:
         """Run the physics for so long, rounded to whole steps."""
         for _ in range(round(seconds / self.step_seconds)):
@@ -174,7 +177,7 @@ class World:
             fault.step(self.now())
         self.cable.apply_springs()
         self.clip.step(self._connector)
-        p.stepSimulation(physicsClientId=self.client)
+        _simulate(physicsClientId=self.client)
         self._steps += 1
         self._connector = self.cable.connector_state()
         self.socket.step()

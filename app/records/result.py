@@ -143,6 +143,7 @@ class Result:
     sim_seconds: float = 0.0
     wall_seconds: float = 0.0
     real_time_factor: float = 0.0
+    wall_by_part: dict[str, float] = dataclasses.field(default_factory=dict)  # s, see `regrasp.interfaces.wall_time`
     renderer: str = ""
     versions: dict[str, str] = dataclasses.field(default_factory=versions)
     belief: BeliefState | None = None

@@ -24,7 +24,16 @@ def run_summary(result: "Result", folder: Path) -> str:
         f"  time    {result.sim_seconds:.1f} s simulated in {result.wall_seconds:.1f} s, "
         f"real-time factor {result.real_time_factor:.2f}, renderer {result.renderer}"
     )
+    lines += [f"  went to {line}" for line in wall_lines(result)]
     return "\n".join(lines)
+
+
+def wall_lines(result: "Result") -> Iterator[str]:
+    """Where the wall-clock time went: each part's share, the largest first."""
+    parts = sorted(result.wall_by_part.items(), key=lambda part: -part[1])
+    whole = sum(result.wall_by_part.values())
+    if whole > 0:
+        yield ", ".join(f"{name} {100 * seconds / whole:.0f} %" for name, seconds in parts)
 
 
 def headline(result: "Result") -> str:

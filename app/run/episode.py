@@ -1,6 +1,5 @@
 """One run: the loop that ticks the tree, how it can end, and its result."""
 
-import time
 import traceback
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +21,7 @@ from regrasp.app.scenario.load import Scenario
 from regrasp.app.tasks.cable.belief import belief_state
 from regrasp.interfaces.cause import Cause, CauseCode
 from regrasp.interfaces.devices import TICK
+from regrasp.interfaces.wall_time import WallTime, measured
 from regrasp.sim.render.renderer import RendererName
 from regrasp.trees import in_tree_order, node_paths
 
@@ -53,8 +53,7 @@ def run_episode(
     A KeyboardInterrupt, inside a leaf or from an observer, ends the run cleanly. An exception inside a leaf ends it
     with the cause `internal_error`, and its traceback goes into the record.
     """
-    began = time.perf_counter()
-    with Record(out, scenario.name, seed, scenario.case, copies(scenario, seed)) as record:
+    with measured("start") as wall, Record(out, scenario.name, seed, scenario.case, copies(scenario, seed)) as record:
         world = build_world(scenario, seed, renderer, gui)
         try:
             log = record.logger(world.now, observers.event)
@@ -79,10 +78,12 @@ def run_episode(
             episode.tree.visitors += [ticks, episode.attempts, *faults]
             note_leaf_at_work(episode.tree, lambda node: record.at_work(world.now(), node))
             with Film(out / "video.mp4" if video and out else None, world) as film:
+                wall.switch("tree")
                 ending = _run(episode, scenario, film, observers.tick, log)
+                wall.switch("film" if video else "record")
             ticks.finalise()
             episode.attempts.finalise()
-            result = _result(episode, scenario, seed, ending, time.perf_counter() - began)
+            result = _result(episode, scenario, seed, ending, wall)
             peaks = {pair: round(force, 2) for pair, force in world.contact_peaks.items()}  # N
             log.info("end", outcome=ending.outcome, succeeded=result.succeeded, contact_peaks=peaks)
             record.finish(result)
@@ -194,7 +195,9 @@ def _raising(error: BaseException, root: py_trees.behaviour.Behaviour) -> py_tre
     return found
 
 
-def _result(episode: Episode, scenario: Scenario, seed: int, ending: Ending, wall: float) -> Result:
+def _result(episode: Episode, scenario: Scenario, seed: int, ending: Ending, wall: WallTime) -> Result:
+    wall.switch("record")
+    seconds = sum(wall.seconds.values())
     judge, belief = episode.judge, episode.services.belief
     expectations = judge.expectations(ending.outcome, ending.cause.code if ending.cause else None, belief)
     return Result(
@@ -209,8 +212,9 @@ def _result(episode: Episode, scenario: Scenario, seed: int, ending: Ending, wal
         expectations=expectations,
         slips=judge.slips(belief),
         sim_seconds=episode.world.now(),
-        wall_seconds=wall,
-        real_time_factor=episode.world.now() / wall,
+        wall_seconds=seconds,
+        real_time_factor=episode.world.now() / seconds,
+        wall_by_part={part: round(spent, 3) for part, spent in wall.seconds.items()},
         renderer=episode.world.renderer.name,
         belief=belief_state(episode.services),
         attempts=tuple(episode.attempts.made),

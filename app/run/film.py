@@ -11,6 +11,7 @@ import numpy as np
 from regrasp.app.run.video import OVERVIEW_SIZE, RgbImage, VideoWriter, compose
 from regrasp.interfaces.cell import FixedMount
 from regrasp.interfaces.frame import Intrinsics
+from regrasp.interfaces.wall_time import counts_as
 from regrasp.sim.world import World
 
 
@@ -44,6 +45,7 @@ class Film:
     ) -> None:
         self._stack.close()
 
+    @counts_as("film")
     def show(self, leaf: str) -> None:
         """Write a frame of the present instant if one is due; `leaf` is the active leaf's name."""
         world = self._world

@@ -7,6 +7,7 @@ from typing import TextIO
 import py_trees
 from py_trees.common import Status
 
+from regrasp.interfaces.wall_time import counts_as
 from regrasp.trees import in_tree_order, node_paths
 
 
@@ -38,6 +39,7 @@ class TickLog(py_trees.visitors.VisitorBase):
         """At a node's visit: note its status, which may have changed when the tick ends."""
         self._visited[id(behaviour)] = behaviour.status
 
+    @counts_as("record")
     def finalise(self) -> None:
         """After a tick, or after a stop outside one: write what changed, and flush."""
         stamp = json.dumps(round(self._now(), 6))

@@ -12,6 +12,7 @@ from regrasp.behaviors.cable.hand import HANDLING_ARM, HandLeaf
 from regrasp.behaviors.leaf import LeafFailed, LeafSteps
 from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.cell import Clip
+from regrasp.interfaces.wall_time import counts_as
 from regrasp.motion.failure import PlanningError
 from regrasp.motion.planning.straight import straight_line
 from regrasp.motion.robots.kinematics import ArmKinematics
@@ -60,6 +61,7 @@ class Carry(HandLeaf):
         onward = [RigidTransform.from_translation([x, 0.0, 0.0]) for x in in_and_out]
         yield motion.carry(HANDLING_ARM, self._goals(held), held, onward=onward, speed=self.parameters.speed)
 
+    @counts_as("planning")
     def _goals(self, held: RigidTransform) -> list[RigidTransform]:
         """Hand poses (world_from_tool) in front of the clip from which a straight path in is free.
 
@@ -147,6 +149,7 @@ class Insert(HandLeaf):
                 seen[result.stamp] = result
         return list(seen.values())
 
+    @counts_as("planning")
     def _seated(self, held: RigidTransform) -> RigidTransform:
         """world_from_tool that seats the held connector, with the roll that turns the hand least."""
         tool, clip = self.services.motion.tool(HANDLING_ARM).as_matrix(), self.services.known.clip

@@ -12,6 +12,7 @@ from regrasp.behaviors.cable.hand import CAMERA_ARM, HandLeaf
 from regrasp.behaviors.leaf import LeafSteps
 from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.cell import WristMount
+from regrasp.interfaces.wall_time import counts_as
 from regrasp.motion.failure import PlanningError
 from regrasp.motion.planning.viewpoints import CloseViewParameters, closer_views
 from regrasp.perception.pose.estimate import Estimate
@@ -42,6 +43,7 @@ class LookLeaf(HandLeaf):
         views = motion.kinematics[CAMERA_ARM].ik_view(world_from_camera, mount.wrist_from_camera)
         return np.array([q for q in views if model.free(q, self.view.margin)]).reshape(-1, 6)
 
+    @counts_as("planning")
     def best_view(
         self, connector: RigidTransform, taken: Sequence[NDArray[np.float64]] = ()
     ) -> tuple[RigidTransform, NDArray[np.float64]]:

@@ -1,14 +1,42 @@
-"""Time-optimal path parametrization by toppra. Importing this brings matplotlib, so `timing` imports it late."""
+"""Time-optimal path parametrization by toppra."""
 
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import ModuleType
 from typing import Any
 
 import numpy as np
-import toppra
-import toppra.algorithm
-import toppra.constraint
 from scipy.interpolate import BPoly
 
 from regrasp.interfaces.arrays import FloatArray
+
+
+@contextmanager
+def _empty_pyplot() -> Iterator[None]:
+    """In this context `import matplotlib.pyplot` gives an empty module, unless it has been imported before.
+
+    toppra imports it for plots that nobody here asks for: a second of every run.
+    """
+    names = ("matplotlib", "matplotlib.pyplot")
+    added = {} if names[1] in sys.modules else {name: ModuleType(name) for name in names}
+    before = {name: sys.modules[name] for name in added if name in sys.modules}
+    for name, module in added.items():
+        sys.modules[name] = module
+    if added:
+        added[names[0]].__dict__["pyplot"] = added[names[1]]
+    try:
+        yield
+    finally:
+        for name in added:
+            del sys.modules[name]
+        sys.modules.update(before)
+
+
+with _empty_pyplot():
+    import toppra
+    import toppra.algorithm
+    import toppra.constraint
 
 toppra.setup_logging("ERROR")
 

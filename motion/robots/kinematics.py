@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import FloatArray
+from regrasp.interfaces.wall_time import counts_as
 from regrasp.motion.robots.poses import multiply, rotation_matrix
 
 # Joint origins in the parent link, metres, and rotation axes (0 x, 1 y, 2 z).
@@ -190,6 +191,7 @@ class ArmKinematics:
         target = world_from_tool if isinstance(world_from_tool, np.ndarray) else world_from_tool.as_matrix()
         return np.asarray(_within_limits(self._solve(target)))
 
+    @counts_as("planning")
     def ik_view(self, world_from_camera: RigidTransform, wrist_from_camera: RigidTransform) -> FloatArray:
         """Joint vectors (n, 6) rad that bring a wrist camera to a place and direction of view, upright images first.
 

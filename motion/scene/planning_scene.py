@@ -10,6 +10,7 @@ from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cell import Connector, KnownCell, WristMount
 from regrasp.interfaces.devices import Arm, Gripper
 from regrasp.interfaces.frame import RgbdFrame
+from regrasp.interfaces.wall_time import counts_as
 from regrasp.motion.robots.kinematics import ArmKinematics, InverseKinematicsParameters
 from regrasp.motion.scene.collision import ArmBody, CollisionModel, CollisionParameters
 from regrasp.motion.scene.distance_grid import DistanceGrid
@@ -56,6 +57,7 @@ class PlanningScene:
         self._points = self._cable = NO_POINTS
         self._spacing = 0.01  # m, until the first voxels come
 
+    @counts_as("planning")
     def set_obstacles(self, points: FloatArray, spacing: float) -> None:
         """Keep clear of occupied voxels from now on: centres (n, 3) m in the world, and the edge `spacing` m.
 
@@ -68,6 +70,7 @@ class PlanningScene:
                 self._points = _points_beyond(self._points, self.model(spec.name, others=False).spheres(q), margin)
         self._rebuild_grid()
 
+    @counts_as("planning")
     def keep_clear(self, points: FloatArray) -> None:
         """Keep clear of these points (n, 3) m too, a cable or a stowed connector; they replace an earlier call's."""
         self._cable = points
@@ -82,6 +85,7 @@ class PlanningScene:
         lower, upper = points.min(axis=0) - border, points.max(axis=0) + border
         self._grid = DistanceGrid.from_points(points, lower, upper, self._spacing)
 
+    @counts_as("planning")
     def start_model(
         self, arm: str, held: RigidTransform | None = None, *, clip: bool = True, opening: float | None = None
     ) -> CollisionModel:
@@ -116,11 +120,13 @@ class PlanningScene:
             return self.kinematics[mount.arm].wrist(frame.joints) * mount.wrist_from_camera
         return mount.world_from_camera
 
+    @counts_as("planning")
     def spheres(self) -> list[tuple[FloatArray, FloatArray]]:
         """The arms' bodies now: centres (n, 3) m and radii (n,) m of each."""
         both = [self.model(name, others=False).spheres(self.joints(name)) for name in self.arms]
         return [(s[:, :3], s[:, 3]) for s in both]
 
+    @counts_as("planning")
     def model(
         self,
         arm: str,
@@ -151,6 +157,7 @@ class PlanningScene:
         grid = self._grid if others else None
         return CollisionModel(self.kinematics[arm], boxes, body, other, grid, self._scene_parameters.collision)
 
+    @counts_as("planning")
     def sees(self, world_from_camera: RigidTransform, points: FloatArray) -> bool:
         """Whether nothing known or seen stands between a camera and any of the points (n, 3) m."""
         eye = world_from_camera.translation

@@ -12,6 +12,7 @@ from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cell import CameraSpec
 from regrasp.interfaces.frame import Intrinsics, RgbdFrame
 from regrasp.interfaces.hidden_world import Errors
+from regrasp.interfaces.wall_time import counts_as
 from regrasp.sim.cameras.depth_noise import DepthNoise
 from regrasp.sim.render.picture import LightState
 from regrasp.sim.render.renderer import Renderer
@@ -93,6 +94,7 @@ class SimCamera:
             exposure = _Exposure(self._count, self._now(), *seen, self._count, self.transmission, self.without_depth)
         self._exposures.append(exposure)
 
+    @counts_as("rendering")
     def latest(self) -> RgbdFrame | None:
         """See `Camera.latest`. The picture is drawn when it is first read."""
         ready = [e for e in self._exposures if e.stamp + self._latency <= self._now() + 1e-9]

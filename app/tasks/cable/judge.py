@@ -11,6 +11,7 @@ from regrasp.app.records.result import Expectation, Slip
 from regrasp.app.tasks.cable.expectations import Expect
 from regrasp.behaviors.services import Belief
 from regrasp.interfaces.arrays import FloatArray
+from regrasp.interfaces.wall_time import counts_as
 from regrasp.sim.cable.phase import ConditionTimer, PhaseParameters
 from regrasp.sim.ground_truth import GroundTruth
 
@@ -57,6 +58,7 @@ class Judge:
         self.settled_pixels: int | None = None  # of the connector in the rear image when it had settled after a loss
         self.found_by: str | None = None  # the camera that found the connector first after its loss
 
+    @counts_as("record")
     def observe(self, now: float, belief: Belief) -> None:
         """Update with the ground truth after a tick at second `now`."""
         self._now = now
