@@ -41,6 +41,12 @@ class Intrinsics:
         f = 0.5 * width / float(np.tan(0.5 * horizontal_fov))
         return cls(width, height, f, f, (width - 1) / 2, (height - 1) / 2)
 
+    def shrunk(self, factor: int) -> "Intrinsics":
+        """The same view in a picture `factor` times smaller; what is left of the last row or column is cut off."""
+        width, height = max(1, self.width // factor), max(1, self.height // factor)
+        centre = (self.cx + 0.5) / factor - 0.5, (self.cy + 0.5) / factor - 0.5
+        return Intrinsics(width, height, self.fx / factor, self.fy / factor, *centre)
+
 
 @dataclass(frozen=True, eq=False)
 class RgbdFrame:

@@ -206,7 +206,7 @@ class World:
         rate = self._step_rate
         due = [c for c in self.cameras.values() if self._steps * c.rate % rate < c.rate]
         if due:
-            poses = self.visuals.snapshot()
+            poses = self.visuals.deferred_snapshot()
             for camera in due:
                 camera.expose(poses)
 

@@ -23,6 +23,7 @@ class FilmParameters:
     overview: FixedMount = field(  # behind and above the right arm
         default_factory=lambda: FixedMount(position=(-0.55, -0.75, 0.85), pitch_down_deg=30.0, yaw_deg=38.0)
     )
+    shrink: int = 2  # of the cameras' pictures, which are shown this much smaller
     overview_fov: float = 0.95  # rad, horizontal; the whole cell is in the picture
 
 
@@ -52,7 +53,7 @@ class Film:
         if self._writer is None or world.now() * self._parameters.rate < self._frames - 1e-6:
             return
         self._frames += 1
-        rear, wrist = (world.cameras[name].latest() for name in ("rear", "wrist"))
+        rear, wrist = (world.cameras[name].preview(self._parameters.shrink) for name in ("rear", "wrist"))
         lines = [
             f"{world.now():6.1f} s",
             f"{leaf}",
@@ -60,11 +61,11 @@ class Film:
             f"renderer: {world.renderer.name}",
         ]
         overview = render_overview(world, self._parameters)
-        self._writer.write(compose(overview, rear.rgb if rear else None, wrist.rgb if wrist else None, lines))
+        self._writer.write(compose(overview, rear, wrist, lines))
 
 
 def render_overview(world: World, parameters: FilmParameters = FilmParameters()) -> RgbImage:
     """The whole cell from behind and above the right arm: (480, 856, 3) uint8 RGB."""
     pose = parameters.overview.world_from_camera
     intrinsics = Intrinsics.from_fov(*OVERVIEW_SIZE, parameters.overview_fov)
-    return np.asarray(world.renderer.render(world.visuals.snapshot(), pose, intrinsics, world.light).rgb)
+    return np.asarray(world.renderer.render_color(world.visuals.snapshot(), pose, intrinsics, world.light))

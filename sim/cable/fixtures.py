@@ -4,6 +4,7 @@ Both are physical models with stated numbers. Neither depends on the gripper, so
 """
 
 import math
+import operator
 from collections import deque
 from dataclasses import dataclass
 
@@ -67,7 +68,7 @@ class Hold:
             physicsClientId=link.client,
         )
         p.changeConstraint(self._constraint, maxForce=self._max_force, physicsClientId=link.client)
-        self._forces: deque[FloatArray] = deque(maxlen=parameters.force_window)
+        self._forces: deque[tuple[float, float, float]] = deque(maxlen=parameters.force_window)
 
     def move(self, position: list[float], quaternion: list[float]) -> None:
         """Move the constraint to that pose in the world, and the link with it; for laying the cable before a run."""
@@ -79,10 +80,10 @@ class Hold:
             physicsClientId=self._client,
         )
 
-    def force(self) -> FloatArray:
+    def force(self) -> list[float]:
         """Add the last step's constraint force, and return the mean (3,) N over the window, in the world frame."""
-        self._forces.append(np.array(p.getConstraintState(self._constraint, physicsClientId=self._client)[:3]))
-        return np.asarray(np.mean(self._forces, axis=0))
+        self._forces.append(p.getConstraintState(self._constraint, physicsClientId=self._client)[:3])
+        return [sum(along) / len(self._forces) for along in zip(*self._forces, strict=True)]
 
     def release(self) -> None:
         """Remove the constraint."""
@@ -101,7 +102,7 @@ class SocketHold:
 
     def __init__(self, hold: Hold, axis: FloatArray | None, pull_out_force: float) -> None:
         self._hold: Hold | None = hold
-        self._axis = None if axis is None else axis / np.linalg.norm(axis)
+        self._axis = None if axis is None else (axis / np.linalg.norm(axis)).tolist()
         self._limit = pull_out_force
 
     @property
@@ -114,7 +115,8 @@ class SocketHold:
         if self._hold is None:
             return
         force = self._hold.force()
-        if float(np.linalg.norm(force) if self._axis is None else force @ self._axis) > self._limit:
+        pull = math.hypot(*force) if self._axis is None else sum(map(operator.mul, force, self._axis))
+        if pull > self._limit:
             self._hold.release()
             self._hold = None
 

@@ -37,7 +37,7 @@ class _Exposure:
 
     number: int
     stamp: float
-    poses: NDArray[np.float32]
+    poses: Callable[[], NDArray[np.float32]]
     world_from_camera: Callable[[], RigidTransform]
     joints: FloatArray | None
     light: LightState
@@ -80,9 +80,9 @@ class SimCamera:
         self._frame: RgbdFrame | None = None
         self._ids: NDArray[np.int32] | None = None
 
-    def expose(self, poses: NDArray[np.float32] | None = None) -> None:
-        """Take a frame now. `poses` is the present `Visuals.snapshot`, which cameras that expose together share."""
-        poses = self._visuals.snapshot() if poses is None else poses
+    def expose(self, poses: Callable[[], NDArray[np.float32]] | None = None) -> None:
+        """Take a frame now; cameras that expose together share the present `Visuals.deferred_snapshot` as `poses`."""
+        poses = self._visuals.deferred_snapshot() if poses is None else poses
         self._count += 1
         joints = None if self._mounting.joints is None else self._mounting.joints().copy()
         if self.drops is not None and self.drops():
@@ -97,10 +97,23 @@ class SimCamera:
     @counts_as("rendering")
     def latest(self) -> RgbdFrame | None:
         """See `Camera.latest`. The picture is drawn when it is first read."""
-        ready = [e for e in self._exposures if e.stamp + self._latency <= self._now() + 1e-9]
-        if ready and (self._frame is None or self._frame.number != ready[-1].number):
-            self._frame, self._ids = self._draw(ready[-1])
+        newest = self._newest()
+        if newest and (self._frame is None or self._frame.number != newest.number):
+            self._frame, self._ids = self._draw(newest)
         return self._frame
+
+    def preview(self, shrink: int) -> NDArray[np.uint8] | None:
+        """The colours (H / shrink, W / shrink, 3) of `latest()`, for a film; nothing else is drawn for it."""
+        newest = self._newest()
+        if newest is None:
+            return None
+        small, pose = self._intrinsics.shrunk(shrink), newest.world_from_camera()
+        return _darkened(self._renderer.render_color(newest.poses(), pose, small, newest.light), newest.transmission)
+
+    def _newest(self) -> _Exposure | None:
+        """The newest exposure that can be read."""
+        ready = [e for e in self._exposures if e.stamp + self._latency <= self._now() + 1e-9]
+        return ready[-1] if ready else None
 
     def true_ids(self) -> NDArray[np.int32] | None:
         """Ground truth: the `VisualItem.id` (H, W) that each pixel of `latest()` shows, -1 for none; None before it."""
@@ -125,14 +138,16 @@ class SimCamera:
         return self._mounting.expose()()
 
     def _draw(self, exposure: _Exposure) -> tuple[RgbdFrame, NDArray[np.int32]]:
-        image = self._renderer.render(exposure.poses, exposure.world_from_camera(), self._intrinsics, exposure.light)
-        rgb, depth = image.rgb, self._noise.apply(image.depth, exposure.noise_number)
-        if exposure.transmission < 1.0:
-            rgb = (rgb * exposure.transmission).astype(np.uint8)
+        image = self._renderer.render(exposure.poses(), exposure.world_from_camera(), self._intrinsics, exposure.light)
+        rgb, depth = _darkened(image.rgb, exposure.transmission), self._noise.apply(image.depth, exposure.noise_number)
         if exposure.transmission < 1.0 or exposure.without_depth:
             depth = np.zeros_like(depth)
         frame = RgbdFrame(self.name, exposure.number, exposure.stamp, rgb, depth, self._intrinsics, exposure.joints)
         return frame, image.ids
+
+
+def _darkened(rgb: NDArray[np.uint8], transmission: float) -> NDArray[np.uint8]:
+    return (rgb * transmission).astype(np.uint8) if transmission < 1.0 else rgb
 
 
 def camera_error(errors: Errors, rng: np.random.Generator) -> RigidTransform:

@@ -75,18 +75,36 @@ class GlRenderer:
         self._shadows.compare_func = "<="
         self._shadows.repeat_x = self._shadows.repeat_y = False
         self._shadow_target = self._gl.framebuffer(depth_attachment=self._shadows)
-        self._targets: dict[tuple[int, int], Any] = {}
+        self._targets: dict[tuple[tuple[int, int], bool], Any] = {}  # by size, and whether for colour alone
         self._placed: tuple[NDArray[np.float32], LightState] | None = None
 
     def render(
         self, poses: NDArray[np.float32], world_from_camera: RigidTransform, intrinsics: Intrinsics, light: LightState
     ) -> Image:
-        """See `Renderer.render`. A second camera with the same read-only array of poses needs no second shadow pass."""
-        placed = self._placed
-        if placed is None or placed[0] is not poses or placed[1] is not light or poses.flags.writeable:
-            self._place(poses, light)
-            self._placed = (poses, light)
+        """See `Renderer.render`. Where nothing has moved since the last picture, no shadows are drawn anew."""
         target = self._target(intrinsics.width, intrinsics.height)
+        self._draw_into(target, poses, world_from_camera, intrinsics, light)
+        return _read(target, intrinsics)
+
+    def render_color(
+        self, poses: NDArray[np.float32], world_from_camera: RigidTransform, intrinsics: Intrinsics, light: LightState
+    ) -> NDArray[np.uint8]:
+        """See `Renderer.render_color`."""
+        target = self._target(intrinsics.width, intrinsics.height, color_only=True)
+        self._draw_into(target, poses, world_from_camera, intrinsics, light)
+        return _read_color(target, intrinsics)
+
+    def _draw_into(
+        self,
+        target: Any,
+        poses: NDArray[np.float32],
+        world_from_camera: RigidTransform,
+        intrinsics: Intrinsics,
+        light: LightState,
+    ) -> None:
+        if self._placed is None or self._placed[1] is not light or not np.array_equal(self._placed[0], poses):
+            self._place(poses, light)
+            self._placed = (poses.copy(), light)
         target.use()
         target.clear()
         _write(self._draw, "world_to_clip", _clip_from_camera(intrinsics) @ world_from_camera.inv().as_matrix())
@@ -94,7 +112,6 @@ class GlRenderer:
         for group in self._groups:
             group.draw.render(instances=len(group.rows))
         self._backdrop.render(vertices=3)
-        return _read(target, intrinsics)
 
     def close(self) -> None:
         """Free the GL context."""
@@ -138,17 +155,15 @@ class GlRenderer:
         for group in casters:
             group.cast.render(instances=len(group.rows))
 
-    def _target(self, width: int, height: int) -> Any:
-        """The frame buffer of that size, with planes for colour, depth and ids."""
+    def _target(self, width: int, height: int, color_only: bool = False) -> Any:
+        """The frame buffer of that size, with planes for colour, depth and ids, or for colour alone."""
         size = (width, height)
-        if size not in self._targets:
-            planes = [
-                self._gl.texture(size, 4),
-                self._gl.texture(size, 1, dtype="f4"),
-                self._gl.texture(size, 1, dtype="i4"),
-            ]
-            self._targets[size] = self._gl.framebuffer(planes, self._gl.depth_renderbuffer(size))
-        return self._targets[size]
+        if (size, color_only) not in self._targets:
+            planes = [self._gl.texture(size, 4)]
+            if not color_only:
+                planes += [self._gl.texture(size, 1, dtype="f4"), self._gl.texture(size, 1, dtype="i4")]
+            self._targets[size, color_only] = self._gl.framebuffer(planes, self._gl.depth_renderbuffer(size))
+        return self._targets[size, color_only]
 
 
 def _set(program: Any, **uniforms: Any) -> None:
@@ -201,8 +216,12 @@ def _light_from_world(
 
 def _read(target: Any, k: Intrinsics) -> Image:
     depth, ids = np.empty((k.height, k.width), np.float32), np.empty((k.height, k.width), np.int32)
-    rgba = np.empty((k.height, k.width, 4), np.uint8)
-    target.read_into(rgba, components=4)
     target.read_into(depth, components=1, attachment=1, dtype="f4")
     target.read_into(ids, components=1, attachment=2, dtype="i4")
-    return Image(cv2.cvtColor(rgba, cv2.COLOR_RGBA2RGB), depth, ids)
+    return Image(_read_color(target, k), depth, ids)
+
+
+def _read_color(target: Any, k: Intrinsics) -> NDArray[np.uint8]:
+    rgba = np.empty((k.height, k.width, 4), np.uint8)
+    target.read_into(rgba, components=4)
+    return np.asarray(cv2.cvtColor(rgba, cv2.COLOR_RGBA2RGB), np.uint8)

@@ -30,6 +30,12 @@ class Renderer(Protocol):
         """The picture of the items at `poses`, a `Visuals.snapshot`, from an optical frame (x right, y down)."""
         ...
 
+    def render_color(
+        self, poses: NDArray[np.float32], world_from_camera: RigidTransform, intrinsics: Intrinsics, light: LightState
+    ) -> NDArray[np.uint8]:
+        """As `render`, but only the picture's `rgb`, for films."""
+        ...
+
     def close(self) -> None:
         """Free the renderer's context or client."""
         ...

@@ -54,6 +54,12 @@ class TinyRenderer:
         rgb[ids == -1] = np.rint(255 * np.array(BACKGROUND)).astype(np.uint8)
         return Image(rgb, metres, ids)
 
+    def render_color(
+        self, poses: NDArray[np.float32], world_from_camera: RigidTransform, intrinsics: Intrinsics, light: LightState
+    ) -> NDArray[np.uint8]:
+        """See `Renderer.render_color`."""
+        return self.render(poses, world_from_camera, intrinsics, light).rgb
+
     def close(self) -> None:
         """Disconnect the PyBullet client."""
         p.disconnect(physicsClientId=self._client)

@@ -1,6 +1,8 @@
 """The visual shapes of the bodies in a PyBullet client, and their poses."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -63,7 +65,14 @@ class Visuals:
 
     def snapshot(self) -> NDArray[np.float32]:
         """Present poses world_from_visual of all items, (n, 3, 4) float32. Read-only, so that cameras may share it."""
+        return self.deferred_snapshot()()
+
+    def deferred_snapshot(self) -> Callable[[], NDArray[np.float32]]:
+        """What works out the present `snapshot` when it is first called, now or later."""
         frames = [frame for body, links in self._links.items() for frame in self._frames(body, links)]
+        return cache(lambda: self._poses(frames))
+
+    def _poses(self, frames: list[tuple[Any, Any]]) -> NDArray[np.float32]:
         if not frames:
             return np.zeros((0, 3, 4), np.float32)
         position, quaternion = zip(*frames, strict=True)

@@ -44,14 +44,14 @@ class SimGripper:
         self._spec, self._errors, self._parameters = hidden.gripper, hidden.errors, parameters
         self._fingers = (links["left_finger_link"], links["right_finger_link"])
         self.pads = (links["left_pad"], links["right_pad"])
-        self._noise_key = int(rng.integers(2**31))
+        self._noise = np.random.default_rng(int(rng.integers(2**31)))
         self._build(links["gripper_prop_link"])
         self._gap_command = parameters.closed_gap
         self._force: float | None = None
         self._forced_open, self._stuck, self._force_share = False, False, 1.0
         self._backlash_gap = self.true_gap()
         self._samples = 0
-        self._reading = self._sample(0)
+        self._reading = self._sample()
         self._drive()
 
     def open(self, gap: float) -> None:
@@ -89,20 +89,20 @@ class SimGripper:
     def restart_clock(self) -> None:
         """Set the count of samples to zero; the arm's clock is zero now."""
         self._samples = 0
-        self._reading = self._sample(0)
+        self._reading = self._sample()
 
     def step(self) -> None:
         """Sample the encoder if it is time."""
         due = int(self._now() * self._errors.finger_rate + 1e-6)
         if due > self._samples:
             self._samples = due
-            self._reading = self._sample(due)
+            self._reading = self._sample()
 
-    def _sample(self, number: int) -> GripperReading:
+    def _sample(self) -> GripperReading:
         half = self._errors.finger_backlash / 2
         gap = self.true_gap()
         self._backlash_gap = min(max(self._backlash_gap, gap - half), gap + half)
-        noise = np.random.default_rng([self._noise_key, number]).normal(0.0, self._errors.finger_noise)
+        noise = self._noise.normal(0.0, self._errors.finger_noise)
         step = self._errors.finger_resolution
         return GripperReading(self._now(), max(0.0, round((self._backlash_gap + noise) / step) * step))
 

@@ -18,14 +18,14 @@ def a_world(rear: Any = None) -> Any:
     world = SimpleNamespace(t=0.0, gravity="zero", light=None)
     world.now = lambda: world.t
     world.visuals = SimpleNamespace(snapshot=lambda: None)
-    world.cameras = {name: SimpleNamespace(latest=lambda: rear) for name in ("rear", "wrist")}
+    world.cameras = {name: SimpleNamespace(preview=lambda shrink: rear) for name in ("rear", "wrist")}
 
-    def render(_poses: Any, _pose: Any, intrinsics: Any, _light: Any) -> Any:
+    def render_color(_poses: Any, _pose: Any, intrinsics: Any, _light: Any) -> Any:
         rgb = np.zeros((intrinsics.height, intrinsics.width, 3), np.uint8)
         rgb[..., 1] = min(255, int(100 * world.t))
-        return SimpleNamespace(rgb=rgb)
+        return rgb
 
-    world.renderer = SimpleNamespace(render=render, name="toy")
+    world.renderer = SimpleNamespace(render_color=render_color, name="toy")
     return world
 
 

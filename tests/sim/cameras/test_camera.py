@@ -1,5 +1,6 @@
 from collections.abc import Callable, Iterator
 
+import cv2
 import numpy as np
 import pybullet as p
 import pytest
@@ -128,6 +129,28 @@ def test_the_same_frame_again_until_the_next_is_there(rig: Rig) -> None:
     assert second.number == 2
 
 
+def test_a_preview_is_the_newest_frame_made_smaller(rig: Rig) -> None:
+    assert rig.camera.preview(2) is None
+    rig.move(0.05)
+    rig.camera.expose()
+    rig.move(-0.1)
+    rig.time = 0.1
+    small, frame = rig.camera.preview(2), rig.camera.latest()
+    assert small is not None
+    assert frame is not None
+    height, width = small.shape[:2]
+    assert (height, width) == (SPEC.height // 2, SPEC.width // 2)
+    expected = cv2.resize(frame.rgb, (width, height), interpolation=cv2.INTER_AREA)
+    off = np.abs(small.astype(int) - expected).max(axis=2)
+    assert float((off > 12).mean()) < 0.02  # the ball's edge
+    rig.camera.transmission = 0.5
+    rig.camera.expose()
+    rig.time = 0.2
+    dark = rig.camera.preview(2)
+    assert dark is not None
+    assert float(dark.mean()) < 0.6 * float(small.mean())
+
+
 def test_readers_change_nothing(rig: Rig) -> None:
     """One camera is read at every exposure, the other once at the end: the last frames are the same."""
     rig.time = 0.0
@@ -135,7 +158,7 @@ def test_readers_change_nothing(rig: Rig) -> None:
     for number in range(1, 8):
         rig.time = number / 15
         rig.move(0.01 * number)
-        poses = rig.visuals.snapshot()
+        poses = rig.visuals.deferred_snapshot()
         rig.camera.expose(poses)
         other.expose(poses)
         rig.camera.latest()

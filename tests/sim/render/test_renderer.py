@@ -130,6 +130,12 @@ def _hull_centroid(points: NDArray[np.float64]) -> NDArray[np.float64]:
     return centroid
 
 
+@pytest.mark.parametrize("name", ["moderngl", "tiny"])
+def test_colours_alone_are_those_of_the_picture(scene: Visuals, name: str) -> None:
+    renderer, view = renderer_of(scene, name), (scene.snapshot(), CAMERA, K, LIGHT)
+    assert np.array_equal(renderer.render_color(*view), renderer.render(*view).rgb)
+
+
 def test_both_renderers_see_the_same(scene: Visuals) -> None:
     fast, slow = renderer_of(scene, "moderngl"), renderer_of(scene, "tiny")
     a, b = (r.render(scene.snapshot(), CAMERA, K, LIGHT) for r in (fast, slow))
