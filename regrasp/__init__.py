@@ -218,7 +218,7 @@ def has_display() -> bool:
 def _check_run(scenario: Any, seed: Any, renderer: Any, on_tick: Any, on_event: Any, stop: Any) -> None:
     """Raises TypeError or ValueError for arguments of `run` that would fail later, or not at all."""
     from regrasp.app.scenario.load import Scenario
-    from regrasp.app.scenario.schema import MAX_SEED
+    from regrasp.interfaces.seed import MAX_SEED
 
     if not isinstance(scenario, Scenario):
         raise TypeError(f"scenario is {scenario!r}; expected a name, a path or what load_scenario returns")

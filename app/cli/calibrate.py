@@ -7,12 +7,10 @@ import typer
 
 from regrasp.app.files.findings import Finding, Findings, real_path, shown
 from regrasp.app.files.resources import resolve
-from regrasp.app.frames.calibration_file import IMAGE_SUFFIXES
 from regrasp.app.interrupts import late_imports
 from regrasp.app.records import folders
-from regrasp.app.scenario.cell_file import load_cell
-from regrasp.app.scenario.schema import MAX_SEED
 from regrasp.interfaces.quote import nearest, quoted
+from regrasp.interfaces.seed import MAX_SEED
 
 
 def add_to(app: typer.Typer) -> None:
@@ -51,6 +49,9 @@ def calibrate(
     holds width, height, fx, fy, cx, cy (pixels; 0, 0 is the middle of the first), OpenCV's distortion k1, k2, p1, p2,
     k3, and the residual.
     """
+    from regrasp.app.frames.calibration_file import IMAGE_SUFFIXES
+    from regrasp.app.scenario.cell_file import load_cell
+
     wrong = folders.file_findings(out, new=True) + (folders.folder_findings(draw) if draw else [])
     if out.suffix.lower() in IMAGE_SUFFIXES:
         wrong.append(Finding(shown(out), 0, "is a picture's name, and a calibration is YAML; end it in .yaml"))

@@ -12,7 +12,7 @@ from regrasp.app.files.findings import Finding, Findings, shown
 from regrasp.app.files.resources import resolve
 from regrasp.app.files.whole_file import write_whole
 from regrasp.app.records import folders
-from regrasp.app.scenario.schema import MAX_SEED
+from regrasp.interfaces.seed import MAX_SEED
 
 if TYPE_CHECKING:
     from regrasp.interfaces.cell import Cell

@@ -12,7 +12,6 @@ from typing import Literal
 
 from regrasp.app.files.resources import shipped
 from regrasp.app.records import folders
-from regrasp.app.scenario.cell_file import load_cell
 
 PACKAGES = ("regrasp", "numpy", "scipy", "pybullet", "py_trees", "ompl", "eaik", "toppra", "numba", "moderngl")
 EGL = {
@@ -73,6 +72,8 @@ def egl(find: Callable[[str], str | None]) -> Check:
 
 def renderer() -> Check:
     """Build the shipped cell's world, which needs all of the above; says which renderer it got, and why."""
+    from regrasp.app.scenario.cell_file import load_cell
+
     try:
         from regrasp.sim.world import World
 

@@ -7,8 +7,8 @@ from typing import Annotated, Literal
 import typer
 
 from regrasp.app.files.findings import Finding, Findings
-from regrasp.app.scenario.schema import MAX_SEED
 from regrasp.interfaces.quote import quoted
+from regrasp.interfaces.seed import MAX_SEED
 
 MAX_SEEDS = 10_000  # of one study
 EXIT_UNMET = 1  # something did not come out as expected, or is not as it should be

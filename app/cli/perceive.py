@@ -3,7 +3,7 @@
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, TypeVar
+from typing import TYPE_CHECKING, Annotated, TypeVar
 
 import typer
 
@@ -12,11 +12,11 @@ from regrasp.app.files.findings import Finding, Findings, real_path, shown
 from regrasp.app.files.resources import resolve
 from regrasp.app.interrupts import late_imports
 from regrasp.app.records import folders
-from regrasp.app.scenario.cell_file import load_cell
-from regrasp.app.scenario.load import load_scenario
-from regrasp.app.scenario.schema import MAX_SEED
-from regrasp.interfaces.fields import Color
 from regrasp.interfaces.quote import nearest, quoted
+from regrasp.interfaces.seed import MAX_SEED
+
+if TYPE_CHECKING:
+    from regrasp.interfaces.fields import Color
 
 T = TypeVar("T")
 
@@ -94,6 +94,8 @@ def perceive(
     \b
     Exit code: 0 found, 1 not found, 2 bad input.
     """
+    from regrasp.app.scenario.cell_file import load_cell
+
     count, wrong = len(rgb), list[Finding]()
     none = [None] * count
     depths = _each("--depth", depth or none, count, wrong, once=False)
@@ -152,7 +154,7 @@ def _bad_drawing(draw: Path, inputs: Sequence[Path]) -> list[Finding]:
     return folders.file_findings(draw)
 
 
-def _color(text: str, wrong: list[Finding], min_saturation: float = 0.2) -> Color | None:
+def _color(text: str, wrong: list[Finding], min_saturation: float = 0.2) -> "Color | None":
     """The colour of "R,G,B", each then 0 to 1. What is wrong is added to `wrong`.
 
     Below `min_saturation` (of HSV; choice) a colour is refused as grey: every grey thing would look like the connector.
@@ -193,6 +195,8 @@ def snapshot(
       regrasp snapshot no_obstacle --seed 3 --frames 4 --out four
       regrasp snapshot no_obstacle --set cell=thesis_tags --out tags
     """
+    from regrasp.app.scenario.load import load_scenario
+
     wrong = folders.folder_findings(out)
     if there := [name for name in SNAPSHOT_FILES if (out / name).exists()]:
         wrong.append(Finding(shown(out), 0, f"already holds {', '.join(there)}; name another folder"))

@@ -2,15 +2,17 @@
 
 import re
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 from rich.console import Console, Group
 from rich.live import Live
 from rich.text import Text
 
 from regrasp.app.cli.keys import keyboard
-from regrasp.app.records.replay import Replay
-from regrasp.app.records.timeline import event_text
 from regrasp.interfaces.quote import printable, quoted
+
+if TYPE_CHECKING:
+    from regrasp.app.records.replay import Replay
 
 PAGE_CHANGES = 10  # changes that PgDn and PgUp go
 HELP = (  # the first that fits is shown
@@ -44,7 +46,7 @@ class View:
     note: str = ""
 
 
-def replay_on_screen(replay: Replay, part: str, start: float) -> None:
+def replay_on_screen(replay: "Replay", part: str, start: float) -> None:
     """Step through the record until q."""
     view: View | None = View(replay.at(start), part)
     console = Console(highlight=False, markup=False)
@@ -57,7 +59,7 @@ def replay_on_screen(replay: Replay, part: str, start: float) -> None:
             view = None if key is None else pressed(replay, view, key)
 
 
-def pressed(replay: Replay, view: View, key: str) -> View | None:
+def pressed(replay: "Replay", view: View, key: str) -> View | None:
     """The view after a key; None to quit."""
     if view.prompt:
         return _typed(replay, view, key)
@@ -75,7 +77,7 @@ def pressed(replay: Replay, view: View, key: str) -> View | None:
     return None if key in ("q", "\x04") else view
 
 
-def _typed(replay: Replay, view: View, key: str) -> View:
+def _typed(replay: "Replay", view: View, key: str) -> View:
     closed = replace(view, prompt="", typed="")
     if key == "escape":
         return closed
@@ -91,8 +93,10 @@ def _typed(replay: Replay, view: View, key: str) -> View:
     return replace(closed, index=replay.at(float(view.typed)))
 
 
-def draw(replay: Replay, view: View, width: int, height: int) -> Group:
+def draw(replay: "Replay", view: View, width: int, height: int) -> Group:
     """The screen: a line with the position, the tree, the change's events, and a line of keys."""
+    from regrasp.app.records.timeline import event_text
+
     change = replay.changes[view.index]
     events = [
         f"{_own_name(event.node) or '-'}  {event_text(event)}" for event in change.events if view.part in event.node
@@ -113,7 +117,7 @@ def _help(width: int) -> str:
     return next((text for text in HELP if len(text) <= width), HELP[-1])
 
 
-def _tree(replay: Replay, view: View, width: int, height: int) -> list[Text]:
+def _tree(replay: "Replay", view: View, width: int, height: int) -> list[Text]:
     """As many lines of the tree as fit, around the first node that changed."""
     nodes = [node for node in replay.rows if view.part in node.path]
     changed = {tick.path for tick in replay.changes[view.index].nodes}

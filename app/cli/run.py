@@ -17,13 +17,13 @@ from regrasp.app.files.findings import Finding, Findings, shown
 from regrasp.app.interrupts import EXIT_INTERRUPTED
 from regrasp.app.records import folders
 from regrasp.app.records.summary import run_summary
-from regrasp.app.run.batch import Run, Settings, result_of
 from regrasp.app.run.processes import run_each
-from regrasp.app.scenario.load import Scenario
 from regrasp.interfaces.quote import printable
 
 if TYPE_CHECKING:
     from regrasp.app.records.result import Result
+    from regrasp.app.run.batch import Run, Settings
+    from regrasp.app.scenario.load import Scenario
 
 
 def add_to(app: typer.Typer) -> None:
@@ -68,6 +68,8 @@ def run_scenario(
     \b
     Exit code: 0 every expectation met, 1 not, 2 bad input, 130 Ctrl-C.
     """
+    from regrasp.app.run.batch import Run, Settings
+
     overrides = [*(sets or []), *([] if seed is None else [f"seed={seed}"])]
     twice = seed is not None and any(text.partition("=")[0].strip() == "seed" for text in sets or [])
     wrong = [Finding("--seed", 0, "the seed is given by --set, too; leave one out")] if twice else []
@@ -100,7 +102,7 @@ def run_scenario(
     raise typer.Exit(exit_code(result))
 
 
-def _checked(load: Callable[[], list[Scenario]], wrong: list[Finding], out: Path | None) -> list[Scenario]:
+def _checked(load: "Callable[[], list[Scenario]]", wrong: list[Finding], out: Path | None) -> "list[Scenario]":
     """The scenarios. Raises `Findings` of all that is wrong with them and with the options."""
     wrong += folders.folder_findings(folders.RUNS) if out is None else folders.run_folder_findings(out)
     try:
@@ -112,7 +114,7 @@ def _checked(load: Callable[[], list[Scenario]], wrong: list[Finding], out: Path
     return loaded
 
 
-def _run(scenario: Scenario, folder: Path, settings: Settings, gui: bool, log_level: LogLevel) -> "Result":
+def _run(scenario: "Scenario", folder: Path, settings: "Settings", gui: bool, log_level: LogLevel) -> "Result":
     """Run in this process, with progress on stderr."""
     with shown_progress(settings.quiet, log_level) as observers:
         try:
@@ -129,8 +131,10 @@ def _run(scenario: Scenario, folder: Path, settings: Settings, gui: bool, log_le
             return stopped.result
 
 
-def _watched(run: Run, task: Callable[[], "Result"], wall_limit: float) -> "Result":
+def _watched(run: "Run", task: Callable[[], "Result"], wall_limit: float) -> "Result":
     """Do the run in a process of its own, which is stopped after `wall_limit` seconds."""
+    from regrasp.app.run.batch import result_of
+
     assert run.folder is not None
     try:
         [done] = run_each([task], 1, wall_limit)
@@ -141,7 +145,7 @@ def _watched(run: Run, task: Callable[[], "Result"], wall_limit: float) -> "Resu
     return result_of(run, done)
 
 
-def _tell(loaded: list[Scenario], out: Path | None) -> None:
+def _tell(loaded: "list[Scenario]", out: Path | None) -> None:
     """Print what a dry run found."""
     first = loaded[0]
     typer.echo(f"{shown(first.path)}: nothing wrong; tree {shown(first.tree)}, cell {first.file.cell}")

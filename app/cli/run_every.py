@@ -2,16 +2,16 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from regrasp.app.cli.options import EXIT_UNMET
 from regrasp.app.files.findings import Finding, Findings
 from regrasp.app.interrupts import EXIT_INTERRUPTED
 from regrasp.app.records import folders
-from regrasp.app.run.batch import Row, Run, RunEpisode, Settings, run_all
-from regrasp.app.run.junit import write_junit
-from regrasp.app.scenario.load import cases
-from regrasp.app.studies.table import print_table
 from regrasp.interfaces.quote import printable
+
+if TYPE_CHECKING:
+    from regrasp.app.run.batch import Row, Run, RunEpisode, Settings
 
 
 def run_every(
@@ -20,9 +20,9 @@ def run_every(
     jobs: int,
     out: Path | None = None,
     junit: Path | None = None,
-    settings: Settings = Settings(),  # noqa: B008 - it does not change
+    settings: "Settings | None" = None,
     wrong: Sequence[Finding] = (),
-    episode: RunEpisode | None = None,
+    episode: "RunEpisode | None" = None,
 ) -> int:
     """Run every case, each in its own process, its record in a folder of `out` with its name.
 
@@ -33,6 +33,10 @@ def run_every(
         Findings: bad input; `wrong` holds what the caller found.
         OSError: the disk is full or the like.
     """
+    from regrasp.app.run.batch import Run, Settings, run_all
+    from regrasp.app.run.junit import write_junit
+    from regrasp.app.scenario.load import cases
+
     found = [*wrong, *(folders.file_findings(junit) if junit else [])]
     try:
         loaded = cases(scenario, overrides)
@@ -48,7 +52,7 @@ def run_every(
         raise Findings(found)
     into = out or folders.new_folder(f"{loaded[0].name}-all")
     runs = [Run(case, case.file.seed, into / name) for case, name in zip(loaded, names, strict=True)]
-    rows, interrupted = run_all(runs, jobs, settings=settings, episode=episode)
+    rows, interrupted = run_all(runs, jobs, settings=settings or Settings(), episode=episode)
     if junit:
         junit.parent.mkdir(parents=True, exist_ok=True)
         write_junit(junit, loaded[0].name, runs, rows)
@@ -58,7 +62,9 @@ def run_every(
     return 0 if all(row.succeeded for row in rows.values()) else EXIT_UNMET
 
 
-def _tell(name: str, runs: Sequence[Run], rows: Mapping[int, Row], into: Path) -> None:
+def _tell(name: str, runs: "Sequence[Run]", rows: "Mapping[int, Row]", into: Path) -> None:
+    from regrasp.app.studies.table import print_table
+
     header = ("case", "as expected", "outcome", "simulated s", "seconds")
     lines = [
         (

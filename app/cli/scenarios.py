@@ -4,13 +4,10 @@ import json
 from typing import Annotated
 
 import typer
-import yaml
 
 from regrasp.app.cli.options import Sets
 from regrasp.app.files.findings import Finding, Findings, shown
 from regrasp.app.files.resources import shipped
-from regrasp.app.files.schema_doc import markdown
-from regrasp.app.scenario.load import case_names, cases, description, load_scenario
 from regrasp.interfaces.quote import printable
 
 app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="List, check and show scenarios.")
@@ -20,6 +17,8 @@ Name = Annotated[str, typer.Argument(help="A shipped scenario's name, or a path 
 @app.command("list")
 def list_scenarios() -> None:
     """List the shipped scenarios, with their cases."""
+    from regrasp.app.scenario.load import case_names, description
+
     known = shipped("scenario")
     width = max(map(len, known), default=0)
     for name, path in known.items():
@@ -47,6 +46,8 @@ def check_scenarios(
     \b
     Exit code: 0 nothing is wrong, 2 findings, a line each on stderr.
     """
+    from regrasp.app.scenario.load import cases
+
     found: list[Finding] = []
     for name in files or shipped("scenario"):
         try:
@@ -77,6 +78,10 @@ def show_scenario(
       regrasp scenarios show short_obstacle
       regrasp scenarios show short_obstacle --case gravity=earth > mine.yaml
     """
+    import yaml
+
+    from regrasp.app.scenario.load import case_names, load_scenario
+
     loaded = load_scenario(scenario, sets or [], case)
     names = case_names(scenario, sets or []) if case is None else [loaded.case]
     typer.echo(f"# {printable(loaded.name)}: {'this case' if case else 'the first of these cases'}")
@@ -109,6 +114,7 @@ def print_schema(
     To read it yourself:
       regrasp scenarios schema --markdown
     """
+    from regrasp.app.files.schema_doc import markdown
     from regrasp.app.scenario.schema import ScenarioFile, json_schema
 
     if as_markdown:

@@ -4,17 +4,17 @@ import sys
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from regrasp.app.files.findings import Finding, Findings, shown
 from regrasp.app.files.resources import read_text, resolve
 from regrasp.app.files.whole_file import write_whole
 from regrasp.app.records.folders import FILES, file_findings
-from regrasp.app.records.reader import RunRecord, read_record
-from regrasp.app.scenario.load import check_tree_file
-from regrasp.app.scenario.references import tree_text
 from regrasp.interfaces.quote import nearest, quoted
-from regrasp.trees import Node, TreeSyntaxError, collapsed, read_graph, recorded, run_stats
-from regrasp.trees.export import FORMAT_OF_SUFFIX, FORMATS, THEMES, export_tree
+
+if TYPE_CHECKING:
+    from regrasp.app.records.reader import RunRecord
+    from regrasp.trees import Node
 
 MAX_MISSING_NAMED = 3  # missing nodes that a finding names
 
@@ -33,6 +33,10 @@ class Request:
 
 def exported(request: Request) -> bytes:
     """The tree in the format asked for, also written to `out` if there is one. Raises `Findings`."""
+    from regrasp.app.records.reader import read_record
+    from regrasp.trees import collapsed
+    from regrasp.trees.export import export_tree
+
     form = _form(request)
     record = read_record(request.run) if request.run else None
     path = _tree_file(request, record)
@@ -47,6 +51,8 @@ def exported(request: Request) -> bytes:
 
 def _form(request: Request) -> str:
     """The format's name. Raises `Findings` of all that is wrong with the request itself."""
+    from regrasp.trees.export import THEMES
+
     out = request.out
     form = request.form or (_named(out) if out else "ascii")
     found = [*_wrong_form(request.form, out)] if request.form else []
@@ -68,10 +74,14 @@ def _form(request: Request) -> str:
 
 def _named(out: Path) -> str:
     """The format of a file's suffix, '' for none."""
+    from regrasp.trees.export import FORMAT_OF_SUFFIX
+
     return FORMAT_OF_SUFFIX.get(out.suffix.lower(), "")
 
 
 def _wrong_form(form: str, out: Path | None) -> Iterator[Finding]:
+    from regrasp.trees.export import FORMAT_OF_SUFFIX, FORMATS
+
     if form not in FORMATS:
         yield Finding("--format", 0, f"no format {quoted(form)}; {nearest(form, FORMATS)}")
     elif out and _named(out) not in ("", form):
@@ -81,6 +91,8 @@ def _wrong_form(form: str, out: Path | None) -> Iterator[Finding]:
 
 
 def _wrong_out(out: Path, form: str) -> Iterator[Finding]:
+    from regrasp.trees.export import FORMAT_OF_SUFFIX
+
     if not form:
         yield Finding(
             shown(out), 0, f"the name ends in none of {', '.join(FORMAT_OF_SUFFIX)}; rename it, or name a --format"
@@ -92,7 +104,7 @@ def _wrong_out(out: Path, form: str) -> Iterator[Finding]:
         yield from file_findings(out)
 
 
-def _tree_file(request: Request, record: RunRecord | None) -> Path:
+def _tree_file(request: Request, record: "RunRecord | None") -> Path:
     """The file of the named tree, else the run's own copy."""
     if request.tree is not None:
         return resolve("tree", request.tree, Path())
@@ -106,15 +118,21 @@ def _tree_file(request: Request, record: RunRecord | None) -> Path:
     return copy
 
 
-def _read(path: Path, record: RunRecord | None) -> Node:
+def _read(path: Path, record: "RunRecord | None") -> "Node":
+    from regrasp.app.scenario.load import check_tree_file
+    from regrasp.trees import read_graph
+
     if record is None:
         check_tree_file(path)
         return read_graph(path)
     return _with_run(path, record)
 
 
-def _with_run(path: Path, record: RunRecord) -> Node:
+def _with_run(path: Path, record: "RunRecord") -> "Node":
     """The tree with its run. It is not checked in full: it may have leaves that no longer exist."""
+    from regrasp.app.scenario.references import tree_text
+    from regrasp.trees import TreeSyntaxError, read_graph, recorded, run_stats
+
     read_text(path)  # its findings are ours
     inputs = record.begin.get("inputs")
     given = {key: tree_text(value) for key, value in inputs.items()} if isinstance(inputs, dict) else {}
@@ -130,7 +148,7 @@ def _with_run(path: Path, record: RunRecord) -> Node:
     return recorded(node, stats, {link.path for link in chain})
 
 
-def _check_paths(path: Path, record: RunRecord, known: Collection[str]) -> None:
+def _check_paths(path: Path, record: "RunRecord", known: Collection[str]) -> None:
     missing: dict[str, int] = {}  # the line on which each came first
     for number, tick in enumerate(record.ticks, 1):
         if tick.path not in known:

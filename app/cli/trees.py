@@ -7,8 +7,6 @@ import typer
 
 from regrasp.app.files.findings import Finding, Findings
 from regrasp.app.files.resources import resolve, shipped
-from regrasp.app.scenario.load import check_tree_file
-from regrasp.app.scenario.references import names_of
 from regrasp.interfaces.quote import nearest, quoted
 
 app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="List, check, show and export behaviour trees.")
@@ -31,6 +29,8 @@ def show_tree_file(
     Example:
       regrasp trees show recovery
     """
+    from regrasp.app.scenario.load import check_tree_file
+
     path = resolve("tree", tree, Path())
     check_tree_file(path)
     from regrasp.trees import show_tree
@@ -104,6 +104,9 @@ def check_trees(
     Exit code: 0 no findings, 2 findings, one a line:
       file:line: what is wrong; what would be right
     """
+    from regrasp.app.scenario.load import check_tree_file
+    from regrasp.app.scenario.references import names_of
+
     found: list[Finding] = []
     names = trees or list(shipped("tree"))
     for name in names:

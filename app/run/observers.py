@@ -4,9 +4,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from regrasp.app.records.record import OnEvent, Progress
-
 if TYPE_CHECKING:
+    from regrasp.app.records.record import OnEvent, Progress
     from regrasp.app.run.compose import Episode  # brings the planner, the compiler and the physics: seconds
 
 
@@ -23,5 +22,5 @@ class Observers:
     """
 
     assembled: "Callable[[Episode], None]" = _ignore
-    tick: Progress = _ignore
-    event: OnEvent = _ignore
+    tick: "Progress" = _ignore
+    event: "OnEvent" = _ignore

@@ -8,8 +8,8 @@ from regrasp.app.tasks.cable.expectations import Expect
 from regrasp.interfaces.fault import AnyFault
 from regrasp.interfaces.fields import Color, Direction, Fraction, Model, Vector
 from regrasp.interfaces.scene import Gravity
+from regrasp.interfaces.seed import MAX_SEED
 
-MAX_SEED = 2**31 - 1
 FaultSpec = Annotated[AnyFault, Field(discriminator="type")]
 FAULT_TYPES: dict[str, type] = {get_args(f.model_fields["type"].annotation)[0]: f for f in get_args(AnyFault)}
 Edge = Annotated[float, Field(ge=1e-3, le=3)]  # metres
