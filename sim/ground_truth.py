@@ -37,8 +37,7 @@ class GroundTruth:
 
     def connector_in_hand(self) -> FloatArray:
         """The connector's centre (3,) m in the frame between the pads of the right hand."""
-        center = self._world.connector_pose().translation
-        return np.asarray(self._world.arms["right"].tool_pose().inv().apply(center))
+        return self._world.arms["right"].in_tool(self._world.connector_position())
 
     def plugged(self) -> bool:
         """Whether the connector sits in its socket."""

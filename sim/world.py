@@ -6,7 +6,7 @@ fixed steps, so nothing depends on who reads them and how often.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -82,6 +82,7 @@ class World:
         self._step_rate = cell.hidden.step_rate
         self.step_seconds = 1.0 / self._step_rate
         self._steps = 0
+        self._next_exposure = 0.0  # the step at which a camera exposes next
         errors_rng, light_rng = (np.random.default_rng(s) for s in np.random.SeedSequence([seed, 1]).spawn(2))
         configure(self.client, cell.hidden, gravity)
         self.boxes = build_boxes(self.client, cell.known, setup.obstacles)
@@ -166,6 +167,10 @@ class World:
         """True world_from_connector after the last step."""
         return self._connector.pose
 
+    def connector_position(self) -> Sequence[float]:
+        """True position (3,) m of the connector's centre."""
+        return self._connector.position
+
     def connector_velocity(self) -> FloatArray:
         """True velocity (3,) m/s of the connector's centre."""
         return np.array(self._connector.velocity)
@@ -203,12 +208,16 @@ class World:
         self._triggers.phases = self._phase.began
 
     def _expose(self) -> None:
-        rate = self._step_rate
-        due = [c for c in self.cameras.values() if self._steps * c.rate % rate < c.rate]
-        if due:
-            poses = self.visuals.deferred_snapshot()
-            for camera in due:
+        if self._steps < self._next_exposure:
+            return
+        steps, rate = self._steps, self._step_rate
+        poses = self.visuals.deferred_snapshot()
+        for camera in self.cameras.values():
+            if steps * camera.rate % rate < camera.rate:
                 camera.expose(poses)
+        # The next step on which any camera has exposed once more.
+        following = (-(-(steps * c.rate // rate + 1) * rate // c.rate) for c in self.cameras.values())
+        self._next_exposure = min(following, default=math.inf)
 
     def _watch_contacts(self) -> None:
         """Update the largest normal force of each arm against each body that it must not touch."""

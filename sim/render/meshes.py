@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from functools import lru_cache
 
+import numba
 import numpy as np
 import pybullet as p
 import trimesh
@@ -100,17 +101,32 @@ def _vertex_normals(faces: NDArray[np.int64], normals: FloatArray, area: FloatAr
 
     Each is the mean, weighted by area, over the vertex's faces whose normals have at least `cosine` with this face's.
     """
-    around: list[list[int]] = [[] for _ in range(int(faces.max()) + 1)]
-    for face, corner in enumerate(faces):
-        for vertex in corner:
-            around[vertex].append(face)
-    out = np.empty((len(faces), 3, 3))
-    for face, corner in enumerate(faces):
-        for k, vertex in enumerate(corner):
-            near = np.array(around[vertex])
-            near = near[normals[near] @ normals[face] > cosine]
-            out[face, k] = area[near] @ normals[near] if len(near) else normals[face]
+    order = np.argsort(faces.ravel(), kind="stable")
+    begins = np.searchsorted(faces.ravel()[order], np.arange(int(faces.max()) + 2))
+    out = _sum_normals(faces, normals, area, cosine, order // 3, begins)
     return out / np.linalg.norm(out, axis=2, keepdims=True)
+
+
+@numba.njit(cache=True)
+def _sum_normals(
+    faces: NDArray[np.int64],
+    normals: FloatArray,
+    area: FloatArray,
+    cosine: float,
+    around: NDArray[np.int64],
+    begins: NDArray[np.int64],
+) -> FloatArray:
+    """`_vertex_normals` before they have length 1; vertex v's faces are `around[begins[v]:begins[v + 1]]`."""
+    out = np.zeros((len(faces), 3, 3))
+    for face in range(len(faces)):
+        for k in range(3):
+            vertex = faces[face, k]
+            for near in around[begins[vertex] : begins[vertex + 1]]:
+                if np.sum(normals[near] * normals[face]) > cosine:
+                    out[face, k] += area[near] * normals[near]
+            if not np.any(out[face, k]):
+                out[face, k] = normals[face]
+    return out
 
 
 def _rows(triangles: FloatArray, normals: FloatArray) -> NDArray[np.float32]:

@@ -5,7 +5,7 @@ have the opposite sign.
 """
 
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -78,6 +78,7 @@ class SimArm:
             for j in range(p.getNumJoints(self.body, physicsClientId=client))
         }
         self.joints = [self.links[name] for name in JOINT_LINKS]
+        self._tool_links = [self.links[name] for name in ("left_pad", "right_pad", "gripper_link")]
         self.offsets = self._draw_offsets(hidden.errors.arm_tool, rng)
         self._speed_share = np.ones(6)  # of `MAX_JOINT_SPEED`, for each joint; less by a fault
         self._encoder_slip = np.zeros(6)  # rad that the encoders read too much, by a fault
@@ -151,6 +152,12 @@ class SimArm:
         bar = p.getLinkState(self.body, self.links["gripper_link"], 0, 1, physicsClientId=self.client)
         return RigidTransform.from_components(middle, Rotation.from_quat(bar[5]))
 
+    def in_tool(self, point: Sequence[float]) -> FloatArray:
+        """A point (3,) m of the world in the frame of `tool_pose`, worked out faster."""
+        left, right, bar = p.getLinkStates(self.body, self._tool_links, 0, 1, physicsClientId=self.client)
+        turn = np.array(p.getMatrixFromQuaternion(bar[5])).reshape(3, 3)
+        return np.asarray((np.array(point) - (np.array(left[4]) + np.array(right[4])) / 2) @ turn)
+
     def set_speed_share(self, joint: int, share: float) -> None:
         """A fault: joint 0 to 5 turns no faster than `share` of `MAX_JOINT_SPEED`; with 0 it does not turn."""
         self._speed_share[joint] = share
@@ -174,14 +181,7 @@ class SimArm:
         self._steps += 1
 
     def _drive(self, q: FloatArray, v: FloatArray) -> None:
-        late = self._late(q)
-        self._late_joints = bool(late.any())
-        if self._late_joints:
-            reach = self._speed_share * MAX_JOINT_SPEED * self._dt
-            self._servo = np.where(late, self._servo + np.clip(q - self._servo, -reach, reach), q)
-            v = np.where(late, 0.0, v)
-        else:
-            self._servo = q
+        self._late_joints, self._servo, v = _servo_command(self._servo, q, v, self._speed_share, self._dt)
         self._target = q
         position_gains, velocity_gains, torques = self._gains
         p.setJointMotorControlArray(
@@ -246,6 +246,24 @@ def _servo_target(
         else:
             velocity[i] = 0.0 if ended else v[i]
     return ended, position, velocity
+
+
+@numba.njit(cache=True)
+def _servo_command(
+    servo: FloatArray, q: FloatArray, v: FloatArray, speed_share: FloatArray, dt: float
+) -> tuple[bool, FloatArray, FloatArray]:
+    """What the servos, which stand at `servo` (6,) rad, do next towards `q` (6,) rad with velocities `v` (6,) rad/s.
+
+    A slow joint's servo goes as far as it can. The first value says whether any is late.
+    """
+    late, position, velocity = False, np.empty(6), np.empty(6)
+    for i in range(6):
+        reach = speed_share[i] * MAX_JOINT_SPEED * dt
+        position[i], velocity[i] = q[i], v[i]
+        if abs(q[i] - servo[i]) > reach + 1e-9:
+            late, velocity[i] = True, 0.0
+            position[i] = servo[i] + min(max(q[i] - servo[i], -reach), reach)
+    return late, position, velocity
 
 
 def _camera_offset(cell: Cell, arm: ArmName) -> tuple[float, float, float] | None:
