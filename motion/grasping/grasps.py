@@ -88,20 +88,20 @@ def grasp_candidates(
     axis = world_from_connector.rotation.apply([1.0, 0.0, 0.0])
     centre = world_from_connector.translation + grip_offset * axis
     forward = _perpendicular(axis)
-    grasps = []
-    for yaw in parameters.yaws:
-        for roll in parameters.rolls:
-            square = rotation_matrix(roll * axis) @ forward
-            x, across = np.cos(yaw) * square + np.sin(yaw) * axis, np.cross(axis, square)
-            for flip in (1.0, -1.0):
-                y = flip * across
-                pose = np.eye(4)
-                pose[:3, :3] = np.column_stack([x, y, flip * np.cross(x, across)])
-                pose[:3, 3] = centre - shallow * x
-                cost = abs(yaw - parameters.preferred_yaw) + parameters.roll_cost * abs(roll)
-                cost = cost + parameters.flip_cost * (flip < 0)
-                grasps.append(Grasp(pose, cost))
-    return sorted(grasps, key=lambda g: g.cost)
+    squares = np.array([rotation_matrix(roll * axis) @ forward for roll in parameters.rolls])
+    yaws, rolls = np.array(parameters.yaws)[:, None, None], np.array(parameters.rolls)[:, None]
+    flips = np.array([1.0, -1.0])
+    shape = len(parameters.yaws), len(parameters.rolls), len(flips)
+    x = np.broadcast_to((np.cos(yaws) * squares + np.sin(yaws) * axis)[:, :, None], (*shape, 3))
+    y = np.broadcast_to(np.cross(axis, squares)[:, None] * flips[:, None], (*shape, 3))
+    poses = np.zeros((*shape, 4, 4))
+    poses[..., :3, :3] = np.stack([x, y, np.cross(x, y)], axis=-1)
+    poses[..., :3, 3] = centre - shallow * x
+    poses[..., 3, 3] = 1.0
+    costs = np.abs(yaws - parameters.preferred_yaw) + parameters.roll_cost * np.abs(rolls)
+    costs = np.broadcast_to(costs + parameters.flip_cost * (flips < 0), shape).ravel()
+    flat = poses.reshape(-1, 4, 4)
+    return [Grasp(flat[i], float(costs[i])) for i in np.argsort(costs, kind="stable")]
 
 
 def _check_fit(length: float, radius: float, grip_offset: float, parameters: GraspParameters) -> None:

@@ -229,7 +229,7 @@ class ArmKinematics:
                     branches = self._solve(_rolled(tool_target, wanted, roll))
                     if not len(branches):
                         break
-                    q = branches[np.argmin(np.abs(wrap(branches[:, :5] - q[:5])).sum(axis=1) + np.abs(branches[:, 5]))]
+                    q = branches[_nearest(branches, q)]
 
     def _sees(self, q: FloatArray, wanted: FloatArray, mount: FloatArray) -> bool:
         camera = self.link_frames(q)[5] @ mount
@@ -251,9 +251,22 @@ class ArmKinematics:
         return kept[:count]
 
 
+@nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
 def _rolled(tool_target: FloatArray, wanted: FloatArray, roll: float) -> FloatArray:
     """The tool target turned by `roll` rad about the wanted optical axis through the wanted camera position."""
     turn = np.eye(4)
     turn[:3, :3] = rotation_matrix(roll * wanted[:3, 2])
-    turn[:3, 3] = wanted[:3, 3] - turn[:3, :3] @ wanted[:3, 3]
-    return np.asarray(multiply(turn, tool_target))
+    for r in range(3):
+        turn[r, 3] = wanted[r, 3] - np.sum(turn[r, :3] * wanted[:3, 3])
+    return multiply(turn, tool_target)
+
+
+@nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
+def _nearest(branches: FloatArray, q: FloatArray) -> int:
+    """The branch whose first five joints are nearest to those of `q` and whose last joint is nearest to 0."""
+    best, least = 0, np.inf
+    for row in range(len(branches)):
+        off = np.sum(np.abs(wrap(branches[row, :5] - q[:5]))) + abs(branches[row, 5])
+        if off < least:
+            best, least = row, off
+    return best

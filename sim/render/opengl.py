@@ -71,6 +71,9 @@ class GlRenderer:
         _set(behind, color=BACKGROUND)
         self._backdrop = self._gl.vertex_array(behind, [])
         self._groups = self._make_groups(visuals)
+        self._casters = [group for group in self._groups if group.radius < shadow_parameters.largest_caster]
+        self._caster_rows = np.concatenate([np.zeros(0, int), *(group.rows for group in self._casters)])
+        self._caster_radii = np.repeat([g.radius for g in self._casters], [len(g.rows) for g in self._casters])
         self._shadows = self._gl.depth_texture((shadow_parameters.size, shadow_parameters.size))
         self._shadows.compare_func = "<="
         self._shadows.repeat_x = self._shadows.repeat_y = False
@@ -143,16 +146,15 @@ class GlRenderer:
         for group in self._groups:
             group.records["pose"] = poses[group.rows]
             group.buffer.write(group.records.tobytes())
-        casters = [group for group in self._groups if group.radius < self._parameters.largest_caster]
         to_light = np.asarray(light.direction, float) / np.linalg.norm(light.direction)
-        matrix, radius = _light_from_world(casters, poses, to_light)
+        matrix, radius = _light_from_world(poses[self._caster_rows, :, 3], self._caster_radii, to_light)
         _write(self._cast, "world_to_light", matrix)
         _write(self._draw, "world_to_light", matrix)
         texel = 2 * radius / self._parameters.size
         _set(self._draw, texel=texel, to_light=tuple(to_light), ambient=light.ambient, diffuse=light.diffuse)
         self._shadow_target.use()
         self._shadow_target.clear()
-        for group in casters:
+        for group in self._casters:
             group.cast.render(instances=len(group.rows))
 
     def _target(self, width: int, height: int, color_only: bool = False) -> Any:
@@ -196,15 +198,17 @@ def _clip_from_camera(k: Intrinsics) -> FloatArray:
 
 
 def _light_from_world(
-    casters: list[_Group], poses: NDArray[np.float32], to_light: FloatArray
+    centres: NDArray[np.float32], radii: FloatArray, to_light: FloatArray
 ) -> tuple[FloatArray, float]:
     """Matrix (4, 4) from the world to the light's view, and the radius (m) of the casters' bounding sphere.
+
+    The casters lie within spheres with `centres` (n, 3) and `radii` (n,) m.
 
     The light's view maps the sphere to 0..1. Its rows run downwards as the picture's do, so that the same sides of
     triangles are drawn.
     """
-    low = np.min([poses[g.rows, :, 3].min(axis=0) - g.radius for g in casters], axis=0) if casters else -np.ones(3)
-    high = np.max([poses[g.rows, :, 3].max(axis=0) + g.radius for g in casters], axis=0) if casters else np.ones(3)
+    low = (centres - radii[:, None]).min(axis=0) if len(centres) else -np.ones(3)
+    high = (centres + radii[:, None]).max(axis=0) if len(centres) else np.ones(3)
     centre, radius = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
     side = np.cross(to_light, [1.0, 0.0, 0.0] if abs(to_light[0]) < 0.9 else [0.0, 1.0, 0.0])
     side /= np.linalg.norm(side)
