@@ -15,10 +15,13 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from regrasp.app.files.resources import shipped
 from regrasp.app.run.attempts import Attempts
+from regrasp.app.run.batch import Run, run_all
 from regrasp.app.run.tick_log import TickLog
 from regrasp.app.scenario.cell_file import load_cell
-from regrasp.app.scenario.load import load_scenario
+from regrasp.app.scenario.load import cases, load_scenario
+from regrasp.app.studies.demo import SCENARIOS
 from regrasp.app.studies.table import print_table
+from regrasp.app.studies.wall_parts import PARTS_HEADER, part_lines
 from regrasp.behaviors import LEAVES
 from regrasp.interfaces.cell import TAG_DICTIONARY, Cell
 from regrasp.interfaces.frame import RgbdFrame
@@ -59,6 +62,20 @@ def print_bench() -> None:
         print_table(("pair", "ours ms", "other ms", "ratio"), [_line(name, *pair) for name, pair in rows.items()])
     finally:
         world.close()
+    print()
+    print_whole_runs()
+
+
+def print_whole_runs() -> None:
+    """Run the demonstration's six cases with two seeds, one after the other, and print where their time goes."""
+    runs = [Run(case, seed) for name in SCENARIOS for case in cases(name, ()) for seed in (0, 1)]
+    rows = list(run_all(runs, jobs=1)[0].values())
+    print_table(PARTS_HEADER, part_lines(rows))
+    factor, longest = statistics.median(row.real_time_factor for row in rows), max(row.longest_tick for row in rows)
+    step = statistics.median(1 + row.wall_by_part["step loop"] / row.wall_by_part["physics"] for row in rows)
+    memory = max(row.peak_memory_mb for row in rows)
+    print(f"step loop with its physics {step:.2f} x physics; whole runs {factor:.2f} x real time")
+    print(f"longest tick {longest:.2f} s, peak memory {memory:.0f} MB")
 
 
 def _line(name: str, ours: Call, other: Call) -> tuple[str, ...]:
@@ -117,8 +134,9 @@ def cable_torques(links: int) -> tuple[Call, Call]:
         turns = Rotation.from_quat(rotations).as_rotvec()
         return np.asarray(-stiffness[:, None] * turns - damping[:, None] * rates)
 
-    assert np.allclose(spring_torques(rotations, rates, stiffness, damping), plain())
-    return lambda: spring_torques(rotations, rates, stiffness, damping), plain
+    states = np.hstack([rotations, rates])
+    assert np.allclose(spring_torques(states, stiffness, damping), plain())
+    return lambda: spring_torques(states, stiffness, damping), plain
 
 
 def rendering_speed(world: World) -> tuple[Call, Call]:

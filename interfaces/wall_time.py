@@ -18,6 +18,14 @@ class WallTime:
     def __init__(self, part: Part) -> None:
         self.seconds: dict[Part, float] = {}
         self._part, self._since = part, time.perf_counter()
+        self.longest_lap, self._lap_since = 0.0, self._since
+
+    def lap(self, counts: bool = True) -> None:
+        """A lap, such as the time from one tick to the next, ends here and another begins; `counts`: as the longest."""
+        now = time.perf_counter()
+        if counts:
+            self.longest_lap = max(self.longest_lap, now - self._lap_since)
+        self._lap_since = now
 
     def switch(self, part: Part) -> Part:
         """Go on with that part; returns the one that ran until now."""

@@ -144,6 +144,7 @@ class Result:
     wall_seconds: float = 0.0
     real_time_factor: float = 0.0
     wall_by_part: dict[str, float] = dataclasses.field(default_factory=dict)  # s, see `regrasp.interfaces.wall_time`
+    longest_tick: float = 0.0  # s of wall time from one tick of the tree to the next
     renderer: str = ""
     versions: dict[str, str] = dataclasses.field(default_factory=versions)
     belief: BeliefState | None = None

@@ -66,6 +66,8 @@ class Row:
     sim_seconds: float = 0.0
     wall_seconds: float = 0.0  # real ones
     real_time_factor: float = 0.0
+    wall_by_part: dict[str, float] = field(default_factory=dict)  # real seconds
+    longest_tick: float = 0.0  # real seconds
 
 
 def run_all(
@@ -149,6 +151,8 @@ def row_of(run: Run, done: Done[Result]) -> Row:
         sim_seconds=result.sim_seconds,
         wall_seconds=result.wall_seconds,
         real_time_factor=result.real_time_factor,
+        wall_by_part=result.wall_by_part,
+        longest_tick=result.longest_tick,
         peak_memory_mb=round(done.peak_memory_mb, 1),
     )
 

@@ -79,7 +79,7 @@ def run_episode(
             note_leaf_at_work(episode.tree, lambda node: record.at_work(world.now(), node))
             with Film(out / "video.mp4" if video and out else None, world) as film:
                 wall.switch("tree")
-                ending = _run(episode, scenario, film, observers.tick, log)
+                ending = _run(episode, scenario, film, observers.tick, log, wall)
                 wall.switch("film" if video else "record")
             ticks.finalise()
             episode.attempts.finalise()
@@ -92,11 +92,11 @@ def run_episode(
     return result
 
 
-def _run(episode: Episode, scenario: Scenario, film: Film, on_tick: Progress, log: Any) -> Ending:
+def _run(episode: Episode, scenario: Scenario, film: Film, on_tick: Progress, log: Any, wall: WallTime) -> Ending:
     """Tick until the tree ends, the time limit is reached or somebody interrupts; then stop the arms."""
     root = episode.tree.root
     try:
-        ending = _loop(episode, scenario, film, on_tick)
+        ending = _loop(episode, scenario, film, on_tick, wall)
     except KeyboardInterrupt as stop:
         ending = _stopped(episode, stop)
     except Exception as error:
@@ -111,10 +111,11 @@ def _run(episode: Episode, scenario: Scenario, film: Film, on_tick: Progress, lo
     return ending
 
 
-def _loop(episode: Episode, scenario: Scenario, film: Film, on_tick: Progress) -> Ending:
+def _loop(episode: Episode, scenario: Scenario, film: Film, on_tick: Progress, wall: WallTime) -> Ending:
     world, root, attempts = episode.world, episode.tree.root, episode.attempts
     belief, limit = episode.services.belief, scenario.file.limits.sim_seconds
     episode.tree.setup(services=episode.services)
+    wall.lap(counts=False)
     while world.now() < limit:
         episode.tree.tick()
         episode.judge.observe(world.now(), belief)
@@ -128,6 +129,7 @@ def _loop(episode: Episode, scenario: Scenario, film: Film, on_tick: Progress) -
             cause = attempts.cause() or (belief.causes[-1] if belief.causes else None)
             return Ending("safe_stop", cause, attempts.failed_chain())
         world.advance(TICK)
+        wall.lap()
     message = f"not done after {limit:g} simulated seconds"
     cause = Cause(CauseCode.TIME_LIMIT, message, _path(running_leaf(root), root))
     return Ending("time_limit", cause, _unfinished(episode))
@@ -214,6 +216,7 @@ def _result(episode: Episode, scenario: Scenario, seed: int, ending: Ending, wal
         sim_seconds=episode.world.now(),
         wall_seconds=seconds,
         real_time_factor=episode.world.now() / seconds,
+        longest_tick=round(wall.longest_lap, 3),
         wall_by_part={part: round(spent, 3) for part, spent in wall.seconds.items()},
         renderer=episode.world.renderer.name,
         belief=belief_state(episode.services),

@@ -14,6 +14,7 @@ from regrasp.app.run.batch import Row, Run, RunEpisode, Settings, run_all
 from regrasp.app.scenario.load import Scenario, cases
 from regrasp.app.studies.statistics import wilson_interval
 from regrasp.app.studies.table import print_table
+from regrasp.app.studies.wall_parts import PARTS_HEADER, part_lines
 
 SCENARIOS = ("no_obstacle", "short_obstacle", "tall_obstacle")
 
@@ -45,6 +46,9 @@ def run_demo(
     rows = list(done.values())
     _write(out, rows, runs, overrides)
     print_table(_HEADER, table_lines(rows))
+    if parts := part_lines(rows):
+        print()
+        print_table(PARTS_HEADER, parts)
     return 130 if interrupted else 0
 
 
@@ -69,7 +73,10 @@ def _write(out: Path | None, rows: list[Row], runs: Sequence[Run], overrides: Se
     write_whole(out / "demo.json", json.dumps(plain(summary), indent=2, allow_nan=False) + "\n")
 
 
-_HEADER = ("case", "succeeded", "95 % interval", "median sim s", "median x real time", "max force N")
+_HEADER = (
+    *("case", "succeeded", "95 % interval", "median sim s", "median x real time", "max force N"),
+    *("longest tick s", "max memory MB"),
+)
 
 
 def table_lines(rows: Sequence[Row]) -> list[tuple[str, ...]]:
@@ -91,4 +98,6 @@ def _line(name: str, rows: Sequence[Row]) -> tuple[str, ...]:
         f"{statistics.median(row.sim_seconds for row in rows):.1f}" if rows else "-",
         f"{statistics.median(row.real_time_factor for row in rows):.2f}" if rows else "-",
         f"{max(forces):.2f}" if forces else "-",
+        f"{max(row.longest_tick for row in rows):.2f}" if rows else "-",
+        f"{max(row.peak_memory_mb for row in rows):.0f}" if rows else "-",
     )

@@ -19,7 +19,8 @@ from regrasp.sim.world import World
 REST_SPEED = 0.05  # rad/s: a joint that holds against a swinging cable
 FIELDS = [
     *("schema", "scenario", "seed", "outcome", "succeeded", "case", "cause", "chain", "traceback", "expectations"),
-    *("slips", "sim_seconds", "wall_seconds", "real_time_factor", "renderer", "versions", "belief", "attempts"),
+    *("slips", "sim_seconds", "wall_seconds", "real_time_factor", "wall_by_part", "longest_tick"),
+    *("renderer", "versions", "belief", "attempts"),
 ]
 STATES = {"unplug", "monitor", "detect_slip", "carry", "insert", "check_cameras", "regrasp", "stow", "let_go"}
 EXPECTED = {"outcome", "slips", "unintended_force"}

@@ -13,7 +13,8 @@ from regrasp.interfaces.cause import Cause, CauseCode
 
 FIELDS = [
     *("schema", "scenario", "seed", "outcome", "succeeded", "case", "cause", "chain", "traceback", "expectations"),
-    *("slips", "sim_seconds", "wall_seconds", "real_time_factor", "renderer", "versions", "belief", "attempts"),
+    *("slips", "sim_seconds", "wall_seconds", "real_time_factor", "wall_by_part", "longest_tick"),
+    *("renderer", "versions", "belief", "attempts"),
 ]
 
 

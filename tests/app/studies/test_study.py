@@ -40,6 +40,8 @@ def episode(scenario: Scenario, out: Path | None, *, seed: int, video: bool, ren
         slips=(Slip(10.0, 10.5, "fingers"), Slip(20.0, None, None)),
         sim_seconds=90.0 + seed,
         real_time_factor=2.0,
+        wall_by_part={"physics": 9.0 + seed, "step loop": 3.0 + seed, "start": 1.8},
+        longest_tick=0.25,
     )
 
 
@@ -66,9 +68,15 @@ def test_a_study_goes_on_to_its_end_and_counts_every_run(tmp_path: Path, capfd: 
 
     out, err = capfd.readouterr()
     lines = [re.split(r"\s{2,}", line.strip()) for line in out.splitlines()]
-    assert lines[0] == ["case", "succeeded", "95 % interval", "median sim s", "median x real time", "max force N"]
-    assert lines[1] == ["no_obstacle gravity=zero", "2/2", "34.2 to 100.0 %", "90.5", "2.00", "2.00"]
-    assert lines[-1][:3] == ["all", "8/12", "39.1 to 86.2 %"]
+    assert lines[0][:4] == ["case", "succeeded", "95 % interval", "median sim s"]
+    assert lines[0][4:] == ["median x real time", "max force N", "longest tick s", "max memory MB"]
+    assert lines[1][:6] == ["no_obstacle gravity=zero", "2/2", "34.2 to 100.0 %", "90.5", "2.00", "2.00"]
+    assert lines[1][6] == "0.25"
+    assert lines[7][:3] == ["all", "8/12", "39.1 to 86.2 %"]
+    parts = {line[0]: line[1:] for line in lines[9:]}
+    assert list(parts) == ["part", "start", "physics", "step loop", "whole run"]
+    assert parts["physics"] == ["105", "1.00", "1.00"]  # 100 with seed 0, 110 with seed 1
+    assert parts["step loop"][1] == "0.37"
     assert len(err.splitlines()) == 12
     assert "[12/12]" in err
 
