@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.motion.robots.kinematics import AXES, ArmKinematics, world_spheres
-from regrasp.motion.robots.spheres import SPHERE_LINKS, spheres_at
+from regrasp.motion.robots.spheres import SPHERE_LINKS, sphere_distances, spheres_at
 
 
 @dataclass(frozen=True)
@@ -52,11 +52,11 @@ def joint_offsets(
     seen = parameters.first_link <= SPHERE_LINKS
     links, local = SPHERE_LINKS[seen], spheres_at(opening)[seen]
     local[:, 3] -= parameters.surface_depth
-    points = points[_distances(points, world_spheres(kin.base, q, links, local))[0] < parameters.search_distance]
+    points = points[sphere_distances(points, world_spheres(kin.base, q, links, local))[0] < parameters.search_distance]
     offsets = np.zeros(6)
     for gate in parameters.gates:
         spheres = world_spheres(kin.base, q + offsets, links, local)
-        residuals, nearest = _distances(points, spheres)
+        residuals, nearest = sphere_distances(points, spheres)
         inliers = np.abs(residuals) < gate
         if np.count_nonzero(inliers) < parameters.min_points:
             return np.zeros(6)
@@ -74,13 +74,6 @@ def _step(
     prior, noise = parameters.offset_deviation**2, parameters.point_deviation**2
     information = np.eye(6) / prior + jacobian.T @ jacobian / noise
     return np.asarray(np.linalg.solve(information, offsets / prior + jacobian.T @ residuals / noise))
-
-
-def _distances(points: FloatArray, spheres: FloatArray) -> tuple[FloatArray, NDArray[np.int64]]:
-    """Signed distances (n,) m of points (n, 3) to the nearest of the spheres (m, 4), and which sphere (n,) that is."""
-    outside = np.linalg.norm(points[:, None] - spheres[None, :, :3], axis=2) - spheres[:, 3]
-    nearest = np.argmin(outside, axis=1)
-    return outside[np.arange(len(points)), nearest], nearest
 
 
 def _jacobian(frames: FloatArray, points: FloatArray, centers: FloatArray, links: NDArray[np.int64]) -> FloatArray:

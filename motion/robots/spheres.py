@@ -6,8 +6,11 @@ no mesh point lies more than 3 mm outside the spheres. The gripper's bar, which 
 5 mm. Fingers stand fully open, 0.057 m each, with pads 6 mm thick.
 """
 
+import numba as nb
 import numpy as np
 from numpy.typing import NDArray
+
+from regrasp.interfaces.arrays import FloatArray
 
 # link frame (0 base ... 6 last link), centre x, y, z in that frame, radius; metres
 _ROWS = [
@@ -74,3 +77,16 @@ def spheres_at(opening: float) -> NDArray[np.float64]:
     moved = SPHERES.copy()
     moved[_FINGERS, 1] -= np.sign(moved[_FINGERS, 1]) * 0.5 * (JAW_OPENING - opening)
     return moved
+
+
+@nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
+def sphere_distances(points: FloatArray, spheres: FloatArray) -> tuple[FloatArray, NDArray[np.int64]]:
+    """Signed distances (n,) m of points (n, 3) to the nearest of the spheres (m, 4), and which sphere (n,) that is."""
+    distances, nearest = np.full(len(points), np.inf), np.zeros(len(points), np.int64)
+    for n in range(len(points)):
+        for m in range(len(spheres)):
+            x, y, z = points[n, 0] - spheres[m, 0], points[n, 1] - spheres[m, 1], points[n, 2] - spheres[m, 2]
+            distance = np.sqrt(x * x + y * y + z * z) - spheres[m, 3]
+            if distance < distances[n]:
+                distances[n], nearest[n] = distance, m
+    return distances, nearest

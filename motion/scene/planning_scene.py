@@ -12,6 +12,7 @@ from regrasp.interfaces.devices import Arm, Gripper
 from regrasp.interfaces.frame import RgbdFrame
 from regrasp.interfaces.wall_time import counts_as
 from regrasp.motion.robots.kinematics import ArmKinematics, InverseKinematicsParameters
+from regrasp.motion.robots.spheres import sphere_distances
 from regrasp.motion.scene.collision import ArmBody, CollisionModel, CollisionParameters
 from regrasp.motion.scene.distance_grid import DistanceGrid
 
@@ -179,5 +180,4 @@ def _connector_spheres(held: RigidTransform, connector: Connector, padding: floa
 
 def _points_beyond(points: FloatArray, spheres: FloatArray, margin: float) -> FloatArray:
     """The points (n, 3) further than `margin` m from the spheres (m, 4)."""
-    distance = np.linalg.norm(points[:, None] - spheres[None, :, :3], axis=2)
-    return points[np.all(distance > spheres[:, 3] + margin, axis=1)]
+    return points[sphere_distances(points, spheres)[0] > margin]

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 import cv2
+import numba
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
@@ -154,9 +155,19 @@ def near_boxes(points: FloatArray, boxes: Sequence[Box], margin: float) -> Mask:
 def _near_spheres(points: FloatArray, groups: Sequence[Spheres], margin: float) -> Mask:
     near = np.zeros(len(points), np.bool_)
     for centers, radii in groups:
-        squared = (points**2).sum(axis=1)[:, None] + (centers**2).sum(axis=1) - 2 * points @ centers.T
-        near |= np.any(squared <= (radii + margin) ** 2, axis=1)
+        _mark_near(points, centers, (radii + margin) ** 2, near)
     return near
+
+
+@numba.njit(cache=True)
+def _mark_near(points: FloatArray, centers: FloatArray, squares: FloatArray, near: Mask) -> None:
+    """Mark in `near` (n,) the points (n, 3) whose squared distance to a centre (m, 3) is at most its `squares` (m,)."""
+    for n in range(len(points)):
+        for m in range(len(centers)):
+            x, y, z = points[n, 0] - centers[m, 0], points[n, 1] - centers[m, 1], points[n, 2] - centers[m, 2]
+            if x * x + y * y + z * z <= squares[m]:
+                near[n] = True
+                break
 
 
 def _min_filter(depth: DepthImage) -> DepthImage:
