@@ -1,4 +1,7 @@
-"""`make bench`: the time that our functions take against the bare library calls in them, measured in one process."""
+"""`make bench`: the time that our functions take against the bare library calls in them, measured in one process.
+
+Then our planner against another one.
+"""
 
 import io
 import statistics
@@ -18,6 +21,7 @@ from regrasp.app.run.attempts import Attempts
 from regrasp.app.run.tick_log import TickLog
 from regrasp.app.scenario.cell_file import load_cell
 from regrasp.app.scenario.load import load_scenario
+from regrasp.app.studies.planner_bench import print_planner_bench
 from regrasp.app.studies.table import print_table
 from regrasp.behaviors import LEAVES
 from regrasp.interfaces.cell import TAG_DICTIONARY, Cell
@@ -230,3 +234,4 @@ def detector_stages(cell: Cell, width: int) -> dict[str, tuple[Call, Call]]:
 
 if __name__ == "__main__":
     print_bench()
+    print_planner_bench()

@@ -130,10 +130,10 @@ def _meets_box(p, reach, boxes):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
-def _free(
+def _free(  # type: ignore[no-untyped-def]
     q, margin, base, links, local, boxes, others, distance, lower, h, self_overlap,
     starts, group_links, group_bounds, group_pairs, other_starts, other_bounds,
-):  # type: ignore[no-untyped-def]  # fmt: skip
+):  # fmt: skip
     """Whether `_nearest` would be at least `margin` (own links: 0), at a tenth of the cost."""
     frames = link_frames_in(base, q)
     world, bounds = spheres_in(frames, links, local), spheres_in(frames, group_links, group_bounds)
