@@ -121,8 +121,9 @@ def cable_torques(links: int) -> tuple[Call, Call]:
         turns = Rotation.from_quat(rotations).as_rotvec()
         return np.asarray(-stiffness[:, None] * turns - damping[:, None] * rates)
 
-    assert np.allclose(spring_torques(rotations, rates, stiffness, damping), plain())
-    return lambda: spring_torques(rotations, rates, stiffness, damping), plain
+    states = np.hstack([rotations, rates])
+    assert np.allclose(spring_torques(states, stiffness, damping), plain())
+    return lambda: spring_torques(states, stiffness, damping), plain
 
 
 def rendering_speed(world: World) -> tuple[Call, Call]:
