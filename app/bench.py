@@ -1,4 +1,7 @@
-"""`make bench`: the time that our functions take against the bare library calls in them, measured in one process."""
+"""`make bench`: the time that our functions take against the bare library calls in them, measured in one process.
+
+Then our planner against another one, and where the time of whole runs goes.
+"""
 
 import io
 import statistics
@@ -20,6 +23,7 @@ from regrasp.app.run.tick_log import TickLog
 from regrasp.app.scenario.cell_file import load_cell
 from regrasp.app.scenario.load import cases, load_scenario
 from regrasp.app.studies.demo import SCENARIOS
+from regrasp.app.studies.planner_bench import print_planner_bench
 from regrasp.app.studies.table import print_table
 from regrasp.app.studies.wall_parts import PARTS_HEADER, part_lines
 from regrasp.behaviors import LEAVES
@@ -62,8 +66,6 @@ def print_bench() -> None:
         print_table(("pair", "ours ms", "other ms", "ratio"), [_line(name, *pair) for name, pair in rows.items()])
     finally:
         world.close()
-    print()
-    print_whole_runs()
 
 
 def print_whole_runs() -> None:
@@ -248,3 +250,6 @@ def detector_stages(cell: Cell, width: int) -> dict[str, tuple[Call, Call]]:
 
 if __name__ == "__main__":
     print_bench()
+    print_planner_bench()
+    print()
+    print_whole_runs()

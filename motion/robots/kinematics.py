@@ -72,7 +72,12 @@ def link_frames_in(base: FloatArray, q: FloatArray) -> FloatArray:
 @nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
 def world_spheres(base: FloatArray, q: FloatArray, links: NDArray[np.int64], local: FloatArray) -> FloatArray:
     """Spheres (n, 4) m in the world, from those in the frames of their `links` (n,)."""
-    frames = link_frames_in(base, q)
+    return spheres_in(link_frames_in(base, q), links, local)
+
+
+@nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
+def spheres_in(frames: FloatArray, links: NDArray[np.int64], local: FloatArray) -> FloatArray:
+    """`world_spheres` with the frames (7, 4, 4) of the links."""
     out = np.empty_like(local)
     for n in range(local.shape[0]):
         f = frames[links[n]]

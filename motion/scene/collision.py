@@ -11,8 +11,17 @@ from numpy.typing import NDArray
 
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cell import Box
-from regrasp.motion.robots.kinematics import LOWER, TOOL_OFFSET, UPPER, ArmKinematics, world_spheres
+from regrasp.motion.robots.kinematics import (
+    LOWER,
+    TOOL_OFFSET,
+    UPPER,
+    ArmKinematics,
+    link_frames_in,
+    spheres_in,
+    world_spheres,
+)
 from regrasp.motion.robots.spheres import CAMERA_ACROSS, CAMERA_RADIUS, JAW_OPENING, SPHERE_LINKS, spheres_at
+from regrasp.motion.scene.bounds import bounding_spheres, group_pairs, group_starts, groups_meet, square_distance
 from regrasp.motion.scene.distance_grid import FREE_DISTANCE, DistanceGrid
 
 _FIRST_MOVING_LINK = 2  # base and shoulder only turn on the spot: no box, surface or arm can be met by moving them
@@ -54,12 +63,6 @@ class ArmBody:
 
 
 @nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
-def _square(a: FloatArray, b: FloatArray) -> float:
-    """Squared distance (m2) of two points (3,)."""
-    return (a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2
-
-
-@nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
 def _box_distance(p: FloatArray, box: FloatArray) -> float:
     """Signed distance of a point (3,) to a box (6,): centre and half edges."""
     outside, inside = 0.0, -1e9
@@ -95,7 +98,7 @@ def _nearest(q, base, links, local, pairs, boxes, others, distance, lower, h, se
             if d < best:
                 best, what = d, b
         for m in range(others.shape[0]):
-            d = np.sqrt(_square(p, others[m])) - r - others[m, 3]
+            d = np.sqrt(square_distance(p, others[m])) - r - others[m, 3]
             if d < best:
                 best, what = d, _OTHER_ARM
         d = _grid_distance(p, distance, lower, h) - r
@@ -103,7 +106,7 @@ def _nearest(q, base, links, local, pairs, boxes, others, distance, lower, h, se
             best, what = d, _GRID
     for m in range(pairs.shape[0]):
         a, c = world[pairs[m, 0]], world[pairs[m, 1]]
-        d = np.sqrt(_square(a, c)) - a[3] - c[3] + self_overlap
+        d = np.sqrt(square_distance(a, c)) - a[3] - c[3] + self_overlap
         if d < best:
             best, what = d, _ITSELF
     return best, what
@@ -127,30 +130,39 @@ def _meets_box(p, reach, boxes):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
-def _free(q, base, links, local, pairs, boxes, others, distance, lower, h, self_overlap, margin):  # type: ignore[no-untyped-def]
-    """Whether `_nearest` would be at least `margin` (own links: 0), at a fifth of the cost."""
-    world = world_spheres(base, q, links, local)
-    for n in range(world.shape[0] - 1, -1, -1):  # gripper first: it meets things most often
-        if links[n] < _FIRST_MOVING_LINK:
+def _free(  # type: ignore[no-untyped-def]
+    q, margin, base, links, local, boxes, others, distance, lower, h, self_overlap,
+    starts, group_links, group_bounds, group_pairs, other_starts, other_bounds,
+):  # fmt: skip
+    """Whether `_nearest` would be at least `margin` (own links: 0), at a tenth of the cost."""
+    frames = link_frames_in(base, q)
+    world, bounds = spheres_in(frames, links, local), spheres_in(frames, group_links, group_bounds)
+    for g in range(bounds.shape[0] - 1, -1, -1):  # gripper first: it meets things most often
+        if group_links[g] < _FIRST_MOVING_LINK:
             continue
-        p, reach = world[n], world[n, 3] + margin
-        if _meets_box(p, reach, boxes) or _grid_distance(p, distance, lower, h) < reach:
-            return False
-        for m in range(others.shape[0]):
-            if _square(p, others[m]) < (reach + others[m, 3]) ** 2:
+        near_box = _meets_box(bounds[g], bounds[g, 3] + margin, boxes)
+        for n in range(starts[g], starts[g + 1]):
+            p, reach = world[n], world[n, 3] + margin
+            if (near_box and _meets_box(p, reach, boxes)) or _grid_distance(p, distance, lower, h) < reach:
                 return False
-    for m in range(pairs.shape[0]):
-        a, c = world[pairs[m, 0]], world[pairs[m, 1]]
-        if _square(a, c) < (a[3] + c[3] - self_overlap) ** 2:
+        group = world[starts[g] : starts[g + 1]]
+        for m in range(other_bounds.shape[0]):
+            other = others[other_starts[m] : other_starts[m + 1]]
+            if groups_meet(group, bounds[g], other, other_bounds[m], margin, 0.0):
+                return False
+    for m in range(group_pairs.shape[0]):
+        a, b = group_pairs[m, 0], group_pairs[m, 1]
+        group, other = world[starts[a] : starts[a + 1]], world[starts[b] : starts[b + 1]]
+        if groups_meet(group, bounds[a], other, bounds[b], 0.0, self_overlap):
             return False
     return True
 
 
 @nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
-def _edge_free(qa, qb, step, base, links, local, pairs, boxes, others, distance, lower, h, self_overlap, margin):  # type: ignore[no-untyped-def]
+def _edge_free(qa, qb, step, margin, *scene):  # type: ignore[no-untyped-def]
     """Whether all configurations of an edge are free: end, middle, then quarters, so that an obstacle shows early."""
     n = int(np.ceil(np.abs(qb - qa).max() / step))
-    if not _free(qb, base, links, local, pairs, boxes, others, distance, lower, h, self_overlap, margin):
+    if not _free(qb, margin, *scene):
         return False
     stride = 1
     while stride * 2 <= n:
@@ -158,7 +170,7 @@ def _edge_free(qa, qb, step, base, links, local, pairs, boxes, others, distance,
     while stride >= 1:
         for k in range(stride, n, 2 * stride):
             q = qa + (qb - qa) * (k / n)
-            if not _free(q, base, links, local, pairs, boxes, others, distance, lower, h, self_overlap, margin):
+            if not _free(q, margin, *scene):
                 return False
         stride //= 2
     return True
@@ -213,11 +225,23 @@ class CollisionModel:
             float(distance.h),
             float(parameters.self_overlap),
         )
+        starts, other = group_starts(links, local), self._arguments[5]
+        other_starts = group_starts(np.zeros(len(other), np.int64), other)
+        self._free_arguments = (
+            *self._arguments[:3],
+            *self._arguments[4:],
+            starts,
+            links[starts[:-1]],
+            bounding_spheres(local, starts),
+            group_pairs(pairs, starts),
+            other_starts,
+            bounding_spheres(other, other_starts),
+        )
 
     def free(self, q: FloatArray, margin: float) -> bool:
         """Whether the arm at joints (6,) rad lies within its limits and keeps `margin` metres from everything."""
         inside = bool(np.all((q >= LOWER) & (q <= UPPER)))
-        return inside and bool(_free(np.asarray(q, float), *self._arguments, margin))
+        return inside and bool(_free(np.asarray(q, float), margin, *self._free_arguments))
 
     def edge_free(self, qa: FloatArray, qb: FloatArray, margin: float) -> bool:
         """Whether the straight joint motion is free, its end included (not its start), checked coarsely."""
@@ -244,7 +268,7 @@ class CollisionModel:
         return np.asarray(world_spheres(base, np.asarray(q, float), links, local))
 
     def _edge_free(self, qa: FloatArray, qb: FloatArray, margin: float, step: float) -> bool:
-        return bool(_edge_free(np.asarray(qa, float), np.asarray(qb, float), step, *self._arguments, margin))
+        return bool(_edge_free(np.asarray(qa, float), np.asarray(qb, float), step, margin, *self._free_arguments))
 
 
 def _body_spheres(body: ArmBody) -> tuple[NDArray[np.int64], FloatArray, NDArray[np.int64]]:

@@ -42,6 +42,17 @@ def test_distance_to_a_box_is_that_of_brute_force(q: FloatArray) -> None:
         assert not model.free(q, 0.0)
 
 
+def test_free_sees_each_sphere_of_an_arm_touched_alone() -> None:
+    body = ArmBody(camera_offset=(0, 0, 0.06), carried=np.array([[0.02, 0, 0, 0.01]]))
+    model = CollisionModel(KIN, [], body)
+    links = np.array([*SPHERE_LINKS, 5, 5, 5, 6])
+    for x, y, z, radius in model.spheres(HOME)[links >= 2]:
+        for way in np.vstack([np.eye(3), -np.eye(3)]):
+            center = np.array([x, y, z]) + way * (radius + 0.003)
+            touching = np.append(center, 0.003 + 1e-6)[None]
+            assert not CollisionModel(KIN, [], body, other_arm=touching).free(HOME, 0.0)
+
+
 @settings(max_examples=60)
 @given(joints, st.floats(0.0, 0.05))
 def test_free_agrees_with_clearance(q: FloatArray, margin: float) -> None:
