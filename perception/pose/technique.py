@@ -1,6 +1,5 @@
 """The techniques that find the connector in a frame: one interface, chosen by name."""
 
-from collections.abc import Callable
 from typing import TYPE_CHECKING, Literal, Protocol, get_args
 
 from regrasp.interfaces.arrays import FloatArray
@@ -38,17 +37,21 @@ class Technique(Protocol):
 
 def make_technique(name: TechniqueName, known: "KnownCell") -> Technique:
     """The technique of that name. Raises ValueError if the cell lacks what it needs."""
-    from regrasp.perception.pose.detector import Detector
-    from regrasp.perception.pose.fiducial import Fiducial
-    from regrasp.perception.pose.fused.fused import Fused
-    from regrasp.perception.pose.rgbd import Rgbd
+    match name:  # each imports what it needs: the compiler, or OpenCV alone
+        case "rgbd":
+            from regrasp.perception.pose.rgbd import Rgbd
 
-    makers: dict[TechniqueName, Callable[[KnownCell], Technique]] = {
-        "rgbd": Rgbd,
-        "fiducial": Fiducial,
-        "detector": Detector,
-        "fused": Fused,
-    }
-    if name not in makers:
-        raise ValueError(f"no technique {name!r}; there are {', '.join(TECHNIQUES)}")
-    return makers[name](known)
+            return Rgbd(known)
+        case "fiducial":
+            from regrasp.perception.pose.fiducial import Fiducial
+
+            return Fiducial(known)
+        case "detector":
+            from regrasp.perception.pose.detector import Detector
+
+            return Detector(known)
+        case "fused":
+            from regrasp.perception.pose.fused.fused import Fused
+
+            return Fused(known)
+    raise ValueError(f"no technique {name!r}; there are {', '.join(TECHNIQUES)}")

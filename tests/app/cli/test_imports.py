@@ -51,3 +51,11 @@ def test_the_check_of_a_tree_knows_the_techniques(tmp_path: Path) -> None:
     path.write_text(WRONG_TREE.replace("<NoSuchLeaf/>", '<UseTechnique technique="fussed"/>'))
     _, told = _imported("trees", "check", str(path), of=SIMULATION, code=2)
     assert "fused" in told
+
+
+def test_finding_a_connector_in_pictures_brings_no_simulator_and_no_planner(tmp_path: Path) -> None:
+    files = [part for name in ("rgb", "depth", "intrinsics") for part in (f"--{name}", str(tmp_path / name))]
+    unneeded = ("pybullet", "ompl", "eaik", "toppra", "moderngl", "matplotlib", "trimesh")
+    brought, told = _imported("perceive", *files, "--technique", "rgbd", of=(*unneeded, "numba"), code=2)
+    assert brought == set()
+    assert str(tmp_path / "intrinsics") in told
