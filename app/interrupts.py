@@ -1,13 +1,11 @@
 """Ctrl-C, SIGTERM, SIGHUP and the wall limit: each ends a run by a KeyboardInterrupt, and its record is kept."""
 
-import multiprocessing
 import os
 import signal
 import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from multiprocessing.connection import wait
 from types import FrameType
 from typing import NoReturn
 
@@ -86,6 +84,8 @@ def stoppable() -> Iterator[None]:
 def listen_to_parent() -> None:
     """In a child process: react to SIGTERM (the parent was stopped), to the parent's death, and to the wall limit."""
 
+    from multiprocessing import parent_process
+
     def stop(_number: int, _frame: FrameType | None) -> NoReturn:
         _interrupt()
 
@@ -94,12 +94,14 @@ def listen_to_parent() -> None:
 
     signal.signal(signal.SIGTERM, stop)
     signal.signal(WALL_LIMIT_SIGNAL, too_long)
-    if (parent := multiprocessing.parent_process()) is not None:
+    if (parent := parent_process()) is not None:
         threading.Thread(target=_follow, args=(parent.sentinel,), daemon=True).start()
 
 
 def _follow(sentinel: int) -> None:
     """Wait for the parent's death, then end as if the parent had sent SIGTERM."""
+    from multiprocessing.connection import wait
+
     wait([sentinel])
     os.kill(os.getpid(), signal.SIGTERM)
 

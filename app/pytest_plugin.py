@@ -200,7 +200,7 @@ class TreeFile(pytest.File):
     def collect(self) -> Iterator[pytest.Item]:
         """Its two tests. Raises `CollectError` with a line for each finding in the file."""
         from regrasp.app.files.findings import Findings
-        from regrasp.app.scenario.load import check_tree_file
+        from regrasp.app.scenario.tree_file import check_tree_file
         from regrasp.trees.trials import left_by_a_stop, never_ends
 
         try:

@@ -1,15 +1,17 @@
 """The services that leaves are given at `setup`, and the belief that they share."""
 
 from dataclasses import dataclass, field
-from typing import Any
-
-from scipy.spatial.transform import RigidTransform
+from typing import TYPE_CHECKING, Any
 
 from regrasp.interfaces.cause import Cause
-from regrasp.interfaces.cell import KnownCell
 from regrasp.interfaces.devices import Clock
-from regrasp.motion.service import Motion
-from regrasp.perception.service import Perception
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import RigidTransform
+
+    from regrasp.interfaces.cell import KnownCell
+    from regrasp.motion.service import Motion
+    from regrasp.perception.service import Perception
 
 
 @dataclass
@@ -24,8 +26,8 @@ class LossNotice:
 class Belief:
     """What the robot believes. Leaves write it, the run's record reads it; its names are those of the record."""
 
-    held: RigidTransform | None = None  # tool_from_connector of the right hand, None when it holds nothing
-    connector: RigidTransform | None = None  # world_from_connector as last found for a grasp
+    held: "RigidTransform | None" = None  # tool_from_connector of the right hand, None when it holds nothing
+    connector: "RigidTransform | None" = None  # world_from_connector as last found for a grasp
     sure: bool = False  # whether the whole of the connector was seen there
     found_by: str | None = None  # the camera that found it last
     vain_searches: int = 0  # searches that failed since the connector was found last
@@ -37,9 +39,9 @@ class Belief:
 class Services:
     """The services of one run."""
 
-    known: KnownCell
+    known: "KnownCell"
     clock: Clock
-    motion: Motion
-    perception: Perception
+    motion: "Motion"
+    perception: "Perception"
     log: Any  # structlog's bound logger
     belief: Belief = field(default_factory=Belief)

@@ -35,9 +35,7 @@ def check_tree(
         TypeError: a leaf class without ports.
     """
     if leaves is None:
-        from regrasp.behaviors import (
-            LEAVES,  # late: they bring the planner, which a check with toy leaves does not need
-        )
+        from regrasp.behaviors import LEAVES  # late: toy leaves do without them
 
         leaves = LEAVES
     try:

@@ -101,7 +101,7 @@ def read_graph(path: Path, leaves: Mapping[str, type] | None = None, inputs: Map
         ValueError: it has no main tree, or more nodes or depth than a tree may have.
     """
     if leaves is None:
-        from regrasp.behaviors import LEAVES  # late: they bring the planner
+        from regrasp.behaviors import LEAVES  # late: toy leaves do without them
 
         leaves = LEAVES
     root = read_elements(path)

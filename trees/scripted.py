@@ -161,7 +161,7 @@ class ScriptedTree:
         inputs: Mapping[str, str] | None = None,
     ) -> None:
         if leaves is None:
-            from regrasp.behaviors import LEAVES  # late: they bring the planner
+            from regrasp.behaviors import LEAVES  # late: toy leaves do without them
 
             leaves = LEAVES
         self.tree = py_trees.trees.BehaviourTree(load_tree(path, stand_ins(leaves), inputs))

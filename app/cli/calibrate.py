@@ -66,7 +66,7 @@ def calibrate(
     if images is not None:
         steps.run_calibration(steps.pictures_in(images), board, shown(images), out, draw, None)
         return
-    cameras = load_cell(resolve("cell", cell, Path())).known.cameras
+    cameras = load_cell(resolve("cell", cell, Path()), laid_out=False).known.cameras
     spec = next((c for c in cameras if c.name == camera), None)
     if spec is None:
         message = f"no camera {quoted(camera)}; {nearest(camera, [c.name for c in cameras])}"

@@ -1,7 +1,6 @@
 """The command line `regrasp`: its commands, and how errors end them."""
 
 import errno
-from importlib.metadata import version
 from typing import Annotated, Any
 
 import typer
@@ -71,6 +70,8 @@ detector.add_to(app)
 
 def _version(wanted: bool) -> None:
     if wanted:
+        from importlib.metadata import version
+
         typer.echo(f"regrasp {version('regrasp')}")
         raise typer.Exit
 

@@ -107,7 +107,7 @@ def perceive(
     tint = None if color is None else _color(color, wrong)
     if wrong:
         raise Findings(wrong)
-    known = load_cell(resolve("cell", cell, Path())).known
+    known = load_cell(resolve("cell", cell, Path()), laid_out=False).known
     given = {"color": tint, "length": length, "radius": radius}
     told = {key: value for key, value in given.items() if value is not None}
     connector = known.connector.model_copy(update=told)

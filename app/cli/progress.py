@@ -5,8 +5,6 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
-from rich.console import Console
-
 from regrasp.app.cli.options import LogLevel
 from regrasp.app.interrupts import interruptible
 from regrasp.app.records.summary import event_words
@@ -23,6 +21,8 @@ def shown_progress(quiet: bool, level: LogLevel = None) -> Iterator[Observers]:
     Events of `level` and above are shown as lines; None shows none. While the context is open, Ctrl-C raises
     KeyboardInterrupt from the observer's `tick`, so between two ticks of the tree; a second Ctrl-C raises it at once.
     """
+    from rich.console import Console
+
     console = Console(stderr=True, highlight=False, markup=False)
     shown_levels = LEVELS[LEVELS.index(level) :] if level else ()
 

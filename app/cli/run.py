@@ -11,13 +11,9 @@ import typer
 
 import regrasp
 from regrasp.app.cli.options import EXIT_UNMET, LogLevel, RendererOption, ScenarioName, Seed, Sets, WallLimitSeconds
-from regrasp.app.cli.progress import shown_progress
-from regrasp.app.cli.run_every import run_every
 from regrasp.app.files.findings import Finding, Findings, shown
 from regrasp.app.interrupts import EXIT_INTERRUPTED
 from regrasp.app.records import folders
-from regrasp.app.records.summary import run_summary
-from regrasp.app.run.processes import run_each
 from regrasp.interfaces.quote import printable
 
 if TYPE_CHECKING:
@@ -68,6 +64,8 @@ def run_scenario(
     \b
     Exit code: 0 every expectation met, 1 not, 2 bad input, 130 Ctrl-C.
     """
+    from regrasp.app.cli.run_every import run_every
+    from regrasp.app.records.summary import run_summary
     from regrasp.app.run.batch import Run, Settings
 
     overrides = [*(sets or []), *([] if seed is None else [f"seed={seed}"])]
@@ -116,6 +114,8 @@ def _checked(load: "Callable[[], list[Scenario]]", wrong: list[Finding], out: Pa
 
 def _run(scenario: "Scenario", folder: Path, settings: "Settings", gui: bool, log_level: LogLevel) -> "Result":
     """Run in this process, with progress on stderr."""
+    from regrasp.app.cli.progress import shown_progress
+
     with shown_progress(settings.quiet, log_level) as observers:
         try:
             return regrasp.run(
@@ -134,6 +134,7 @@ def _run(scenario: "Scenario", folder: Path, settings: "Settings", gui: bool, lo
 def _watched(run: "Run", task: Callable[[], "Result"], wall_limit: float) -> "Result":
     """Do the run in a process of its own, which is stopped after `wall_limit` seconds."""
     from regrasp.app.run.batch import result_of
+    from regrasp.app.run.processes import run_each
 
     assert run.folder is not None
     try:

@@ -119,7 +119,7 @@ def _tree_file(request: Request, record: "RunRecord | None") -> Path:
 
 
 def _read(path: Path, record: "RunRecord | None") -> "Node":
-    from regrasp.app.scenario.load import check_tree_file
+    from regrasp.app.scenario.tree_file import check_tree_file
     from regrasp.trees import read_graph
 
     if record is None:

@@ -29,7 +29,7 @@ def show_tree_file(
     Example:
       regrasp trees show recovery
     """
-    from regrasp.app.scenario.load import check_tree_file
+    from regrasp.app.scenario.tree_file import check_tree_file
 
     path = resolve("tree", tree, Path())
     check_tree_file(path)
@@ -104,8 +104,7 @@ def check_trees(
     Exit code: 0 no findings, 2 findings, one a line:
       file:line: what is wrong; what would be right
     """
-    from regrasp.app.scenario.load import check_tree_file
-    from regrasp.app.scenario.references import names_of
+    from regrasp.app.scenario.tree_file import check_tree_file, names_of
 
     found: list[Finding] = []
     names = trees or list(shipped("tree"))
@@ -129,7 +128,7 @@ def list_leaves(name: Annotated[str | None, typer.Argument(help="One element, in
     Example:
       regrasp trees leaves SpiralSearch
     """
-    from regrasp.behaviors import LEAVES  # brings the planner and the compiler: a second
+    from regrasp.behaviors import LEAVES
     from regrasp.trees.catalogue import all_elements, describe
 
     known = all_elements(LEAVES)

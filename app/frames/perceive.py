@@ -17,14 +17,11 @@ from scipy.spatial.transform import RigidTransform
 from regrasp.app.files.findings import Finding, Findings, real_path, shown
 from regrasp.app.files.whole_file import write_whole
 from regrasp.app.frames.camera_pose_file import load_camera_pose
-from regrasp.app.frames.draw import draw_pose
 from regrasp.app.frames.frame_files import read_frame
 from regrasp.interfaces.cell import FixedMount, KnownCell
 from regrasp.interfaces.frame import RgbdFrame
 from regrasp.interfaces.quote import nearest, quoted
-from regrasp.perception.camera.registration import expected_errors, register
 from regrasp.perception.pose.estimate import Estimate, NoEstimate
-from regrasp.perception.pose.fiducial import Fiducial
 from regrasp.perception.pose.fusion import fuse
 from regrasp.perception.pose.technique import TECHNIQUES, Technique, TechniqueName, make_technique
 
@@ -86,7 +83,7 @@ def run_perceive(technique: str, files: Sequence[FrameFiles], known: KnownCell, 
                 **_file_names(each.files),
                 "camera": each.frame.camera,
                 **_result_fields(each.result),
-                **_clip_fields(estimator, each),
+                **(_clip_fields(estimator, each) if name == "fiducial" else {}),
             }
             for each in results
         ],
@@ -180,9 +177,10 @@ def _result_fields(result: Estimate | NoEstimate) -> dict[str, Any]:
 
 
 def _clip_fields(technique: Technique, frame_result: FrameResult) -> dict[str, Any]:
-    """The pose of the stow clip's seat, if the technique reads the clip's tag."""
-    if not isinstance(technique, Fiducial):
-        return {}
+    """The pose of the stow clip's seat by the clip's tag, which only the technique `fiducial` reads."""
+    from regrasp.perception.pose.fiducial import Fiducial  # late: it brings the compiler
+
+    assert isinstance(technique, Fiducial)
     seat = technique.seat(frame_result.frame, frame_result.world_from_camera)
     if isinstance(seat, NoEstimate):
         return {"clip": {"found": False, "reason": str(seat.reason), "message": seat.message}}
@@ -208,6 +206,9 @@ def _draw(
     path: Path, frame_result: FrameResult, result: Estimate | NoEstimate, known: KnownCell, technique: str
 ) -> None:
     """The result on the frame's picture."""
+    from regrasp.app.frames.draw import draw_pose  # late: few ask for a picture, and the compiler comes with it
+    from regrasp.perception.camera.registration import expected_errors, register
+
     camera_pose = frame_result.world_from_camera
     if technique == "fused":  # it corrects the camera's pose first
         errors = expected_errors(known, frame_result.frame.camera)

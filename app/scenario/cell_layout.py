@@ -203,8 +203,8 @@ def _cable(document: Document, cell: Cell) -> Iterator[Finding]:
 
 
 def _clip(document: Document, known: KnownCell) -> Iterator[Finding]:
-    from regrasp.behaviors.cable.hand import HANDLING_ARM  # late: it brings the planner and the compiler
-    from regrasp.motion.robots.kinematics import ORIGINS, TOOL_OFFSET
+    from regrasp.behaviors.cable.hand import HANDLING_ARM
+    from regrasp.motion.robots.kinematics import ORIGINS, TOOL_OFFSET  # late: it brings the compiler
 
     shoulder = np.asarray(known.arm(HANDLING_ARM).base) + ORIGINS[0] + ORIGINS[1]
     reach = float(np.linalg.norm(ORIGINS[2:], axis=1).sum() + np.linalg.norm(TOOL_OFFSET))
@@ -233,7 +233,7 @@ def _plug(document: Document, known: KnownCell) -> Iterator[Finding]:
 @lru_cache(maxsize=64)
 def _no_grasp(known: KnownCell) -> str | None:
     """Why the hand cannot take hold of the plugged connector among the known boxes; None when it can."""
-    from regrasp.behaviors.cable.hand import HANDLING_ARM  # late: they bring the planner and the compiler
+    from regrasp.behaviors.cable.hand import HANDLING_ARM  # late: the rest brings the planner and the compiler
     from regrasp.behaviors.cable.unplug import UnplugParameters
     from regrasp.motion.execution import JawParameters
     from regrasp.motion.failure import PlanningError

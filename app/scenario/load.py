@@ -1,6 +1,6 @@
 """Reads and checks scenario files with all their cases, their cells and their trees."""
 
-from collections.abc import Callable, Collection, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Hashable, Iterable, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,14 +11,15 @@ from regrasp.app.files.overrides import Assignment, apply_assignments, parse_ove
 from regrasp.app.files.resources import read_text, resolve
 from regrasp.app.files.schema_nodes import value_at
 from regrasp.app.files.validation import Error, read_as
-from regrasp.app.files.yaml_lines import Document, Place, parse
+from regrasp.app.files.yaml_lines import Document, parse
 from regrasp.app.files.yaml_lines import Path as KeyPath
 from regrasp.app.records.result import DEFAULT_CASE
 from regrasp.app.scenario import vary
 from regrasp.app.scenario.cell_file import load_cell
 from regrasp.app.scenario.placement import check_obstacles
-from regrasp.app.scenario.references import check_names, check_tree_inputs, names_of, tree_text
+from regrasp.app.scenario.references import check_names, check_tree_inputs, tree_text
 from regrasp.app.scenario.schema import ScenarioFile
+from regrasp.app.scenario.tree_file import check_tree_file, names_of
 from regrasp.interfaces.cell import Cell
 from regrasp.interfaces.quote import MAX_QUOTE, cut, nearest, quoted
 
@@ -244,19 +245,6 @@ def _named(document: Document, key: Literal["cell", "tree"], folder: Path) -> Pa
 def _cell(document: Document, folder: Path, assignments: Sequence[Assignment]) -> Cell | None:
     path = _named(document, "cell", folder)
     return load_cell(path, assignments, document.place(("cell",))) if path else None
-
-
-def check_tree_file(path: Path, where: Place | None = None, names: Mapping[str, Collection[str]] | None = None) -> None:
-    """Raises `Findings` for all that is wrong in a tree file; if there is no file, at `where`, which names it.
-
-    `names` are the names in the cell, by kind; without them the tree's references to the cell are not checked.
-    """
-    read_text(path, where)
-    from regrasp.trees import check_tree  # the leaves bring the planner and the compiler with them: seconds
-
-    found = [Finding(shown(path), line, message) for line, message in check_tree(path, names=names)]
-    if found:
-        raise Findings(found)
 
 
 def description(path: Path) -> str:

@@ -11,8 +11,10 @@ from regrasp.app.files.schema_nodes import value_at
 from regrasp.app.files.validation import validated_part
 from regrasp.app.files.yaml_lines import Document
 from regrasp.app.scenario.schema import TreeInput
-from regrasp.interfaces.cell import PLUGGED_INTO, Cell
+from regrasp.app.scenario.tree_file import names_of
+from regrasp.interfaces.cell import Cell
 from regrasp.interfaces.quote import cut, nearest, quoted
+from regrasp.trees import TreeSyntaxError, check_inputs, read_graph
 
 _INPUT = TypeAdapter[TreeInput](TreeInput)
 
@@ -22,28 +24,8 @@ def tree_text(value: TreeInput) -> str:
     return str(value).lower() if isinstance(value, bool) else str(value)
 
 
-def names_of(cell: Cell | None) -> dict[str, dict[str, str]]:
-    """The names in the cell that a tree may refer to, by kind, for `trees.check_tree`.
-
-    Each has the reason why it cannot be used in this cell, or "". Without a cell: the names that every cell has.
-    """
-    from regrasp.perception.pose.technique import TECHNIQUES  # late: it brings the compiler with it
-
-    techniques: dict[str, str] = dict.fromkeys(TECHNIQUES, "")
-    if cell is None:
-        return {"technique": techniques}
-    if cell.known.connector.tag is None:
-        techniques["fiducial"] = "needs a tag on the connector, and this cell's has none; take the cell thesis_tags"
-    plugged = cell.known.plugged_into
-    empty = f"is empty at the start: the cell's plugged_into is {quoted(plugged)}; write {PLUGGED_INTO}"
-    sockets = {socket.name: "" if socket.name == plugged else empty for socket in cell.known.sockets}
-    return {"socket": {PLUGGED_INTO: ""} | sockets, "technique": techniques}
-
-
 def check_tree_inputs(document: Document, tree: Path | None, cell: Cell | None) -> None:
     """Raises `Findings` for inputs that the tree does not have, and for values that it does not take."""
-    from regrasp.trees import check_inputs  # late: the leaves bring the planner and the compiler with them: seconds
-
     written = value_at(document.value, ("inputs",))
     if tree is None or not isinstance(written, dict):
         return
@@ -94,8 +76,6 @@ def _nodes(document: Document, tree: Path | None) -> Iterator[Finding]:
 
 def _node_names(tree: Path) -> set[str]:
     """Every way to name a node of the tree: its path, or the end of it; none if the file is no valid tree."""
-    from regrasp.trees import TreeSyntaxError, read_graph
-
     try:
         nodes = read_graph(tree).walk()
     except (OSError, TreeSyntaxError, ValueError):  # a finding of the tree's own check

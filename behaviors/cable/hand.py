@@ -1,16 +1,18 @@
 """Steps of the handling arm that several leaves share."""
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import RigidTransform
 
 from regrasp.behaviors.leaf import LeafFailed, LeafSteps, StepsLeaf
 from regrasp.interfaces.cause import CauseCode
 from regrasp.motion.failure import PlanningError
 from regrasp.perception.tracking.slip import GapTest
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import RigidTransform
 
 # The thesis's fixed roles of the two arms.
 HANDLING_ARM = "right"  # handles the cable
@@ -34,7 +36,7 @@ class HandLeaf(StepsLeaf):
 
     hand: ClassVar[HandParameters] = HandParameters()
 
-    def held(self) -> RigidTransform:
+    def held(self) -> "RigidTransform":
         """tool_from_connector as believed. Raises `LeafFailed` when `DetectSlip` has just noticed a loss."""
         held = self.services.belief.held
         if held is None:
@@ -45,7 +47,7 @@ class HandLeaf(StepsLeaf):
         """Points (n, 3) m in the world that the rear camera saw from second `since` on; None until a picture comes."""
         return self.services.perception.surface("rear", since)
 
-    def grip(self, world_from_connector: RigidTransform) -> LeafSteps:
+    def grip(self, world_from_connector: "RigidTransform") -> LeafSteps:
         """Close the jaw and tell by its gap whether something is in it; then the belief is that it holds the connector.
 
         Raises LeafFailed GRASP_EMPTY when the jaw closes on nothing, PlanningError when it does not move.

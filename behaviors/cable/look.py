@@ -2,20 +2,21 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import RigidTransform
 
 from regrasp.behaviors.cable.hand import CAMERA_ARM, HandLeaf
 from regrasp.behaviors.leaf import LeafSteps
 from regrasp.interfaces.cause import CauseCode
-from regrasp.interfaces.cell import WristMount
 from regrasp.interfaces.wall_time import counts_as
 from regrasp.motion.failure import PlanningError
 from regrasp.motion.planning.viewpoints import CloseViewParameters, closer_views
 from regrasp.perception.pose.estimate import Estimate
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import RigidTransform
 
 
 @dataclass(frozen=True)
@@ -34,8 +35,10 @@ class LookLeaf(HandLeaf):
 
     view: ClassVar[LookParameters] = LookParameters()
 
-    def view_goals(self, world_from_camera: RigidTransform) -> NDArray[np.float64]:
+    def view_goals(self, world_from_camera: "RigidTransform") -> NDArray[np.float64]:
         """Free joint vectors (n, 6) rad of the camera arm that bring its camera there."""
+        from regrasp.interfaces.cell import WristMount
+
         motion = self.services.motion
         mount = self.services.known.camera("wrist").mount
         assert isinstance(mount, WristMount)
@@ -45,8 +48,8 @@ class LookLeaf(HandLeaf):
 
     @counts_as("planning")
     def best_view(
-        self, connector: RigidTransform, taken: Sequence[NDArray[np.float64]] = ()
-    ) -> tuple[RigidTransform, NDArray[np.float64]]:
+        self, connector: "RigidTransform", taken: Sequence[NDArray[np.float64]] = ()
+    ) -> "tuple[RigidTransform, NDArray[np.float64]]":
         """The best viewpoint (world_from_camera) that shows the whole connector, with free joints (n, 6) rad for it.
 
         It looks from another side than the lines of sight `taken`, unit vectors (3,) in the world. `connector` is

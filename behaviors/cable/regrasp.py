@@ -1,15 +1,17 @@
 """Grasp the connector again where it was found."""
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import RigidTransform
 
 from regrasp.behaviors.cable.hand import HANDLING_ARM, HandLeaf
 from regrasp.behaviors.leaf import LeafFailed, LeafSteps
 from regrasp.perception.pose.cable_shape import cable_course
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import RigidTransform
 
 
 @dataclass(frozen=True)
@@ -53,7 +55,7 @@ class Regrasp(HandLeaf):
             raise
 
 
-def _distance_to_axis(points: NDArray[np.float64], connector: RigidTransform, half: float) -> NDArray[np.float64]:
+def _distance_to_axis(points: NDArray[np.float64], connector: "RigidTransform", half: float) -> NDArray[np.float64]:
     """Distances (n,) m of points (n, 3) m to the connector's axis, a segment of `half` m to each side of its centre."""
     if not len(points):
         return np.empty(0)

@@ -3,22 +3,23 @@
 from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import product
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import RigidTransform, Rotation
 
 from regrasp.behaviors.cable.hand import CAMERA_ARM
 from regrasp.behaviors.cable.look import LookLeaf
 from regrasp.behaviors.leaf import LeafFailed, LeafPort, LeafSteps
 from regrasp.interfaces.cause import CauseCode
-from regrasp.interfaces.cell import FixedMount
 from regrasp.motion.failure import PlanningError
 from regrasp.motion.planning.viewpoints import SpiralParameters, Viewpoint, spiral
 from regrasp.motion.task import MotionTask
 from regrasp.perception.pose.estimate import Estimate
 from regrasp.perception.pose.fusion import fuse
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import RigidTransform
 
 
 def _spiral_of_the_left_arm() -> SpiralParameters:
@@ -92,7 +93,7 @@ class SpiralSearch(LookLeaf):
             yield from self.go_to_sleep(CAMERA_ARM)
             raise LeafFailed(CauseCode.CAMERA_FAILED, f"{trouble}; the rear camera shows no connector")
 
-    def _look_from(self, world_from_camera: RigidTransform) -> Generator[MotionTask | None, None, list[Estimate]]:
+    def _look_from(self, world_from_camera: "RigidTransform") -> Generator[MotionTask | None, None, list[Estimate]]:
         """Estimates from a viewpoint, and from nearer after a weak detection. Raises PlanningError out of reach."""
         seen: list[Estimate] = []
         weak_detections: list[NDArray[np.float64]] = []
@@ -111,6 +112,8 @@ class SpiralSearch(LookLeaf):
         return position
 
     def _viewpoints(self) -> Iterator[Viewpoint]:
+        from regrasp.interfaces.cell import FixedMount
+
         known, last = self.services.known, self.services.perception.track.last
         panel = next(box for box in known.boxes if box.name == "back_panel")
         from_last = last is not None and self.services.belief.vain_searches % 2 == 0
@@ -121,9 +124,11 @@ class SpiralSearch(LookLeaf):
         return spiral(start, rear.mount.world_from_camera, rear.intrinsics, self.parameters.spiral)
 
     def _look_there(
-        self, world_from_camera: RigidTransform, place: NDArray[np.float64], seen: list[Estimate]
+        self, world_from_camera: "RigidTransform", place: NDArray[np.float64], seen: list[Estimate]
     ) -> LeafSteps:
         """Look at a weak detection at `place` (3,) m: from in front of it in the same direction, else turned to it."""
+        from scipy.spatial.transform import RigidTransform, Rotation
+
         sight = world_from_camera.rotation.apply([0.0, 0.0, 1.0])
         position = place - self.parameters.spiral.distance * sight
         before = RigidTransform.from_components(position, world_from_camera.rotation)
@@ -136,8 +141,10 @@ class SpiralSearch(LookLeaf):
         except PlanningError as error:
             self.say("no closer look", why=str(error))
 
-    def _goals(self, views: Sequence[RigidTransform]) -> NDArray[np.float64]:
+    def _goals(self, views: "Sequence[RigidTransform]") -> NDArray[np.float64]:
         """Joints (n, 6) rad for the first view that can be reached. Raises PlanningError when there is none."""
+        from scipy.spatial.transform import RigidTransform
+
         for view, approach in product(views, self.parameters.approaches):
             pose = view * RigidTransform.from_translation([0.0, 0.0, approach])
             goals = self.view_goals(pose)

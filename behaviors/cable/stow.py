@@ -11,7 +11,6 @@ from regrasp.behaviors.leaf import LeafFailed, LeafSteps
 from regrasp.behaviors.services import LossNotice
 from regrasp.interfaces.cause import CauseCode
 from regrasp.motion.failure import PlanningError
-from regrasp.motion.scene.planning_scene import NO_POINTS
 from regrasp.perception.pose.cable_shape import cable_course
 from regrasp.perception.pose.estimate import Estimate
 from regrasp.perception.tracking.slip import seen_at
@@ -40,6 +39,8 @@ class LetGo(HandLeaf):
 
     def steps(self) -> LeafSteps:
         """See the class."""
+        from regrasp.motion.scene.planning_scene import NO_POINTS
+
         yield self.services.motion.release(HANDLING_ARM)
         self.services.belief.held = None
         yield from self.wait(self.parameters.open_time)

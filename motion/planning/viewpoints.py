@@ -5,13 +5,15 @@ The search is the thesis's spiral (Hwang 2024, section 3.4.3).
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial.transform import RigidTransform, Rotation
 
 from regrasp.interfaces.arrays import FloatArray
-from regrasp.interfaces.cell import OPTICAL
 from regrasp.interfaces.frame import Intrinsics
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import RigidTransform
 
 # Steps (right, up) from a main point to its subpoints: the right one first, then downwards and round.
 _SUBPOINTS = ((1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1), (0, 1), (1, 1))
@@ -47,12 +49,12 @@ class Viewpoint:
     index: int
     main: int
     sub: int
-    world_from_camera: RigidTransform
+    world_from_camera: "RigidTransform"
 
 
 def spiral(
     start: FloatArray,
-    world_from_rear: RigidTransform,
+    world_from_rear: "RigidTransform",
     rear: Intrinsics,
     parameters: SpiralParameters = SpiralParameters(),
 ) -> Iterator[Viewpoint]:
@@ -84,15 +86,19 @@ def _square_spiral(rings: int) -> Iterator[tuple[int, int]]:
         length += turn % 2
 
 
-def _view(point: FloatArray, distance: float, offset: FloatArray, view_turn: float) -> RigidTransform:
+def _view(point: FloatArray, distance: float, offset: FloatArray, view_turn: float) -> "RigidTransform":
     """world_from_camera at `offset` (3,) m from the main point's flat view, turned towards the main point."""
+    from scipy.spatial.transform import RigidTransform, Rotation
+
+    from regrasp.interfaces.cell import OPTICAL
+
     position = point + offset - np.array([distance, 0.0, 0.0])
     inwards = -offset / max(float(np.linalg.norm(offset)), 1e-9)
     turn = Rotation.from_rotvec(view_turn * np.cross([1.0, 0.0, 0.0], inwards))
     return RigidTransform.from_components(position, turn * OPTICAL)
 
 
-def _in_view(point: FloatArray, world_from_camera: RigidTransform, camera: Intrinsics) -> bool:
+def _in_view(point: FloatArray, world_from_camera: "RigidTransform", camera: Intrinsics) -> bool:
     """Whether a point (3,) m in the world lies in the camera's picture."""
     x, y, z = world_from_camera.inv().apply(point)
     if z <= 0:
@@ -102,13 +108,17 @@ def _in_view(point: FloatArray, world_from_camera: RigidTransform, camera: Intri
 
 
 def closer_views(
-    world_from_connector: RigidTransform, parameters: CloseViewParameters = CloseViewParameters()
-) -> Iterator[RigidTransform]:
+    world_from_connector: "RigidTransform", parameters: CloseViewParameters = CloseViewParameters()
+) -> "Iterator[RigidTransform]":
     """Viewpoints for a closer look at a connector whose pose is known roughly: world_from_camera, the best first.
 
     They lie on the arms' side (towards -x) and look as square to the connector's axis as may be: there its whole length
     shows, and its tilt in depth.
     """
+    from scipy.spatial.transform import RigidTransform, Rotation
+
+    from regrasp.interfaces.cell import OPTICAL
+
     center = world_from_connector.translation
     axis = world_from_connector.rotation.apply([1.0, 0.0, 0.0])
     grid = np.meshgrid(parameters.distances, np.deg2rad(parameters.yaws_deg), np.deg2rad(parameters.pitches_deg))

@@ -1,18 +1,24 @@
 """Where the cable runs, from what is known of its two ends."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline
-from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import FloatArray
-from regrasp.interfaces.cell import KnownCell
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import RigidTransform
+
+    from regrasp.interfaces.cell import KnownCell
 
 
-def cable_course(known: KnownCell, world_from_connector: RigidTransform, spacing: float = 0.01) -> FloatArray:
+def cable_course(known: "KnownCell", world_from_connector: "RigidTransform", spacing: float = 0.01) -> FloatArray:
     """Points (n, 3) m, world, about `spacing` m apart along the cable of a connector at rest, from the plugged end on.
 
     A cubic Hermite curve between the two ends with their directions: the shape of a rod under small deflections.
     """
+    from scipy.interpolate import CubicHermiteSpline
+
     start, start_direction = known.cable_anchor
     end = world_from_connector.apply([-0.5 * known.connector.length, 0.0, 0.0])
     direction = world_from_connector.rotation.apply([1.0, 0.0, 0.0])

@@ -1,12 +1,16 @@
 """What a look at the connector gives: a pose with its covariance, or the reason why there is none."""
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import FloatArray
-from regrasp.perception.pose.segmentation import NotSeen
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import RigidTransform
+
+    from regrasp.perception.pose.segmentation import NotSeen
 
 # World frame. Decides the sign of the axis where nothing else does: plugs of the cell point to +y.
 DEFAULT_AXIS = np.array([0.0, 1.0, 0.0])
@@ -36,7 +40,7 @@ class Estimate:
     camera: str
     position: FloatArray
     axis: FloatArray
-    world_from_connector: RigidTransform
+    world_from_connector: "RigidTransform"
     covariance: FloatArray
     points: int
     mask_area: int
@@ -54,7 +58,7 @@ class NoEstimate:
 
     stamp: float
     camera: str
-    reason: NotSeen
+    reason: "NotSeen"
     message: str
     weak_detection: FloatArray | None = None
 

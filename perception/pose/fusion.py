@@ -6,13 +6,15 @@ The errors of different cameras are independent.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial.transform import RigidTransform, Rotation
-from scipy.stats import chi2
 
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.perception.pose.estimate import Estimate
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
 
 
 @dataclass(frozen=True)
@@ -25,7 +27,7 @@ class FusionParameters:
     # Of the longest visible part. Choice: the centre of a part at least so long is nearly the longest part's.
     min_part_share: float = 0.9
     # Squared Mahalanobis distance beyond which two estimates disagree: 99.9 % of chi-square, 5 degrees of freedom.
-    max_mahalanobis_sq: float = float(chi2.ppf(0.999, 5))
+    max_mahalanobis_sq: float = 20.515005652432873
 
 
 def fuse(estimates: Sequence[Estimate], parameters: FusionParameters = FusionParameters()) -> Estimate:
@@ -121,6 +123,8 @@ def _estimate(
     kept: Sequence[Estimate], line: FloatArray, across: FloatArray, mean: FloatArray, covariance: FloatArray
 ) -> Estimate:
     """The estimate at the tangent coordinates `mean` (5,) of `line`. Its roll is that of the surest estimate."""
+    from scipy.spatial.transform import RigidTransform, Rotation
+
     turn = Rotation.from_rotvec(across.T @ mean[3:])
     line = turn.apply(line)
     axis = line * _sign(kept, line)
@@ -161,8 +165,10 @@ def _roll_variance(estimate: Estimate) -> float:
     return float(estimate.axis @ estimate.covariance[3:, 3:] @ estimate.axis)
 
 
-def _shortest_rotation(start: FloatArray, end: FloatArray) -> Rotation:
+def _shortest_rotation(start: FloatArray, end: FloatArray) -> "Rotation":
     """The smallest rotation from one unit vector (3,) to another that is not opposite."""
+    from scipy.spatial.transform import Rotation
+
     cross = np.cross(start, end)
     sine = float(np.linalg.norm(cross))
     return Rotation.from_rotvec(cross * (np.arctan2(sine, float(start @ end)) / sine if sine > 0 else 1.0))

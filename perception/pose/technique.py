@@ -1,18 +1,15 @@
 """The techniques that find the connector in a frame: one interface, chosen by name."""
 
-from collections.abc import Callable
-from typing import Literal, Protocol, get_args
-
-from scipy.spatial.transform import RigidTransform
+from typing import TYPE_CHECKING, Literal, Protocol, get_args
 
 from regrasp.interfaces.arrays import FloatArray
-from regrasp.interfaces.cell import KnownCell
 from regrasp.interfaces.frame import RgbdFrame
-from regrasp.perception.pose.detector import Detector
 from regrasp.perception.pose.estimate import Estimate, NoEstimate
-from regrasp.perception.pose.fiducial import Fiducial
-from regrasp.perception.pose.fused.fused import Fused
-from regrasp.perception.pose.rgbd import Rgbd
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import RigidTransform
+
+    from regrasp.interfaces.cell import KnownCell
 
 TechniqueName = Literal["rgbd", "fiducial", "detector", "fused"]
 TECHNIQUES: tuple[TechniqueName, ...] = get_args(TechniqueName)
@@ -24,7 +21,7 @@ class Technique(Protocol):
     def estimate(
         self,
         frame: RgbdFrame,
-        world_from_camera: RigidTransform,
+        world_from_camera: "RigidTransform",
         *,
         axis: FloatArray | None = None,
         near: FloatArray | None = None,
@@ -38,14 +35,23 @@ class Technique(Protocol):
         ...
 
 
-def make_technique(name: TechniqueName, known: KnownCell) -> Technique:
+def make_technique(name: TechniqueName, known: "KnownCell") -> Technique:
     """The technique of that name. Raises ValueError if the cell lacks what it needs."""
-    makers: dict[TechniqueName, Callable[[KnownCell], Technique]] = {
-        "rgbd": Rgbd,
-        "fiducial": Fiducial,
-        "detector": Detector,
-        "fused": Fused,
-    }
-    if name not in makers:
-        raise ValueError(f"no technique {name!r}; there are {', '.join(TECHNIQUES)}")
-    return makers[name](known)
+    match name:  # each imports what it needs: the compiler, or OpenCV alone
+        case "rgbd":
+            from regrasp.perception.pose.rgbd import Rgbd
+
+            return Rgbd(known)
+        case "fiducial":
+            from regrasp.perception.pose.fiducial import Fiducial
+
+            return Fiducial(known)
+        case "detector":
+            from regrasp.perception.pose.detector import Detector
+
+            return Detector(known)
+        case "fused":
+            from regrasp.perception.pose.fused.fused import Fused
+
+            return Fused(known)
+    raise ValueError(f"no technique {name!r}; there are {', '.join(TECHNIQUES)}")

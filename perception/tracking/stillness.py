@@ -3,7 +3,6 @@
 from collections import deque
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -57,6 +56,8 @@ class Stillness:
 
 def _block_means(rgb: ColorImage, block: int) -> NDArray[np.float32]:
     """Block means of the gray image, over their own mean; (H / block, W / block)."""
+    import cv2  # late: leaves import this module, and not all that do need pictures
+
     gray = cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY).astype(np.float32)
     means = cv2.resize(gray, (rgb.shape[1] // block, rgb.shape[0] // block), interpolation=cv2.INTER_AREA)
     return np.asarray(means / max(float(means.mean()), 1.0), np.float32)

@@ -11,7 +11,8 @@ from regrasp.app.cli.commands import app
 from regrasp.app.files.findings import Findings
 from regrasp.app.files.resources import shipped
 from regrasp.app.scenario.cell_file import load_cell
-from regrasp.app.scenario.load import cases, check_tree_file
+from regrasp.app.scenario.load import cases
+from regrasp.app.scenario.tree_file import check_tree_file
 from regrasp.interfaces.quote import MAX_QUOTE
 
 LONG = ("9" * 5000, "a" * 5000, "{" + "a" * 5000 + "}", "[" + "a, " * 90 + "]")

@@ -34,7 +34,8 @@ FINDING = re.compile(r"[^\n]+: [^\n]*; [^\n]+")
 def read(case: Case, folder: Path) -> str:
     """How reading the case went: "clean", "findings", or what is wrong with the reader."""
     from regrasp.app.scenario.cell_file import load_cell  # late: in the worker
-    from regrasp.app.scenario.load import check_tree_file, load_scenario
+    from regrasp.app.scenario.load import load_scenario
+    from regrasp.app.scenario.tree_file import check_tree_file
 
     if case.kind in RECORDED:
         run = folder / "run"

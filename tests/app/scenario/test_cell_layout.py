@@ -122,3 +122,15 @@ def test_no_number_of_a_cell_may_be_huge() -> None:
         with pytest.raises(Findings) as raised:
             load_cell(shipped("cell")["thesis"], assignments)
         assert {item.source.partition("=")[0].removeprefix("--set ") for item in raised.value.items} == set(keys)
+
+
+def test_who_only_looks_at_pictures_may_have_a_cell_that_cannot_work() -> None:
+    path = shipped("cell")["thesis"]
+    high, wrong = parse_overrides(["known.clip.seat=[0.4,0.1,3.0]"])
+    assert not wrong
+    with pytest.raises(Findings):
+        load_cell(path, high)
+    assert load_cell(path, high, laid_out=False).known.clip.seat == (0.4, 0.1, 3.0)
+    misnamed, _ = parse_overrides(["known.plugged_into=nowhere"])
+    with pytest.raises(Findings, match="nowhere"):
+        load_cell(path, misnamed, laid_out=False)

@@ -255,3 +255,7 @@ def test_frames_that_disagree_across_the_view_do_not_meet_in_the_camera(apart: f
     for place in places:
         away = fused.position - place
         assert away @ np.linalg.solve(fused.covariance[:3, :3], away) < 9.0
+
+
+def test_the_limit_of_outliers_is_a_quantile_of_chi_square() -> None:
+    assert FusionParameters().max_mahalanobis_sq == pytest.approx(float(chi2.ppf(0.999, 5)), rel=1e-12)
