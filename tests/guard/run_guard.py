@@ -32,7 +32,7 @@ from regrasp.app.scenario.load import load_scenario
 KEPT = Path(__file__).with_name("runs.json")
 SCENARIOS = ("no_obstacle", "short_obstacle", "tall_obstacle")
 SEEDS = (0, 1)
-OF_THE_CLOCK = ("wall_seconds", "real_time_factor", "versions")
+OF_THE_CLOCK = ("wall_seconds", "real_time_factor", "wall_by_part", "longest_tick", "versions")
 TICKS = 20  # between two digests that are kept: a second, to tell where runs part
 
 
