@@ -20,7 +20,7 @@ run: setup
 	$(BIN)/regrasp run short_obstacle --video
 
 test: setup
-	$(BIN)/pytest -n 2 $(TESTS)
+	$(BIN)/pytest -n 2 --dist worksteal $(TESTS)
 
 lint: setup
 	$(BIN)/ruff check .

@@ -18,6 +18,7 @@ from regrasp.motion.scene.collision import CollisionModel
 
 pytest_plugins = ["pytester", "regrasp.app.pytest_plugin"]
 
+LONG = ("tests/scenarios", "tests/outside")
 PACKAGES = {"app", "behaviors", "interfaces", "motion", "perception", "scenarios", "sim", "trees"}
 
 
@@ -31,6 +32,11 @@ class _NoBareImport:
 
 
 sys.meta_path.insert(0, _NoBareImport())
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Whole runs first: what is long must not begin last, when the other workers have nothing left to take over."""
+    items.sort(key=lambda item: not item.nodeid.startswith(LONG))
+
 
 # A shell starts background jobs with Ctrl-C ignored, and what tests start would inherit that.
 signal.signal(signal.SIGINT, signal.default_int_handler)
