@@ -33,6 +33,7 @@ class _NoBareImport:
 
 sys.meta_path.insert(0, _NoBareImport())
 
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Whole runs first: what is long must not begin last, when the other workers have nothing left to take over."""
     items.sort(key=lambda item: not item.nodeid.startswith(LONG))

@@ -3,6 +3,7 @@
 import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from functools import cache
 from typing import Any
 
 from regrasp.app.cli.options import LogLevel
@@ -55,6 +56,25 @@ def shown_progress(quiet: bool, level: LogLevel = None) -> Iterator[Observers]:
                 lines.show(time, leaf)
 
             yield Observers(tick=plain, event=event)
+
+
+@cache
+def tell_of_compilation() -> None:
+    """From now on say so once, on stderr, if something has to be compiled; the result is kept on disk."""
+    from numba.core import event as numba_event
+
+    class Compilation(numba_event.Listener):  # type: ignore[misc,unused-ignore]
+        told = False
+
+        def on_start(self, event: Any) -> None:
+            if not self.told:
+                self.told = True
+                _print("compiling, once on this machine: a minute")
+
+        def on_end(self, event: Any) -> None:
+            pass
+
+    numba_event.register("numba:compile", Compilation())
 
 
 class _Lines:

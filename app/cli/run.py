@@ -64,10 +64,13 @@ def run_scenario(
     \b
     Exit code: 0 every expectation met, 1 not, 2 bad input, 130 Ctrl-C.
     """
+    from regrasp.app.cli.progress import tell_of_compilation
     from regrasp.app.cli.run_every import run_every
     from regrasp.app.records.summary import run_summary
     from regrasp.app.run.batch import Run, Settings
 
+    if not quiet:
+        tell_of_compilation()
     overrides = [*(sets or []), *([] if seed is None else [f"seed={seed}"])]
     twice = seed is not None and any(text.partition("=")[0].strip() == "seed" for text in sets or [])
     wrong = [Finding("--seed", 0, "the seed is given by --set, too; leave one out")] if twice else []
