@@ -48,7 +48,7 @@ def print_bench() -> None:
             "shipped trees checked / parsed by py_trees": tree_checks(),
             "tick of the recovery tree with logs / bare": tree_ticks(),
             "cable torques by numba / numpy and scipy": cable_torques(scenario.cell.hidden.cable.links),
-            f"848x480 picture by {world.renderer.name} / TinyRenderer": rendering_speed(world),
+            f"848x480 picture by {world.renderer.name} / software": rendering_speed(world),
             **color_techniques(scenario.cell, 848),
             **color_techniques(scenario.cell, 640),
             "848x480 tag to pose / bare OpenCV calls": tag_techniques(848),
@@ -122,15 +122,15 @@ def cable_torques(links: int) -> tuple[Call, Call]:
 
 
 def rendering_speed(world: World) -> tuple[Call, Call]:
-    """The rear camera's picture by the world's renderer and by PyBullet's software renderer."""
-    tiny = make_renderer(world.visuals, "tiny")
+    """The rear camera's picture by the world's renderer and by the software renderer."""
+    software = make_renderer(world.visuals, "software")
     spec = world.cell.known.camera("rear")
     pose = spec.mount.world_from_camera  # type: ignore[union-attr]
 
     def draw(renderer: Any) -> Any:
         return renderer.render(world.visuals.snapshot(), pose, spec.intrinsics, world.light)
 
-    return lambda: draw(world.renderer), lambda: draw(tiny)
+    return lambda: draw(world.renderer), lambda: draw(software)
 
 
 def rear_frame(cell: Cell, width: int) -> tuple[RgbdFrame, RigidTransform]:

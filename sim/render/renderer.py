@@ -9,12 +9,12 @@ from scipy.spatial.transform import RigidTransform
 from regrasp.interfaces.frame import Intrinsics
 from regrasp.sim.render.opengl import GlRenderer
 from regrasp.sim.render.picture import Image, LightState
-from regrasp.sim.render.tiny import TinyRenderer
+from regrasp.sim.render.software import SoftwareRenderer
 from regrasp.sim.render.visuals import Visuals
 
 __all__ = ["Image", "LightState", "Renderer", "RendererName", "make_renderer"]
 
-RendererName = Literal["auto", "moderngl", "tiny"]
+RendererName = Literal["auto", "moderngl", "software"]
 
 
 class Renderer(Protocol):
@@ -37,20 +37,20 @@ class Renderer(Protocol):
         ...
 
     def close(self) -> None:
-        """Free the renderer's context or client."""
+        """Free the renderer's context."""
         ...
 
 
 def make_renderer(visuals: Visuals, choice: RendererName = "auto") -> Renderer:
-    """The chosen renderer; "auto" takes moderngl where an EGL context can be made, else TinyRenderer.
+    """The chosen renderer; "auto" takes moderngl where an EGL context can be made, else our own.
 
     Raises whatever moderngl raises if it is chosen by name and no context can be made.
     """
-    if choice == "tiny":
-        return TinyRenderer(visuals, "asked for")
+    if choice == "software":
+        return SoftwareRenderer(visuals, "asked for")
     if choice == "moderngl":
         return GlRenderer(visuals, "asked for")
     try:
         return GlRenderer(visuals, "an EGL context can be made here")
     except Exception as error:  # moderngl and glcontext raise bare Exception
-        return TinyRenderer(visuals, f"no EGL context can be made here ({error})")
+        return SoftwareRenderer(visuals, f"no EGL context can be made here ({error})")

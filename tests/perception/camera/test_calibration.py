@@ -32,7 +32,7 @@ def corners_through(lens: list[float], noise: float, seed: int, views: int = 15)
     return [s.reshape(-1, 2) + rng.normal(0.0, noise, (ROWS * COLUMNS, 2)) for s in seen]
 
 
-@pytest.mark.parametrize("renderer", ["auto", "tiny"])
+@pytest.mark.parametrize("renderer", ["auto", "software"])
 def test_rendered_boards_give_the_camera_that_took_them(renderer: RendererName) -> None:
     poses = board_poses(K, COLUMNS, ROWS, SQUARE, 12, np.random.default_rng(5))
     views = [find_checkerboard(rgb, COLUMNS, ROWS) for rgb in board_pictures(K, poses, COLUMNS, ROWS, SQUARE, renderer)]

@@ -52,7 +52,7 @@ def mahalanobis_sq(error: NDArray[np.float64], covariance: NDArray[np.float64]) 
     return float(error @ np.linalg.solve(covariance, error))
 
 
-@pytest.mark.parametrize("renderer", ["auto", "tiny"])
+@pytest.mark.parametrize("renderer", ["auto", "software"])
 def test_free_views_are_found_and_the_covariance_tells_how_well(renderer: RendererName) -> None:
     scene, rng = TagScene(renderer), np.random.default_rng(4)
     poses = [random_pose(rng)[0] for _ in range(60)]
