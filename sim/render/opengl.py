@@ -1,4 +1,4 @@
-"""The fast renderer: OpenGL without a window, on a graphics card or with Mesa's software rasteriser."""
+"""The OpenGL renderer, without a window: on a graphics card or with Mesa's software rasteriser."""
 
 from dataclasses import dataclass
 from typing import Any

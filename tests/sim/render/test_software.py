@@ -14,6 +14,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from regrasp.interfaces.frame import Intrinsics
 from regrasp.sim.render.opengl import GlRenderer
 from regrasp.sim.render.picture import Z_FAR, Z_NEAR, Image, LightState
+from regrasp.sim.render.raster import draw_triangles
 from regrasp.sim.render.shading import sine
 from regrasp.sim.render.software import SoftwareRenderer
 from regrasp.sim.render.visuals import Visuals
@@ -129,6 +130,22 @@ def test_a_wall_has_no_holes_where_its_triangles_meet(
     assert shown[np.array(away) > 0.01].all()
     assert not shown[np.array(away) < -0.01].any()
     assert np.abs(image.depth[shown] - depth / 6).max() < 1e-5
+
+
+@given(st.integers(1, 15), st.integers(1, 15))
+def test_triangles_that_meet_on_pixels_draw_each_of_them_once(x: int, y: int) -> None:
+    """Four triangles make up a square from pixel 2 to pixel 10; they meet at half a pixel's steps in it."""
+    flat = [[2.0, 2.0], [10.0, 2.0], [10.0, 10.0], [2.0, 10.0], [2.0 + x / 2, 2.0 + y / 2]]
+    corners = np.array([[u, v, 1.0, 1.0, u, v] for u, v in flat])
+    drawn = np.zeros((12, 12), int)
+    for i in range(4):
+        nearest = np.zeros((12, 12), np.float32)
+        triangles = np.array([[4, (i + 1) % 4, i]], np.int32)
+        draw_triangles(corners, np.array([0]), np.array([0, 1]), triangles, 0.0, nearest, None)
+        drawn += nearest > 0.0
+    expected = np.zeros((12, 12), int)
+    expected[2:10, 2:10] = 1
+    np.testing.assert_array_equal(drawn, expected)
 
 
 @pytest.mark.parametrize("depth", [0.0, -0.5])
