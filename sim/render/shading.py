@@ -8,17 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 _ROUND = np.float32(12582912.0)  # 1.5 * 2**23: a float32 that is added to it and taken away again is whole
-_TURN = np.float32(2.0 * np.pi)
-_TURNS = np.float32(0.5 / np.pi)
 _SINE = tuple(np.float32(c) for c in (0.9999966, -0.1666483, 0.0083063, -0.0001836))  # odd powers, -pi/2 to pi/2
 _HALF, _ONE, _ZERO = np.float32(0.5), np.float32(1.0), np.float32(0.0)
-_PI = np.float32(np.pi)
+_PI, _PER_PI = np.float32(np.pi), np.float32(1.0 / np.pi)
 
 
 @numba.njit(cache=True, error_model="numpy", fastmath={"contract"})
 def sine(x: np.float32) -> np.float32:
     """The sine to 1e-4 for |x| < 1000, by a polynomial of its angle to the next multiple of pi."""
-    half_turns = (x * (_TURNS + _TURNS) + _ROUND) - _ROUND
+    half_turns = (x * _PER_PI + _ROUND) - _ROUND
     odd = half_turns - np.float32(2.0) * ((half_turns * _HALF + _ROUND) - _ROUND)  # -1, 0 or 1
     r = x - half_turns * _PI
     s = r * r
@@ -215,6 +213,7 @@ def _paint(
     background: NDArray[np.uint8],
     rgb: NDArray[np.uint8],
 ) -> None:
+    """The colours of a row, from its items' colours times brightness."""
     top = np.float32(255.0)
     width, u = len(seen), 0
     while u < width:
