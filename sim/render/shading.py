@@ -176,6 +176,13 @@ def _face(
         u = end
 
 
+@numba.njit(cache=True, error_model="numpy")
+def _within(x: np.float32, last: np.float32) -> np.float32:
+    """The number from 0 to `last` that is next to x; 0 for what is no number, which must not become an index."""
+    above = x if x > _ZERO else _ZERO
+    return above if above < last else last
+
+
 @numba.njit(cache=True, error_model="numpy", fastmath={"contract"})
 def _light(
     x: NDArray[np.float32],
@@ -190,7 +197,7 @@ def _light(
     ambient, diffuse, last = strengths[0], strengths[1], np.float32(shadows.shape[0] - 1)
     texels, size = shadows.ravel(), np.int32(shadows.shape[0])
     for u in range(len(x)):
-        across, down = min(max(x[u], _ZERO), last), min(max(y[u], _ZERO), last)
+        across, down = _within(x[u], last), _within(y[u], last)
         i, j = np.int32(min(across, last - _ONE)), np.int32(min(down, last - _ONE))
         right, low = across - np.float32(i), down - np.float32(j)
         near = max(z[u], _ZERO)

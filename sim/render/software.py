@@ -16,6 +16,7 @@ from regrasp.sim.render.shading import read_out, shade, write_normals
 from regrasp.sim.render.shadows import DEFAULT_SHADOWS, ShadowParameters, light_from_world
 from regrasp.sim.render.visuals import Visuals
 
+_LARGEST = 1e6  # m; what is farther from the origin is not drawn
 _OFFSET = 1.5  # texels along the normal, at which shadows are looked up, as the OpenGL renderer does
 
 
@@ -70,8 +71,9 @@ class SoftwareRenderer:
         inverse.fill(1.0 / Z_FAR)
         seen.fill(-1)
         camera_from_world, pixels = world_from_camera.inv().as_matrix(), _pixels_from_camera(intrinsics)
-        centres = poses[self._order, :, 3] @ camera_from_world[:3, :3].T + camera_from_world[:3, 3]
-        visible = self._order[_in_view(centres, self._radius[self._order], intrinsics)]
+        sound = self._order[_sound(poses[self._order])]
+        centres = poses[sound, :, 3] @ camera_from_world[:3, :3].T + camera_from_world[:3, 3]
+        visible = sound[_in_view(centres, self._radius[sound], intrinsics)]
         project_corners(self._places, visible, self._first_corner, pixels @ camera_from_world, self._corners)
         draw = (self._corners, visible, self._first_triangle, self._triangles)
         draw_triangles(*draw, Z_NEAR, inverse, seen)
@@ -108,6 +110,7 @@ class SoftwareRenderer:
         self._texels_from_world = texels @ matrix
         self._shadows.fill(0.0)
         rows = np.array([row for mesh in casters for row in mesh.rows], np.int64)
+        rows = rows[_sound(poses[rows])]
         view = self._texels_from_world[[0, 1, 3, 2]]
         project_corners(self._places, rows, self._first_corner, view, self._corners)
         draw_triangles(self._corners, rows, self._first_triangle, self._triangles, 0.0, self._shadows, None)
@@ -131,6 +134,11 @@ def _stack(rows: Sequence[NDArray[Any]], width: int, kind: DTypeLike) -> NDArray
 def _pixels_from_camera(k: Intrinsics) -> FloatArray:
     """The matrix (4, 4) from a point to its pixel times its depth, its depth, and 1."""
     return np.array([[k.fx, 0.0, k.cx, 0.0], [0.0, k.fy, k.cy, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
+
+
+def _sound(poses: NDArray[np.float32]) -> NDArray[np.bool_]:
+    """Which poses are of numbers that can be drawn; those of a world that has blown up are not."""
+    return np.abs(poses).reshape(len(poses), 12).max(axis=1) < _LARGEST
 
 
 def _in_view(centres: FloatArray, radius: FloatArray, k: Intrinsics) -> NDArray[np.bool_]:

@@ -172,6 +172,17 @@ def test_a_floor_under_the_camera_is_drawn_up_to_the_near_plane(software: Softwa
     )
 
 
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")  # of the shadow map's bounds
+@pytest.mark.parametrize("wrong", [np.nan, np.inf, -np.inf, 1e30])
+def test_what_lies_nowhere_is_not_drawn(software: SoftwareRenderer, wrong: float) -> None:
+    """A physics step may blow up: the others are drawn as ever, but for the shadows, whose map has no bounds."""
+    poses = placed([(0.0, 0.0, 0.2 * i, 0.0, 0.0, 0.0) for i in range(5)])
+    poses[0, 0, 3] = wrong
+    image = software.render(poses, RigidTransform.identity(), K, LIGHT)
+    poses[0, :, 3] = 0.0, 0.0, -9.0
+    assert np.array_equal(image.ids, software.render(poses, RigidTransform.identity(), K, LIGHT).ids)
+
+
 def test_an_empty_scene_is_all_background() -> None:
     client = p.connect(p.DIRECT)
     renderer = SoftwareRenderer(Visuals(client))
