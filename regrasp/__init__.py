@@ -113,7 +113,7 @@ def run(
     out: str | Path | None = None,
     video: bool = False,
     gui: bool = False,
-    renderer: Literal["auto", "moderngl", "tiny"] = "auto",
+    renderer: Literal["software", "moderngl"] = "software",
     on_tick: Progress | None = None,
     on_event: OnEvent | None = None,
     stop: StopRequest | None = None,
@@ -126,7 +126,7 @@ def run(
         out: the folder for the record, which is made; None keeps no record.
         video: film the run into the record.
         gui: show PyBullet's window.
-        renderer: what draws the cameras' pictures; auto takes OpenGL (moderngl) where it works, else PyBullet's.
+        renderer: what draws the cameras' pictures: compiled loops, or OpenGL (moderngl), for a graphics card.
         on_tick: called after each tick of the tree with the simulated second and the active leaf's name, "" for none.
         on_event: called with each event of the run, a mapping as in events.jsonl.
         stop: a `threading.Event` or the like. Once it is set, the run ends after the tick with the outcome
@@ -225,8 +225,8 @@ def _check_run(scenario: Any, seed: Any, renderer: Any, on_tick: Any, on_event: 
     whole = isinstance(seed, Integral) and seed is not True and seed is not False
     if seed is not None and not (whole and 0 <= seed <= MAX_SEED):
         raise ValueError(f"seed is {seed!r}; expected a whole number from 0 to {MAX_SEED}")
-    if renderer not in ("auto", "moderngl", "tiny"):
-        raise ValueError(f"renderer is {renderer!r}; expected auto, moderngl or tiny")
+    if renderer not in ("software", "moderngl"):
+        raise ValueError(f"renderer is {renderer!r}; expected software or moderngl")
     for name, callback in {"on_tick": on_tick, "on_event": on_event}.items():
         if not (callback is None or callable(callback)):
             raise TypeError(f"{name} is {callback!r}; expected a function")

@@ -73,7 +73,7 @@ class World:
         gravity: Gravity,
         seed: int,
         setup: SceneSetup = NOTHING_ADDED,
-        renderer: RendererName = "auto",
+        renderer: RendererName = "software",
         gui: bool = False,
         parameters: WorldParameters = WorldParameters(),
     ) -> None:

@@ -94,9 +94,9 @@ def evaluate_detector(
 ) -> None:
     """Measure how well the network finds the connector.
 
-    In pictures unlike those of its training, some three minutes by default. They show another layout of the cell, other
-    light, things and look-alikes, drawn by PyBullet's renderer; the connector is hidden by up to 70 %, and absent in as
-    many pictures as each class of occlusion has.
+    In pictures unlike those of its training, a minute or two by default. They show another layout of the cell, other
+    light, things and look-alikes; the connector is hidden by up to 70 %, and absent in as many pictures as each
+    class of occlusion has.
 
     \b
     Example:

@@ -30,10 +30,8 @@ Seed = Annotated[
     int | None, typer.Option(min=0, max=MAX_SEED, help="Draws every error, noise and jitter; default the scenario's.")
 ]
 RendererOption = Annotated[
-    Literal["auto", "moderngl", "tiny"],
-    typer.Option(
-        help="What draws the cameras' pictures; auto takes OpenGL (moderngl) where it works, else PyBullet's."
-    ),
+    Literal["software", "moderngl"],
+    typer.Option(help="What draws the cameras' pictures: compiled loops, or OpenGL, for a graphics card."),
 ]
 WallLimitSeconds = Annotated[
     float | None,

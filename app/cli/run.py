@@ -43,7 +43,7 @@ def run_scenario(
     ] = None,
     junit: Annotated[Path | None, typer.Option(metavar="FILE", help="With --all: write JUnit XML, too.")] = None,
     video: Annotated[bool, typer.Option("--video", help="Film the run into the record.")] = False,
-    renderer: RendererOption = "auto",
+    renderer: RendererOption = "software",
     wall_limit: WallLimitSeconds = None,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Check everything, say what would run, and run nothing.")

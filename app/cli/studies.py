@@ -23,7 +23,7 @@ def demo(
     jobs: Annotated[int, typer.Option(min=1, help="Episodes side by side.")] = os.cpu_count() or 1,
     out: Annotated[Path | None, typer.Option(help="Folder of demo.json and the runs' records.")] = None,
     sets: Sets = None,
-    renderer: RendererOption = "auto",
+    renderer: RendererOption = "software",
     wall_limit: WallLimitSeconds = None,
 ) -> None:
     """Run the whole demonstration over many seeds.
@@ -64,7 +64,7 @@ def pose(
         bool, typer.Option("--both-cameras", help="A second row each: the wrist camera looks, too.")
     ] = False,
     cell: CellName = None,
-    renderer: RendererOption = "auto",
+    renderer: RendererOption = "software",
     jobs: Annotated[int, typer.Option(min=1, help="Scenes side by side.")] = os.cpu_count() or 1,
     out: Annotated[Path | None, typer.Option(help="Folder of pose.json, pose.csv and the plots.")] = None,
 ) -> None:
@@ -102,7 +102,7 @@ def coverage(
     seeds: Annotated[str, typer.Option(metavar="A:B", help="Scenes: seeds from A up to, not including, B.")] = "0:200",
     techniques: Techniques = None,
     cell: CellName = None,
-    renderer: RendererOption = "auto",
+    renderer: RendererOption = "software",
     jobs: Annotated[int, typer.Option(min=1, help="Scenes side by side.")] = os.cpu_count() or 1,
     out: Annotated[Path | None, typer.Option(help="Folder of coverage.json.")] = None,
 ) -> None:

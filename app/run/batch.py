@@ -27,7 +27,7 @@ class Settings:
     """How runs are done: what is rendered and shown, and how many seconds of wall time each may take."""
 
     video: bool = False
-    renderer: "RendererName" = "auto"
+    renderer: "RendererName" = "software"
     quiet: bool = False
     wall_limit: float = math.inf
 

@@ -33,7 +33,7 @@ class Episode:
     attempts: Attempts
 
 
-def build_world(scenario: Scenario, seed: int, renderer: RendererName = "auto", gui: bool = False) -> World:
+def build_world(scenario: Scenario, seed: int, renderer: RendererName = "software", gui: bool = False) -> World:
     """The scenario's world for this seed. The caller closes it."""
     rng = np.random.default_rng([seed, 0])
     obstacles = draw_obstacles(scenario.file, rng)

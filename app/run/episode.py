@@ -45,7 +45,7 @@ def run_episode(
     seed: int,
     video: bool = False,
     gui: bool = False,
-    renderer: RendererName = "auto",
+    renderer: RendererName = "software",
     observers: Observers = Observers(),  # noqa: B008 - it does not change
 ) -> Result:
     """Run a scenario to its end and leave its record in the folder `out` (None: nowhere).
@@ -69,7 +69,7 @@ def run_episode(
                 limits=scenario.file.limits.model_dump(),
                 overrides=list(scenario.overrides),
                 renderer=world.renderer.name,
-                renderer_reason=world.renderer.reason,
+                renderer_device=world.renderer.device,
             )
             episode = assemble(scenario, world, seed, log)
             observers.assembled(episode)

@@ -47,7 +47,7 @@ def print_planner_bench(count: int = 10, seed: int = 0) -> None:
     for name in SCENARIOS:
         scenario = load_scenario(name)
         obstacles = draw_obstacles(scenario.file, np.random.default_rng([seed, 0]))  # as `build_world` draws them
-        world = build_world(scenario, seed, "tiny")
+        world = build_world(scenario, seed, "software")
         try:
             scene = PlanningScene(world.cell.known, world.arms, {n: arm.gripper for n, arm in world.arms.items()})
             queries = draw_queries(scene, obstacles, np.random.default_rng(seed), count)

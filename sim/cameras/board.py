@@ -76,7 +76,7 @@ def board_pictures(
     columns: int,
     rows: int,
     square: float,
-    renderer: RendererName = "auto",
+    renderer: RendererName = "software",
     light: LightState = BOARD_LIGHT,
 ) -> Iterator[NDArray[np.uint8]]:
     """Pictures (H, W, 3) uint8 of the board at `poses`, as from `board_poses`; `light` is in the optical frame."""

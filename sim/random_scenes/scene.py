@@ -93,7 +93,7 @@ class RandomScene:
         cell: Cell,
         rng: np.random.Generator,
         held_out: bool = False,
-        renderer: RendererName = "auto",
+        renderer: RendererName = "software",
         parameters: RandomSceneParameters = RandomSceneParameters(),
     ) -> None:
         self._client: int = p.connect(p.DIRECT)

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numba
 import numpy as np
@@ -10,7 +11,7 @@ import trimesh
 from numpy.typing import NDArray
 
 from regrasp.interfaces.arrays import FloatArray
-from regrasp.sim.render.visuals import VisualItem
+from regrasp.sim.render.visuals import VisualItem, Visuals
 
 
 @dataclass(frozen=True)
@@ -22,6 +23,37 @@ class MeshParameters:
     thin_radius: float = 0.006  # m; a round shape below this radius ...
     thin_sides: int = 12  # ... has so many sides ...
     round_sides: int = 24  # ... and a thicker one so many
+
+
+@dataclass(frozen=True)
+class SharedMesh:
+    """The mesh of some items.
+
+    Attributes:
+        rows: The items' numbers.
+        corners: Positions (m) and unit normals, each once (n, 6), in the items' visual frame.
+        triangles: Rows of `corners` (m, 3).
+        radius: In m, about the origin of the visual frame.
+    """
+
+    rows: NDArray[np.int64]
+    corners: NDArray[np.float32]
+    triangles: NDArray[np.int32]
+    radius: float
+
+
+def shared_meshes(visuals: Visuals) -> list[SharedMesh]:
+    """The meshes of all items, small ones first."""
+    rows: dict[tuple[Any, ...], list[int]] = {}
+    for row, item in enumerate(visuals.items):
+        rows.setdefault((item.kind, item.size, item.file), []).append(row)
+    return sorted((_shared(visuals, np.array(same)) for same in rows.values()), key=lambda mesh: mesh.radius)
+
+
+def _shared(visuals: Visuals, rows: NDArray[np.int64]) -> SharedMesh:
+    corners, index = np.unique(triangle_corners(visuals.items[rows[0]]), axis=0, return_inverse=True)
+    radius = float(np.linalg.norm(corners[:, :3], axis=1).max())
+    return SharedMesh(rows, corners, index.reshape(-1, 3).astype(np.int32), radius)
 
 
 def triangle_corners(item: VisualItem, parameters: MeshParameters = MeshParameters()) -> NDArray[np.float32]:

@@ -1,4 +1,4 @@
-"""The fast renderer: OpenGL without a window, on a graphics card or with Mesa's software rasteriser."""
+"""The OpenGL renderer, without a window: on a graphics card or with Mesa's software rasteriser."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -11,7 +11,7 @@ from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.frame import Intrinsics
-from regrasp.sim.render.meshes import triangle_corners
+from regrasp.sim.render.meshes import SharedMesh, shared_meshes
 from regrasp.sim.render.picture import BACKGROUND, Z_FAR, Z_NEAR, Image, LightState
 from regrasp.sim.render.shaders import (
     BACKDROP_FRAGMENT,
@@ -21,6 +21,7 @@ from regrasp.sim.render.shaders import (
     SHADOW_VERTEX,
     VERTEX,
 )
+from regrasp.sim.render.shadows import DEFAULT_SHADOWS, ShadowParameters, light_from_world
 from regrasp.sim.render.visuals import Visuals
 
 _ROWS = ("row0", "row1", "row2")
@@ -29,22 +30,13 @@ _INSTANCE = np.dtype([("pose", "f4", (3, 4)), ("color", "f4", 3), ("id", "i4")])
 
 @dataclass(frozen=True)
 class _Group:
-    """Items that share a mesh: their rows, its radius about its origin (m), their records here and on the card."""
+    """Items that share a mesh, and their records here and on the card."""
 
-    rows: NDArray[np.int64]
-    radius: float
+    mesh: SharedMesh
     records: NDArray[np.void]
     buffer: Any
     draw: Any
     cast: Any
-
-
-@dataclass(frozen=True)
-class ShadowParameters:
-    """The shadow map."""
-
-    size: int = 1024  # texels a side; a texel covers about 2 mm of the cell
-    largest_caster: float = 1.0  # m; items of a larger radius, such as the floor, receive shadows but cast none
 
 
 class GlRenderer:
@@ -55,13 +47,11 @@ class GlRenderer:
 
     name = "moderngl"
 
-    def __init__(
-        self, visuals: Visuals, reason: str = "", shadow_parameters: ShadowParameters = ShadowParameters()
-    ) -> None:
+    def __init__(self, visuals: Visuals, shadow_parameters: ShadowParameters = DEFAULT_SHADOWS) -> None:
         self.visuals, self._parameters = visuals, shadow_parameters
         backend: Any = {"backend": "egl"}
         self._gl: Any = moderngl.create_context(standalone=True, require=330, **backend)
-        self.reason = f"{reason}: {self._gl.info['GL_RENDERER']}"
+        self.device = str(self._gl.info["GL_RENDERER"])
         self._gl.enable(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
         self._gl.front_face = "cw"  # image rows run downwards, which mirrors GL's picture
         self._gl.depth_func = "<="
@@ -70,10 +60,8 @@ class GlRenderer:
         behind = self._gl.program(vertex_shader=BACKDROP_VERTEX, fragment_shader=BACKDROP_FRAGMENT)
         _set(behind, color=BACKGROUND)
         self._backdrop = self._gl.vertex_array(behind, [])
-        self._groups = self._make_groups(visuals)
-        self._casters = [group for group in self._groups if group.radius < shadow_parameters.largest_caster]
-        self._caster_rows = np.concatenate([np.zeros(0, int), *(group.rows for group in self._casters)])
-        self._caster_radii = np.repeat([g.radius for g in self._casters], [len(g.rows) for g in self._casters])
+        # small ones first: floor and panels are then not shaded where something hides them
+        self._groups = [self._make_group(mesh) for mesh in shared_meshes(visuals)]
         self._shadows = self._gl.depth_texture((shadow_parameters.size, shadow_parameters.size))
         self._shadows.compare_func = "<="
         self._shadows.repeat_x = self._shadows.repeat_y = False
@@ -113,49 +101,41 @@ class GlRenderer:
         _write(self._draw, "world_to_clip", _clip_from_camera(intrinsics) @ world_from_camera.inv().as_matrix())
         self._shadows.use()
         for group in self._groups:
-            group.draw.render(instances=len(group.rows))
+            group.draw.render(instances=len(group.mesh.rows))
         self._backdrop.render(vertices=3)
 
     def close(self) -> None:
         """Free the GL context."""
         self._gl.release()
 
-    def _make_groups(self, visuals: Visuals) -> list[_Group]:
-        """Groups of items, small ones first: floor and panels are then not shaded where something hides them."""
-        rows: dict[tuple[Any, ...], list[int]] = {}
-        for row, item in enumerate(visuals.items):
-            rows.setdefault((item.kind, item.size, item.file), []).append(row)
-        groups = [self._make_group(visuals, np.array(same)) for same in rows.values()]
-        return sorted(groups, key=lambda group: group.radius)
-
-    def _make_group(self, visuals: Visuals, rows: NDArray[np.int64]) -> _Group:
-        vertices, index = np.unique(triangle_corners(visuals.items[rows[0]]), axis=0, return_inverse=True)
-        records = np.zeros(len(rows), _INSTANCE)
-        records["color"] = [visuals.items[row].color for row in rows]
-        records["id"] = visuals.ids[rows]
-        mesh, order = self._gl.buffer(vertices.tobytes()), self._gl.buffer(index.astype("i4").tobytes())
+    def _make_group(self, mesh: SharedMesh) -> _Group:
+        records = np.zeros(len(mesh.rows), _INSTANCE)
+        records["color"] = [self.visuals.items[row].color for row in mesh.rows]
+        records["id"] = self.visuals.ids[mesh.rows]
+        corners, order = self._gl.buffer(mesh.corners.tobytes()), self._gl.buffer(mesh.triangles.tobytes())
         buffer = self._gl.buffer(records.tobytes())
-        full = [(mesh, "3f 3f", "at", "normal"), (buffer, "4f 4f 4f 3f 1i/i", *_ROWS, "color", "item")]
-        bare = [(mesh, "3f 12x", "at"), (buffer, "4f 4f 4f 16x/i", *_ROWS)]
+        full = [(corners, "3f 3f", "at", "normal"), (buffer, "4f 4f 4f 3f 1i/i", *_ROWS, "color", "item")]
+        bare = [(corners, "3f 12x", "at"), (buffer, "4f 4f 4f 16x/i", *_ROWS)]
         draw = self._gl.vertex_array(self._draw, full, index_buffer=order)
         cast = self._gl.vertex_array(self._cast, bare, index_buffer=order)
-        return _Group(rows, float(np.linalg.norm(vertices[:, :3], axis=1).max()), records, buffer, draw, cast)
+        return _Group(mesh, records, buffer, draw, cast)
 
     def _place(self, poses: NDArray[np.float32], light: LightState) -> None:
         """Send the poses to the card and draw the shadow map."""
         for group in self._groups:
-            group.records["pose"] = poses[group.rows]
+            group.records["pose"] = poses[group.mesh.rows]
             group.buffer.write(group.records.tobytes())
+        casters = [group for group in self._groups if group.mesh.radius < self._parameters.largest_caster]
         to_light = np.asarray(light.direction, float) / np.linalg.norm(light.direction)
-        matrix, radius = _light_from_world(poses[self._caster_rows, :, 3], self._caster_radii, to_light)
+        matrix, radius = light_from_world([group.mesh for group in casters], poses, to_light)
         _write(self._cast, "world_to_light", matrix)
         _write(self._draw, "world_to_light", matrix)
         texel = 2 * radius / self._parameters.size
         _set(self._draw, texel=texel, to_light=tuple(to_light), ambient=light.ambient, diffuse=light.diffuse)
         self._shadow_target.use()
         self._shadow_target.clear()
-        for group in self._casters:
-            group.cast.render(instances=len(group.rows))
+        for group in casters:
+            group.cast.render(instances=len(group.mesh.rows))
 
     def _target(self, width: int, height: int, color_only: bool = False) -> Any:
         """The frame buffer of that size, with planes for colour, depth and ids, or for colour alone."""
@@ -195,27 +175,6 @@ def _clip_from_camera(k: Intrinsics) -> FloatArray:
             [0.0, 0.0, 1.0, 0.0],
         ]
     )
-
-
-def _light_from_world(
-    centres: NDArray[np.float32], radii: FloatArray, to_light: FloatArray
-) -> tuple[FloatArray, float]:
-    """Matrix (4, 4) from the world to the light's view, and the radius (m) of the casters' bounding sphere.
-
-    The casters lie within spheres with `centres` (n, 3) and `radii` (n,) m.
-
-    The light's view maps the sphere to 0..1. Its rows run downwards as the picture's do, so that the same sides of
-    triangles are drawn.
-    """
-    low = (centres - radii[:, None]).min(axis=0) if len(centres) else -np.ones(3)
-    high = (centres + radii[:, None]).max(axis=0) if len(centres) else np.ones(3)
-    centre, radius = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
-    side = np.cross(to_light, [1.0, 0.0, 0.0] if abs(to_light[0]) < 0.9 else [0.0, 1.0, 0.0])
-    side /= np.linalg.norm(side)
-    turn = np.array([side, np.cross(side, to_light), -to_light]) / (2 * radius)
-    matrix = np.eye(4)
-    matrix[:3, :3], matrix[:3, 3] = turn, 0.5 - turn @ centre
-    return matrix, radius
 
 
 def _read(target: Any, k: Intrinsics) -> Image:

@@ -7,22 +7,21 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.frame import Intrinsics
-from regrasp.sim.render.opengl import GlRenderer
 from regrasp.sim.render.picture import Image, LightState
-from regrasp.sim.render.tiny import TinyRenderer
+from regrasp.sim.render.software import SoftwareRenderer
 from regrasp.sim.render.visuals import Visuals
 
 __all__ = ["Image", "LightState", "Renderer", "RendererName", "make_renderer"]
 
-RendererName = Literal["auto", "moderngl", "tiny"]
+RendererName = Literal["software", "moderngl"]
 
 
 class Renderer(Protocol):
-    """Draws the items of `visuals`. `reason` says in words why this renderer was chosen."""
+    """Draws the items of `visuals`. `device` says in words what draws."""
 
     visuals: Visuals
     name: str
-    reason: str
+    device: str
 
     def render(
         self, poses: NDArray[np.float32], world_from_camera: RigidTransform, intrinsics: Intrinsics, light: LightState
@@ -37,20 +36,17 @@ class Renderer(Protocol):
         ...
 
     def close(self) -> None:
-        """Free the renderer's context or client."""
+        """Free the renderer's context."""
         ...
 
 
-def make_renderer(visuals: Visuals, choice: RendererName = "auto") -> Renderer:
-    """The chosen renderer; "auto" takes moderngl where an EGL context can be made, else TinyRenderer.
+def make_renderer(visuals: Visuals, choice: RendererName = "software") -> Renderer:
+    """The chosen renderer. The software one draws the same pictures on every machine, and is faster than Mesa's.
 
-    Raises whatever moderngl raises if it is chosen by name and no context can be made.
+    Raises whatever moderngl raises if it is chosen and no EGL context can be made.
     """
-    if choice == "tiny":
-        return TinyRenderer(visuals, "asked for")
     if choice == "moderngl":
-        return GlRenderer(visuals, "asked for")
-    try:
-        return GlRenderer(visuals, "an EGL context can be made here")
-    except Exception as error:  # moderngl and glcontext raise bare Exception
-        return TinyRenderer(visuals, f"no EGL context can be made here ({error})")
+        from regrasp.sim.render.opengl import GlRenderer  # late: few ask for it, and it takes 30 MB
+
+        return GlRenderer(visuals)
+    return SoftwareRenderer(visuals)

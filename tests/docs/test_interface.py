@@ -105,7 +105,7 @@ def test_a_film_wants_a_folder(resting: regrasp.Scenario) -> None:
         ({"seed": -1}, "seed is -1; expected a whole number from 0"),
         ({"seed": True}, "seed is True; expected a whole number"),
         ({"seed": "x"}, "seed is 'x'; expected a whole number"),
-        ({"renderer": "vulkan"}, "renderer is 'vulkan'; expected auto, moderngl or tiny"),
+        ({"renderer": "vulkan"}, "renderer is 'vulkan'; expected software or moderngl"),
         ({"on_tick": 3}, "on_tick is 3; expected a function"),
         ({"stop": True}, "stop is True; expected a threading.Event"),
     ],

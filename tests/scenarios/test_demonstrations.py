@@ -56,7 +56,7 @@ def check_result(folder: Path, scenario: str, expected: set[str]) -> None:
         assert 0 < slip["released_at"] <= slip["detected_at"] < read["sim_seconds"]
         assert slip["detected_by"] in {"distance", "gap", "place"}
     assert read["real_time_factor"] == pytest.approx(read["sim_seconds"] / read["wall_seconds"])
-    assert read["renderer"] in {"moderngl", "tiny"}
+    assert read["renderer"] in {"moderngl", "software"}
     assert {"python", "numpy", "pybullet", "py_trees", "ompl"} <= set(read["versions"])
 
 
@@ -117,8 +117,8 @@ def test_two_processes_with_one_seed_write_the_same_bytes(tmp_path: Path) -> Non
 
 def test_the_software_renderer_carries_the_run_as_far_as_the_slip(tmp_path: Path) -> None:
     scenario = load_scenario("no_obstacle", ["limits.sim_seconds=11"])
-    result = run_episode(scenario, tmp_path / "run", seed=0, renderer="tiny")
-    assert (result.outcome, result.renderer) == ("time_limit", "tiny")
+    result = run_episode(scenario, tmp_path / "run", seed=0, renderer="software")
+    assert (result.outcome, result.renderer) == ("time_limit", "software")
     [slip] = result.slips
     assert slip.detected_at is not None
     assert slip.detected_at - slip.released_at < 1.0

@@ -12,7 +12,7 @@ from regrasp.sim.world import World
 
 @pytest.fixture(scope="module")
 def world(cell: Cell) -> Iterator[World]:
-    world = World(cell, "zero", seed=1, renderer="tiny")
+    world = World(cell, "zero", seed=1, renderer="software")
     world.advance(0.2)
     yield world
     world.close()
@@ -38,7 +38,7 @@ def test_the_rear_camera_sees_the_red(world: World) -> None:
 
 
 def test_before_the_first_frame_no_pixels(cell: Cell) -> None:
-    world = World(cell, "zero", seed=1, renderer="tiny")
+    world = World(cell, "zero", seed=1, renderer="software")
     assert world.cameras["rear"].latest() is None
     assert GroundTruth(world).connector_pixels("rear") == 0
     world.close()
@@ -49,7 +49,7 @@ def test_behind_an_obstacle_no_pixels(cell: Cell, world: World) -> None:
     assert isinstance(camera, FixedMount)
     middle = connector + 0.3 * (np.asarray(camera.position) - connector)
     box = Box(name="wall", center=(middle[0], middle[1], middle[2]), size=(0.01, 0.2, 0.2))
-    hidden = World(cell, "zero", seed=1, setup=SceneSetup((Obstacle(box, 0.0, None),)), renderer="tiny")
+    hidden = World(cell, "zero", seed=1, setup=SceneSetup((Obstacle(box, 0.0, None),)), renderer="software")
     hidden.advance(0.2)
     assert GroundTruth(hidden).connector_pixels("rear") == 0
     assert GroundTruth(hidden).occluded_share("rear") == 1.0
@@ -79,7 +79,7 @@ def test_contact_peaks_are_a_copy(world: World) -> None:
 
 def test_a_cell_needs_neither_floor_nor_panels(cell: Cell) -> None:
     bare = cell.model_copy(update={"known": cell.known.model_copy(update={"boxes": ()})})
-    world = World(bare, "zero", seed=1, renderer="tiny")
+    world = World(bare, "zero", seed=1, renderer="software")
     world.advance(0.1)
     socket = next(s for s in bare.known.sockets if s.name == bare.known.plugged_into)
     place = socket.world_from_plug(bare.known.connector.length).translation

@@ -28,7 +28,7 @@ CREEP = 1e-3  # m in 2 s
 @pytest.fixture(scope="module")
 def plugged(cell: Cell) -> Iterator[World]:
     """A world in which nothing has moved; tests leave the connector plugged."""
-    world = World(cell, "zero", seed=1, renderer="tiny")
+    world = World(cell, "zero", seed=1, renderer="software")
     yield world
     world.close()
 
@@ -54,7 +54,7 @@ def joined(world: World) -> list[tuple[int, int]]:
 
 @pytest.fixture(scope="module")
 def drawn(cell: Cell) -> Iterator[Pull]:
-    world = World(cell, "zero", seed=3, renderer="tiny")
+    world = World(cell, "zero", seed=3, renderer="software")
     take_hold(world)
     held, joined_when_held = world.socket.holds, joined(world)
     axis = world.connector_pose().rotation.apply([1.0, 0.0, 0.0])
@@ -112,7 +112,7 @@ def test_it_starts_with_its_arms_at_rest_and_touching_nothing(cell: Cell, plugge
 
 
 def test_the_socket_lets_go_above_its_force_only(cell: Cell) -> None:
-    world = World(cell, "zero", seed=2, renderer="tiny")
+    world = World(cell, "zero", seed=2, renderer="software")
     truth = GroundTruth(world)
     axis = world.connector_pose().rotation.apply([1.0, 0.0, 0.0])
     start = world.connector_pose().translation
@@ -156,7 +156,7 @@ def test_an_opened_hand_loses_the_connector(drawn: Pull) -> None:
 
 
 def test_an_arm_against_the_panel_is_counted_with_its_force(cell: Cell) -> None:
-    world = World(cell, "zero", seed=1, renderer="tiny")
+    world = World(cell, "zero", seed=1, renderer="software")
     robot, q = kinematics(world, "right"), np.zeros(6)
     ahead = RigidTransform.from_translation([0.44, -0.15, 0.30])
     before = nearest(robot.ik(ahead), q)
@@ -171,7 +171,7 @@ def test_an_arm_against_the_panel_is_counted_with_its_force(cell: Cell) -> None:
 def test_obstacles_stand_where_they_were_put(cell: Cell) -> None:
     box = Box(name="tall", center=(0.3, 0.2, 0.18), size=(0.12, 0.08, 0.36))
     stand = Box(name="leg", center=(0.3, 0.2, 0.05), size=(0.02, 0.02, 0.1))
-    world = World(cell, "zero", seed=1, setup=SceneSetup((Obstacle(box, np.pi / 2, stand),)), renderer="tiny")
+    world = World(cell, "zero", seed=1, setup=SceneSetup((Obstacle(box, np.pi / 2, stand),)), renderer="software")
     lower, upper = p.getAABB(world.boxes["obstacle tall"], physicsClientId=world.client)
     np.testing.assert_allclose(np.subtract(upper, lower), [0.08, 0.12, 0.36], atol=5e-3)
     np.testing.assert_allclose(np.add(upper, lower) / 2, box.center, atol=1e-6)
@@ -181,7 +181,7 @@ def test_obstacles_stand_where_they_were_put(cell: Cell) -> None:
 
 def test_a_connector_may_start_on_a_stand(cell: Cell) -> None:
     asked = RigidTransform.from_components([0.38, 0.06, 0.29], Rotation.from_euler("zy", [100.0, -20.0], degrees=True))
-    world = World(cell, "zero", seed=1, setup=SceneSetup(connector_at=asked), renderer="tiny")
+    world = World(cell, "zero", seed=1, setup=SceneSetup(connector_at=asked), renderer="software")
     off = asked.inv() * world.connector_pose()
     assert world.socket.holds
     assert float(np.linalg.norm(off.translation)) < 1e-3
@@ -193,7 +193,7 @@ def test_a_connector_may_start_on_a_stand(cell: Cell) -> None:
 
 def test_props_are_seen_where_they_are_placed_and_stop_nothing(cell: Cell) -> None:
     props = (Prop("ball", (0.03,), (0.0, 1.0, 0.0)), Prop("rod", (0.2, 0.02), (0.0, 1.0, 0.0)))
-    world = World(cell, "zero", seed=1, setup=SceneSetup(props=props), renderer="tiny")
+    world = World(cell, "zero", seed=1, setup=SceneSetup(props=props), renderer="software")
     rear = world.cameras["rear"]
 
     def green() -> NDArray[np.intp]:
@@ -215,7 +215,7 @@ def test_props_are_seen_where_they_are_placed_and_stop_nothing(cell: Cell) -> No
 
 
 def test_under_gravity_a_loose_end_hangs(cell: Cell) -> None:
-    world = World(cell, "earth", seed=1, renderer="tiny")
+    world = World(cell, "earth", seed=1, renderer="software")
     push(world, -15.0 * world.connector_pose().rotation.apply([1.0, 0.0, 0.0]), 0.05)
     world.advance(4.0)
     droop = cell.hidden.cable.anchor[2] - world.connector_pose().translation[2]

@@ -28,7 +28,7 @@ WALL = 1.1  # m before the camera
 class TagScene:
     """A client with the wall and tagged connectors, one for each of `tags`."""
 
-    def __init__(self, renderer: RendererName = "auto", tags: Sequence[Tag] = (TAG,)) -> None:
+    def __init__(self, renderer: RendererName = "software", tags: Sequence[Tag] = (TAG,)) -> None:
         self._client = p.connect(p.DIRECT)
         wall = p.createVisualShape(
             p.GEOM_BOX, halfExtents=[3, 3, 0.01], rgbaColor=[0.8, 0.66, 0.45, 1], physicsClientId=self._client

@@ -22,7 +22,7 @@ def small_cell() -> Cell:
 
 
 def main(second_reader: bool) -> None:
-    world = World(small_cell(), "earth", seed=11, renderer="tiny")
+    world = World(small_cell(), "earth", seed=11, renderer="software")
     for name, arm in world.arms.items():
         start = arm.reading().positions
         goal = start + np.array([0.3, 0.4, -0.3, 0.5, 0.2, 0.6])

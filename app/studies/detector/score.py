@@ -1,6 +1,6 @@
 """How well a detector finds the connector in pictures that it was not trained on: `regrasp evaluate-detector`.
 
-The pictures differ from those of the training in the cell's layout, light, objects and renderer. Up to 70 % of the
+The pictures differ from those of the training in the cell's layout, light and objects. Up to 70 % of the
 connector is hidden, measured in its true mask.
 """
 
@@ -120,7 +120,7 @@ def held_out_shots(
     cell: Cell,
     seed: int,
     count: int,
-    renderer: RendererName = "tiny",
+    renderer: RendererName = "software",
     report_progress: Callable[[int], None] = lambda _done: None,
     parameters: ScoreParameters = _DEFAULTS,
 ) -> list[Shot]:

@@ -59,7 +59,7 @@ def run_negatives(setup: Setup, seed: int, parameters: NegativeParameters = _DEF
 
 
 def negative_frames(
-    cell: Cell, seed: int, renderer: RendererName = "auto", parameters: NegativeParameters = _DEFAULTS
+    cell: Cell, seed: int, renderer: RendererName = "software", parameters: NegativeParameters = _DEFAULTS
 ) -> Iterator[RgbdFrame]:
     """The rear camera's pictures of one seed."""
     rng = np.random.default_rng([seed, 6])

@@ -110,7 +110,7 @@ class StudyScene:
         cell: Cell,
         configuration: str,
         seed: int,
-        renderer: RendererName = "auto",
+        renderer: RendererName = "software",
         parameters: SceneParameters = _DEFAULTS,
     ) -> None:
         self.configuration, self.seed, self._parameters = CONFIGURATIONS[configuration], seed, parameters

@@ -77,7 +77,7 @@ class Setup:
     cell: Cell
     techniques: Sequence[str]
     grasps: bool = True
-    renderer: RendererName = "auto"
+    renderer: RendererName = "software"
     maker: Maker = technique_named
     parameters: TrialParameters = TrialParameters()
 
@@ -91,7 +91,7 @@ class Setup:
 
 
 def setups_of(
-    techniques: Sequence[str], cell: str | None = None, *, grasps: bool = True, renderer: RendererName = "auto"
+    techniques: Sequence[str], cell: str | None = None, *, grasps: bool = True, renderer: RendererName = "software"
 ) -> list[Setup]:
     """The techniques grouped by the cells that they need, or all in the `cell` of that name.
 

@@ -83,7 +83,7 @@ def test_run_ends_with_a_summary_on_stdout_and_progress_on_stderr(calls: list[Si
     assert ran.stderr.splitlines() == ["    0.0 s  carry", "    3.0 s  look"]
     (call,) = calls
     assert (call.out, call.seed, call.video, call.gui) == (Path("runs/mine-7-1"), 7, True, False)
-    assert (call.renderer, Path("runs").exists()) == ("auto", False)  # nothing was written: the folder is gone
+    assert (call.renderer, Path("runs").exists()) == ("software", False)  # nothing was written: the folder is gone
     assert call.scenario.file.inputs == {"tries": 2}
 
 

@@ -97,7 +97,7 @@ def test_a_position_may_be_one_vector_or_one_for_each_gravity() -> None:
 @pytest.mark.parametrize("gravity", GRAVITIES)
 def test_the_cable_hangs_at_the_start_as_the_world_lays_it(cell: Cell, gravity: Gravity) -> None:
     points = cable_at_start(cell, gravity)
-    world = World(cell, gravity, seed=0, renderer="tiny")
+    world = World(cell, gravity, seed=0, renderer="software")
     states = p.getLinkStates(world.cable.body, range(cell.hidden.cable.links), 1, 1, physicsClientId=world.client)
     np.testing.assert_allclose(points[:-1], [state[4] for state in states], atol=0.003)
     world.close()

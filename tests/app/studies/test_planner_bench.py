@@ -20,7 +20,7 @@ SCENARIO = load_scenario("tall_obstacle")
 
 @pytest.fixture(scope="module")
 def world() -> Iterator[World]:
-    made = build_world(SCENARIO, 0, "tiny")
+    made = build_world(SCENARIO, 0, "software")
     yield made
     made.close()
 

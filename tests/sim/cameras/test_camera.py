@@ -181,8 +181,7 @@ def test_depth_is_measured_and_truth_is_exact(rig: Rig) -> None:
     assert np.median(frame.depth[on_ball]) == pytest.approx(0.56, abs=0.03)
     assert (frame.depth[ids == -1] == 0).all()
     radius = 0.05 / np.sqrt(0.6**2 - 0.05**2) * SPEC.intrinsics.fx
-    # TinyRenderer leaves out the outermost third of a pixel.
-    assert (ids == rig.ball).sum() == pytest.approx(np.pi * radius**2, rel=0.08)
+    assert (ids == rig.ball).sum() == pytest.approx(np.pi * radius**2, rel=0.06)
 
 
 def test_true_ids_before_the_first_frame(rig: Rig) -> None:

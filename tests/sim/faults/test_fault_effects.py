@@ -31,7 +31,7 @@ def make(cell: Cell) -> Iterator[Make]:
             values["seconds"] = seconds
         data = {"type": kind, "when": {"at": (on, on)}, **values}
         fault = FAULT_TYPES[kind].model_validate(data)  # type: ignore[attr-defined]
-        made.append(World(cell, "zero", seed, SceneSetup((BLOCK,), (fault,)), renderer="tiny"))
+        made.append(World(cell, "zero", seed, SceneSetup((BLOCK,), (fault,)), renderer="software"))
         return made[-1]
 
     yield world

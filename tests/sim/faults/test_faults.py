@@ -68,7 +68,7 @@ def test_phases_begin_faults_and_the_connector_is_really_lost(cell: Cell) -> Non
         for phase in ("unplugged", "carried", "lost", "settled")
     ]
     faults: tuple[AnyFault, ...] = (opens(carried=(0.5, 0.5)), *noted)
-    world = World(cell, "zero", seed=3, setup=SceneSetup(faults=faults), renderer="tiny")
+    world = World(cell, "zero", seed=3, setup=SceneSetup(faults=faults), renderer="software")
     hand, start = world.arms["right"], world.connector_pose().translation
     way = cell.known.clip.world_from_seat.translation - start
     take_hold(world)
@@ -100,7 +100,7 @@ def test_phases_begin_faults_and_the_connector_is_really_lost(cell: Cell) -> Non
 
 def test_a_node_begins_a_fault_when_the_world_is_told_of_it(cell: Cell) -> None:
     world = World(
-        cell, "zero", seed=3, setup=SceneSetup(faults=(opens(node="grip", after=(0.1, 0.1)),)), renderer="tiny"
+        cell, "zero", seed=3, setup=SceneSetup(faults=(opens(node="grip", after=(0.1, 0.1)),)), renderer="software"
     )
     world.advance(0.5)
     world.note_entered("root/work/grip")

@@ -6,10 +6,10 @@ from regrasp.sim.random_scenes.clutter import rearranged
 from regrasp.sim.random_scenes.scene import RandomScene, Shot
 from regrasp.sim.render.renderer import RendererName
 
-RENDERERS: tuple[RendererName, ...] = ("moderngl", "tiny")
+RENDERERS: tuple[RendererName, ...] = ("moderngl", "software")
 
 
-def shots(cell: Cell, seed: int, count: int, held_out: bool = False, renderer: RendererName = "auto") -> list[Shot]:
+def shots(cell: Cell, seed: int, count: int, held_out: bool = False, renderer: RendererName = "software") -> list[Shot]:
     try:
         scene = RandomScene(cell, np.random.default_rng(seed), held_out, renderer)
     except Exception as error:
@@ -52,7 +52,7 @@ def test_the_mask_lies_in_the_outline_and_is_empty_without_a_connector(cell: Cel
 
 
 def test_a_piece_of_foam_hides_parts_of_all_sizes(cell: Cell) -> None:
-    hidden = [s.occlusion for seed in range(4) for s in shots(cell, seed, 15, renderer="tiny") if s.mask.any()]
+    hidden = [s.occlusion for seed in range(4) for s in shots(cell, seed, 15, renderer="software") if s.mask.any()]
     counts, _ = np.histogram(hidden, [-1, 0.1, 0.3, 0.5, 0.7, 1.0])
     assert (counts > 0).all()
 

@@ -12,17 +12,15 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from regrasp.interfaces.cell import OPTICAL
 from regrasp.interfaces.frame import Intrinsics
 from regrasp.sim.render.meshes import triangle_corners
-from regrasp.sim.render.opengl import GlRenderer
 from regrasp.sim.render.renderer import Image, LightState, Renderer, make_renderer
-from regrasp.sim.render.tiny import TinyRenderer
+from regrasp.sim.render.software import SoftwareRenderer
 from regrasp.sim.render.visuals import Visuals
 from regrasp.sim.robot.model import robot_urdf
 
 K = Intrinsics.from_fov(424, 240, np.deg2rad(65.0))
 LIGHT = LightState((-0.5, 0.3, 1.0), 0.45, 0.55)
 FLOOR_COLOR = (0.5, 0.6, 0.7)
-DEPTH_ERROR = {"moderngl": 1e-4, "tiny": 1e-3}  # metres
-SHADE = {"moderngl": 0.55, "tiny": 0.95}  # ambient light alone gives 0.49; TinyRenderer's shadows are faint
+NAMES = pytest.mark.parametrize("name", ["moderngl", "software"])
 
 
 def looking(position: tuple[float, float, float], yaw_deg: float, pitch_down_deg: float) -> RigidTransform:
@@ -68,8 +66,8 @@ def scene(client: int, tmp_path: Path) -> Visuals:
 
 
 def renderer_of(visuals: Visuals, name: str) -> Renderer:
-    if name == "tiny":
-        return make_renderer(visuals, "tiny")
+    if name == "software":
+        return make_renderer(visuals, "software")
     try:
         return make_renderer(visuals, "moderngl")
     except Exception as error:
@@ -89,17 +87,17 @@ def project(camera: RigidTransform, points: NDArray[np.float64]) -> NDArray[np.f
     return np.column_stack([K.fx * q[:, 0] / q[:, 2] + K.cx, K.fy * q[:, 1] / q[:, 2] + K.cy])
 
 
-@pytest.mark.parametrize("name", ["moderngl", "tiny"])
+@NAMES
 def test_depth_of_the_floor_is_exact_and_nothing_is_behind_it(scene: Visuals, name: str) -> None:
     image = renderer_of(scene, name).render(scene.snapshot(), CAMERA, K, LIGHT)
     floor = image.ids == 0
     assert floor.mean() > 0.3
-    assert np.abs(image.depth - plane_depth(CAMERA))[floor].max() < DEPTH_ERROR[name]
+    assert np.abs(image.depth - plane_depth(CAMERA))[floor].max() < 1e-4
     assert (image.ids == -1).any()
     assert np.array_equal(image.ids == -1, image.depth == 0)
 
 
-@pytest.mark.parametrize("name", ["moderngl", "tiny"])
+@NAMES
 def test_corners_of_boxes_lie_where_the_intrinsics_put_them(client: int, name: str) -> None:
     half = np.array([0.05, 0.08, 0.03])
     add(client, p.GEOM_BOX, (0, 0, 0), (1, 1, 1), halfExtents=half.tolist())
@@ -130,27 +128,23 @@ def _hull_centroid(points: NDArray[np.float64]) -> NDArray[np.float64]:
     return centroid
 
 
-@pytest.mark.parametrize("name", ["moderngl", "tiny"])
+@NAMES
 def test_colours_alone_are_those_of_the_picture(scene: Visuals, name: str) -> None:
     renderer, view = renderer_of(scene, name), (scene.snapshot(), CAMERA, K, LIGHT)
     assert np.array_equal(renderer.render_color(*view), renderer.render(*view).rgb)
 
 
 def test_both_renderers_see_the_same(scene: Visuals) -> None:
-    fast, slow = renderer_of(scene, "moderngl"), renderer_of(scene, "tiny")
-    a, b = (r.render(scene.snapshot(), CAMERA, K, LIGHT) for r in (fast, slow))
-    assert set(np.unique(a.ids)) == set(np.unique(b.ids))
+    a, b = (renderer_of(scene, name).render(scene.snapshot(), CAMERA, K, LIGHT) for name in ("moderngl", "software"))
     assert (a.ids == b.ids).mean() > 0.999
     both = (a.ids == b.ids) & (a.ids >= 0)
-    assert np.quantile(np.abs(a.depth - b.depth)[both], 0.999) < 0.001
-    for thing in np.unique(a.ids[a.ids > 0]):  # no outline is wider in one of them: what measures it would be refused
-        assert abs((b.ids == thing).sum() / (a.ids == thing).sum() - 1.0) < 0.01
-    # the light falls from the same side: the same faces are bright
-    boxes = both & (a.ids == 1)
-    assert np.corrcoef(a.rgb[boxes][:, 0], b.rgb[boxes][:, 0])[0, 1] > 0.8
+    assert np.quantile(np.abs(a.depth - b.depth)[both], 0.999) < 1e-4
+    off = np.abs(a.rgb.astype(int) - b.rgb).max(axis=2)
+    assert (off <= 2).mean() > 0.999
+    assert (off[(a.ids == -1) & (b.ids == -1)] == 0).all()
 
 
-@pytest.mark.parametrize("name", ["moderngl", "tiny"])
+@NAMES
 def test_a_box_throws_its_shadow_away_from_the_light(client: int, name: str) -> None:
     add_floor(client)
     shape = p.createVisualShape(p.GEOM_BOX, halfExtents=[0.1, 0.1, 0.02], physicsClientId=client)
@@ -159,7 +153,7 @@ def test_a_box_throws_its_shadow_away_from_the_light(client: int, name: str) -> 
     image = renderer_of(visuals, name).render(visuals.snapshot(), CAMERA, K, LIGHT)
     under = np.array([0.15, -0.09, 0.0])  # 0.3 up along the light's direction lies the box's centre
     shaded, lit = _brightness(image, under), _brightness(image, under + np.array([0.0, 0.35, 0.0]))
-    assert shaded < SHADE[name] * lit
+    assert shaded < 0.55 * lit  # ambient light alone gives 0.49
 
 
 def _brightness(image: Image, point: NDArray[np.float64]) -> float:
@@ -168,22 +162,24 @@ def _brightness(image: Image, point: NDArray[np.float64]) -> float:
     return float(image.rgb[v - 3 : v + 4, u - 3 : u + 4].mean())
 
 
-def test_lit_floor_has_lamberts_brightness_and_no_stripes(client: int) -> None:
+@NAMES
+def test_lit_floor_has_lamberts_brightness_and_no_stripes(client: int, name: str) -> None:
     add_floor(client)
     add(client, p.GEOM_BOX, (0.3, 0.3, 0.2), (1, 1, 1), halfExtents=[0.05, 0.1, 0.08])
     visuals = Visuals(client)
-    image = renderer_of(visuals, "moderngl").render(visuals.snapshot(), CAMERA, K, LIGHT)
+    image = renderer_of(visuals, name).render(visuals.snapshot(), CAMERA, K, LIGHT)
     facing = 1.0 / np.linalg.norm(np.asarray(LIGHT.direction))
     expected = 255 * np.array(FLOOR_COLOR) * (LIGHT.ambient + LIGHT.diffuse * facing)
     lit = (image.ids == 0) & (np.arange(K.width) > K.width / 2)  # the right half is clear of the shadow
     assert np.abs(image.rgb[lit] / expected - 1.0).max() < 0.05
 
 
-def test_a_ball_and_a_cable_are_as_wide_as_they_should_be(client: int) -> None:
+@NAMES
+def test_a_ball_and_a_cable_are_as_wide_as_they_should_be(client: int, name: str) -> None:
     add(client, p.GEOM_SPHERE, (0, 0, 0), (1, 1, 1), radius=0.05)
     add(client, p.GEOM_CAPSULE, (0, 0, 0), (1, 1, 1), radius=0.0035, length=0.03)
     visuals = Visuals(client)
-    renderer = renderer_of(visuals, "moderngl")
+    renderer = renderer_of(visuals, name)
     k = Intrinsics.from_fov(848, 480, np.deg2rad(20.0))
     poses = np.tile(np.eye(4)[:3], (2, 1, 1)).astype(np.float32)
     poses[:, :, 3] = [[-0.06, 0.0, 0.6], [0.05, 0.0, 0.6]]
@@ -205,18 +201,19 @@ def test_every_mesh_is_turned_outwards(scene: Visuals) -> None:
         assert np.allclose(np.linalg.norm(normal, axis=2), 1.0, atol=1e-4)
 
 
-def test_what_was_drawn_before_does_not_show(scene: Visuals) -> None:
-    """Poses, light and camera of earlier pictures are kept on the card: none may leak into a later one."""
+@NAMES
+def test_what_was_drawn_before_does_not_show(scene: Visuals, name: str) -> None:
+    """Poses, light and camera of earlier pictures are kept: none may leak into a later one."""
     poses = scene.snapshot()
     moved = poses.copy()
     moved[:, 0, 3] += 0.1
     other = LightState((1.0, 0.0, 1.0), 0.3, 0.5)
     views = [(poses, CAMERA, LIGHT), (poses, looking((-0.5, 0.2, 0.3), -10.0, 10.0), LIGHT), (moved, CAMERA, LIGHT)]
     views += [(poses, CAMERA, other), (poses, CAMERA, LIGHT)]
-    renderer = renderer_of(scene, "moderngl")
+    renderer = renderer_of(scene, name)
     for at, camera, light in views:
         again = renderer.render(at, camera, K, light)
-        fresh = renderer_of(scene, "moderngl").render(at, camera, K, light)
+        fresh = renderer_of(scene, name).render(at, camera, K, light)
         assert np.array_equal(again.rgb, fresh.rgb)
         assert np.array_equal(again.depth, fresh.depth)
         assert np.array_equal(again.ids, fresh.ids)
@@ -224,21 +221,11 @@ def test_what_was_drawn_before_does_not_show(scene: Visuals) -> None:
     assert np.array_equal(renderer.render(moved, CAMERA, K, LIGHT).ids[:100], again.ids[:100])
 
 
-def test_without_egl_the_tiny_renderer_is_taken_and_says_so(scene: Visuals, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_egl_opengl_is_refused_and_the_default_draws(scene: Visuals, monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(**_: object) -> None:
         raise Exception("cannot open libEGL")
 
     monkeypatch.setattr(moderngl, "create_context", refuse)
-    chosen = make_renderer(scene)
-    assert isinstance(chosen, TinyRenderer)
-    assert "cannot open libEGL" in chosen.reason
-    chosen.close()
+    assert isinstance(make_renderer(scene), SoftwareRenderer)
     with pytest.raises(Exception, match="libEGL"):
         make_renderer(scene, "moderngl")
-
-
-def test_auto_takes_opengl_where_it_works_and_names_the_device(scene: Visuals) -> None:
-    renderer_of(scene, "moderngl")
-    chosen = make_renderer(scene)
-    assert isinstance(chosen, GlRenderer)
-    assert "EGL" in chosen.reason

@@ -9,9 +9,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from regrasp.interfaces.frame import Intrinsics
-from regrasp.sim.render import tiny
 from regrasp.sim.render.picture import Z_FAR, Z_NEAR, LightState
-from regrasp.sim.render.tiny import TinyRenderer
+from regrasp.sim.render.software import SoftwareRenderer
 from regrasp.sim.render.visuals import Visuals
 
 OFFSET_URDF = """<robot name="offset">
@@ -48,14 +47,14 @@ def test_offset_inertial_frames_look_as_bullet_itself_draws_them(client: int, tm
     _, _, _, buffer, seen = p.getCameraImage(
         k.width,
         k.height,
-        tiny._view(camera),
-        tiny._projection(k),
+        _view(camera),
+        _projection(k),
         renderer=p.ER_TINY_RENDERER,
         flags=p.ER_SEGMENTATION_MASK_OBJECT_AND_LINKINDEX,
         physicsClientId=client,
     )
     truth = Z_FAR * Z_NEAR / (Z_FAR - (Z_FAR - Z_NEAR) * np.asarray(buffer, float).reshape(k.height, k.width))
-    mine = TinyRenderer(visuals).render(visuals.snapshot(), camera, k, LightState((0, 0, 1), 0.5, 0.5))
+    mine = SoftwareRenderer(visuals).render(visuals.snapshot(), camera, k, LightState((0, 0, 1), 0.5, 0.5))
     ids = np.asarray(seen).reshape(k.height, k.width)
     assert set(np.unique(ids)) == {-1, body, body + (1 << 24)}
     assert (mine.ids == ids).mean() > 0.999
@@ -63,6 +62,19 @@ def test_offset_inertial_frames_look_as_bullet_itself_draws_them(client: int, tm
     off = np.abs(mine.depth - truth)
     assert off[both & (ids == body)].max() < 1e-3  # the box
     assert np.median(off[both & (ids != body)]) < 1e-3  # Bullet's own round things have other facets
+
+
+def _view(world_from_camera: RigidTransform) -> list[float]:
+    """OpenGL's view matrix (y up, z backwards), column by column."""
+    flip = np.diag([1.0, -1.0, -1.0, 1.0])
+    return list((flip @ world_from_camera.inv().as_matrix()).T.ravel())
+
+
+def _projection(k: Intrinsics) -> list[float]:
+    """OpenGL's projection matrix, column by column; Bullet samples a pixel at its lower left corner."""
+    third = (1 - 2 * k.cx / k.width, 2 * (k.cy + 1) / k.height - 1, -(Z_FAR + Z_NEAR) / (Z_FAR - Z_NEAR), -1.0)
+    fourth = (0.0, 0.0, -2 * Z_FAR * Z_NEAR / (Z_FAR - Z_NEAR), 0.0)
+    return [2 * k.fx / k.width, 0.0, 0.0, 0.0, 0.0, 2 * k.fy / k.height, 0.0, 0.0, *third, *fourth]
 
 
 @given(st.lists(st.floats(-1, 1), min_size=6, max_size=6), st.lists(st.floats(-1, 1), min_size=6, max_size=6))

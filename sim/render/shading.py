@@ -1,0 +1,262 @@
+"""Compiled shading: the colour of each pixel, from the triangle that it sees and the inverse of its depth.
+
+The formula is that of the OpenGL renderer's shaders.
+"""
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+_ROUND = np.float32(12582912.0)  # 1.5 * 2**23: a float32 that is added to it and taken away again is whole
+_SINE = tuple(np.float32(c) for c in (0.9999966, -0.1666483, 0.0083063, -0.0001836))  # odd powers, -pi/2 to pi/2
+_HALF, _ONE, _ZERO = np.float32(0.5), np.float32(1.0), np.float32(0.0)
+_PI, _PER_PI = np.float32(np.pi), np.float32(1.0 / np.pi)
+
+
+@numba.njit(cache=True, error_model="numpy", fastmath={"contract"})
+def sine(x: np.float32) -> np.float32:
+    """The sine to 1e-4 for |x| < 1000, by a polynomial of its angle to the next multiple of pi."""
+    half_turns = (x * _PER_PI + _ROUND) - _ROUND
+    odd = half_turns - np.float32(2.0) * ((half_turns * _HALF + _ROUND) - _ROUND)  # -1, 0 or 1
+    r = x - half_turns * _PI
+    s = r * r
+    y = r * (_SINE[0] + s * (_SINE[1] + s * (_SINE[2] + s * _SINE[3])))
+    return y * (_ONE - np.float32(2.0) * odd * odd)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def write_normals(
+    corners: NDArray[np.float64],
+    triangles: NDArray[np.int32],
+    normals: NDArray[np.float32],
+    seen: NDArray[np.int32],
+    ready: NDArray[np.bool_],
+    planes: NDArray[np.float32],
+) -> None:
+    """Write the `planes` (9) of each triangle that is in `seen`: (u, v, 1) times them is normal over depth."""
+    ready[:] = False
+    height, width = seen.shape
+    for v in range(height):
+        last = -1
+        for u in range(width):
+            t = seen[v, u]
+            if t != last:
+                last = t
+                if t >= 0 and not ready[t]:
+                    ready[t] = True
+                    _write_normal(corners, triangles[t], normals, planes[t])
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _write_normal(
+    corners: NDArray[np.float64], triangle: NDArray[np.int32], normals: NDArray[np.float32], out: NDArray[np.float32]
+) -> None:
+    p, q, r = corners[triangle[0]], corners[triangle[1]], corners[triangle[2]]
+    volume = (
+        p[0] * (q[1] * r[2] - q[2] * r[1]) + p[1] * (q[2] * r[0] - q[0] * r[2]) + p[2] * (q[0] * r[1] - q[1] * r[0])
+    )
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        a = (q[j] * r[k] - q[k] * r[j]) / volume
+        b = (r[j] * p[k] - r[k] * p[j]) / volume
+        c = (p[j] * q[k] - p[k] * q[j]) / volume
+        for axis in range(3):
+            out[3 * axis + i] = (
+                a * normals[triangle[0], axis] + b * normals[triangle[1], axis] + c * normals[triangle[2], axis]
+            )
+
+
+@numba.njit(cache=True, error_model="numpy", fastmath={"contract"})
+def shade(
+    inverse: NDArray[np.float32],
+    seen: NDArray[np.int32],
+    planes: NDArray[np.float32],
+    item_of: NDArray[np.int32],
+    colors: NDArray[np.float32],
+    world_rays: NDArray[np.float32],
+    light_rays: NDArray[np.float32],
+    shadows: NDArray[np.float32],
+    strengths: tuple[np.float32, np.float32, np.float32],
+    background: NDArray[np.uint8],
+    rgb: NDArray[np.uint8],
+) -> None:
+    """Write the colours (H, W, 3) of a picture with `inverse` depth (H, W), whose pixels see triangles or -1.
+
+    A pixel's ray runs to rays @ (u, v, 1) at depth 1 from rays[:, 3]: in the world, and in the light's texels and
+    nearness. `colors` are of items, 0 to 255; `strengths` are of ambient and diffuse light, and the offset along the
+    normal, per texel.
+    """
+    height, width = seen.shape
+    grain, facing = np.empty(width, np.float32), np.empty(width, np.float32)
+    x, y, z = np.empty(width, np.float32), np.empty(width, np.float32), np.empty(width, np.float32)
+    depth = np.empty(width, np.float32)
+    for v in range(height):
+        _invert(inverse[v], depth)
+        _grain(depth, world_rays, v, grain)
+        _follow(depth, light_rays, v, x, y, z)
+        _face(seen[v], planes, depth, v, strengths[2], strengths[2] / np.float32(len(shadows)), facing, x, y, z)
+        _light(x, y, z, shadows, facing, grain, strengths)
+        _paint(seen[v], item_of, colors, grain, background, rgb[v])
+
+
+@numba.njit(cache=True, error_model="numpy", fastmath={"contract"})
+def _invert(inverse: NDArray[np.float32], depth: NDArray[np.float32]) -> None:
+    for u in range(len(depth)):
+        depth[u] = _ONE / inverse[u]
+
+
+@numba.njit(cache=True, error_model="numpy", fastmath={"contract"})
+def _grain(depth: NDArray[np.float32], rays: NDArray[np.float32], v: int, grain: NDArray[np.float32]) -> None:
+    """Faint grain, fixed in the world, so that surfaces are not of one colour."""
+    row = np.float32(v)
+    ax, ay, az = rays[0, 0], rays[1, 0], rays[2, 0]
+    bx, by, bz = (rays[0, 1] * row + rays[0, 2], rays[1, 1] * row + rays[1, 2], rays[2, 1] * row + rays[2, 2])
+    ox, oy, oz = rays[0, 3], rays[1, 3], rays[2, 3]
+    for u in range(len(depth)):
+        column, far = np.float32(u), depth[u]
+        px, py, pz = ox + far * (ax * column + bx), oy + far * (ay * column + by), oz + far * (az * column + bz)
+        warp = np.float32(4.0) * sine(np.float32(11.0) * pz + np.float32(7.0) * py)
+        waves = sine(np.float32(90.0) * px + warp) * sine(np.float32(37.0) * (py + pz) + warp)
+        grain[u] = _ONE + np.float32(0.03) * waves
+
+
+@numba.njit(cache=True, error_model="numpy", fastmath={"contract"})
+def _follow(
+    depth: NDArray[np.float32],
+    rays: NDArray[np.float32],
+    v: int,
+    x: NDArray[np.float32],
+    y: NDArray[np.float32],
+    z: NDArray[np.float32],
+) -> None:
+    """The places that the row's pixels see, in the light's view."""
+    row = np.float32(v)
+    ax, ay, az = rays[0, 0], rays[1, 0], rays[2, 0]
+    bx, by, bz = (rays[0, 1] * row + rays[0, 2], rays[1, 1] * row + rays[1, 2], rays[2, 1] * row + rays[2, 2])
+    ox, oy, oz = rays[0, 3], rays[1, 3], rays[2, 3]
+    for u in range(len(depth)):
+        column, far = np.float32(u), depth[u]
+        x[u] = ox + far * (ax * column + bx)
+        y[u] = oy + far * (ay * column + by)
+        z[u] = oz + far * (az * column + bz)
+
+
+@numba.njit(cache=True, error_model="numpy", fastmath={"contract"})
+def _face(
+    seen: NDArray[np.int32],
+    planes: NDArray[np.float32],
+    depth: NDArray[np.float32],
+    v: int,
+    offset: np.float32,
+    nearer: np.float32,
+    facing: NDArray[np.float32],
+    x: NDArray[np.float32],
+    y: NDArray[np.float32],
+    z: NDArray[np.float32],
+) -> None:
+    """The cosine between normal and light; and move x, y, z off the surface, which else shadows itself in stripes."""
+    width, row, u = len(seen), np.float32(v), 0
+    while u < width:
+        t, end = seen[u], u + 1
+        while end < width and seen[end] == t:
+            end += 1
+        if t >= 0:
+            plane = planes[t]
+            ax, ay, az = plane[0], plane[3], plane[6]
+            bx, by, bz = plane[1] * row + plane[2], plane[4] * row + plane[5], plane[7] * row + plane[8]
+            for i in range(u, end):
+                column, far = np.float32(i), depth[i]
+                nx, ny, nz = far * (ax * column + bx), far * (ay * column + by), far * (az * column + bz)
+                facing[i] = -nz / np.sqrt(nx * nx + ny * ny + nz * nz)
+                x[i] += offset * nx
+                y[i] += offset * ny
+                z[i] -= nearer * nz
+        else:
+            facing[u:end] = _ZERO
+        u = end
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _within(x: np.float32, last: np.float32) -> np.float32:
+    """The number from 0 to `last` that is next to x; 0 for what is no number, which must not become an index."""
+    above = x if x > _ZERO else _ZERO
+    return above if above < last else last
+
+
+@numba.njit(cache=True, error_model="numpy", fastmath={"contract"})
+def _light(
+    x: NDArray[np.float32],
+    y: NDArray[np.float32],
+    z: NDArray[np.float32],
+    shadows: NDArray[np.float32],
+    facing: NDArray[np.float32],
+    grain: NDArray[np.float32],
+    strengths: tuple[np.float32, np.float32, np.float32],
+) -> None:
+    """Multiply `grain` by the light, where the four texels about x, y are weighted that are not nearer than z."""
+    ambient, diffuse, last = strengths[0], strengths[1], np.float32(shadows.shape[0] - 1)
+    texels, size = shadows.ravel(), np.int32(shadows.shape[0])
+    for u in range(len(x)):
+        across, down = _within(x[u], last), _within(y[u], last)
+        i, j = np.int32(min(across, last - _ONE)), np.int32(min(down, last - _ONE))
+        right, low = across - np.float32(i), down - np.float32(j)
+        near = max(z[u], _ZERO)
+        at = np.uint32(j * size + i)
+        a = _ONE if near >= texels[at] else _ZERO
+        b = _ONE if near >= texels[at + np.uint32(1)] else _ZERO
+        c = _ONE if near >= texels[at + np.uint32(size)] else _ZERO
+        d = _ONE if near >= texels[at + np.uint32(size + 1)] else _ZERO
+        upper, lower = a + right * (b - a), c + right * (d - c)
+        lit = upper + low * (lower - upper)
+        grain[u] *= ambient + diffuse * lit * max(facing[u], _ZERO)
+
+
+@numba.njit(cache=True, error_model="numpy", fastmath={"contract"})
+def _paint(
+    seen: NDArray[np.int32],
+    item_of: NDArray[np.int32],
+    colors: NDArray[np.float32],
+    brightness: NDArray[np.float32],
+    background: NDArray[np.uint8],
+    rgb: NDArray[np.uint8],
+) -> None:
+    """The colours of a row, from its items' colours times brightness."""
+    top = np.float32(255.0)
+    width, u = len(seen), 0
+    while u < width:
+        t, end = seen[u], u + 1
+        while end < width and seen[end] == t:
+            end += 1
+        if t >= 0:
+            color = colors[item_of[t]]
+            red, green, blue = color[0], color[1], color[2]
+            for i in range(u, end):
+                rgb[i, 0] = np.uint8(np.int32(min(red * brightness[i], top) + _HALF))
+                rgb[i, 1] = np.uint8(np.int32(min(green * brightness[i], top) + _HALF))
+                rgb[i, 2] = np.uint8(np.int32(min(blue * brightness[i], top) + _HALF))
+        else:
+            for i in range(u, end):
+                rgb[i, 0], rgb[i, 1], rgb[i, 2] = background[0], background[1], background[2]
+        u = end
+
+
+@numba.njit(cache=True, error_model="numpy")
+def read_out(
+    inverse: NDArray[np.float32],
+    seen: NDArray[np.int32],
+    item_of: NDArray[np.int32],
+    ids_of: NDArray[np.int32],
+    depth: NDArray[np.float32],
+    ids: NDArray[np.int32],
+) -> None:
+    """Write depth, 0 for none, and ids, -1 for none, of all pixels."""
+    height, width = seen.shape
+    for v in range(height):
+        for u in range(width):
+            t = seen[v, u]
+            if t >= 0:
+                depth[v, u] = _ONE / inverse[v, u]
+                ids[v, u] = ids_of[item_of[t]]
+            else:
+                depth[v, u] = _ZERO
+                ids[v, u] = -1

@@ -1,0 +1,155 @@
+"""The renderer without OpenGL: it draws what the OpenGL renderer draws, on one processor core."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+from scipy.spatial.transform import RigidTransform
+
+from regrasp.interfaces.arrays import FloatArray
+from regrasp.interfaces.frame import Intrinsics
+from regrasp.sim.render.meshes import shared_meshes
+from regrasp.sim.render.picture import BACKGROUND, Z_FAR, Z_NEAR, Image, LightState
+from regrasp.sim.render.raster import draw_triangles, place_corners, project_corners
+from regrasp.sim.render.shading import read_out, shade, write_normals
+from regrasp.sim.render.shadows import DEFAULT_SHADOWS, ShadowParameters, light_from_world
+from regrasp.sim.render.visuals import Visuals
+
+_LARGEST = 1e6  # m; what is farther from the origin is not drawn
+_OFFSET = 1.5  # texels along the normal, at which shadows are looked up, as the OpenGL renderer does
+
+
+class SoftwareRenderer:
+    """A `Renderer` of compiled loops: it finds the triangle that each pixel sees, then colours each pixel once."""
+
+    name = "software"
+
+    device = "compiled loops on one core"
+
+    def __init__(self, visuals: Visuals, shadow_parameters: ShadowParameters = DEFAULT_SHADOWS) -> None:
+        self.visuals, self._parameters = visuals, shadow_parameters
+        self._meshes = shared_meshes(visuals)
+        mesh_of = {int(row): mesh for mesh in self._meshes for row in mesh.rows}
+        meshes = [mesh_of[row] for row in range(len(visuals.items))]
+        self._order = np.array([row for mesh in self._meshes for row in mesh.rows], np.int64)  # small ones first
+        self._radius = np.array([mesh.radius for mesh in meshes])
+        self._first_corner = _starts([len(mesh.corners) for mesh in meshes])
+        self._first_triangle = _starts([len(mesh.triangles) for mesh in meshes])
+        self._local = _stack([mesh.corners for mesh in meshes], 6, np.float32)
+        shifted = [mesh.triangles + start for mesh, start in zip(meshes, self._first_corner, strict=False)]
+        self._triangles = _stack(shifted, 3, np.int32)
+        self._item_of = np.repeat(np.arange(len(meshes)), [len(mesh.triangles) for mesh in meshes]).astype(np.int32)
+        self._colors = 255 * _stack([np.array([item.color]) for item in visuals.items], 3, np.float32)
+        self._places, self._normals = (np.empty((len(self._local), 3), np.float32) for _ in range(2))
+        self._corners = np.empty((len(self._local), 6))
+        self._planes = np.empty((len(self._triangles), 9), np.float32)
+        self._ready = np.empty(len(self._triangles), bool)
+        self._shadows = np.empty((shadow_parameters.size,) * 2, np.float32)
+        self._texels_from_world: FloatArray = np.eye(4)
+        self._buffers_by_size: dict[tuple[int, int], tuple[NDArray[np.float32], NDArray[np.int32]]] = {}
+        self._placed: tuple[NDArray[np.float32], LightState] | None = None
+
+    def render(
+        self, poses: NDArray[np.float32], world_from_camera: RigidTransform, intrinsics: Intrinsics, light: LightState
+    ) -> Image:
+        """See `Renderer.render`. Where nothing has moved since the last picture, no shadows are drawn anew."""
+        rgb = self.render_color(poses, world_from_camera, intrinsics, light)
+        inverse, seen = self._buffers(intrinsics)
+        depth, ids = np.empty(seen.shape, np.float32), np.empty(seen.shape, np.int32)
+        read_out(inverse, seen, self._item_of, self.visuals.ids, depth, ids)
+        return Image(rgb, depth, ids)
+
+    def render_color(
+        self, poses: NDArray[np.float32], world_from_camera: RigidTransform, intrinsics: Intrinsics, light: LightState
+    ) -> NDArray[np.uint8]:
+        """See `Renderer.render_color`."""
+        if self._placed is None or self._placed[1] is not light or not np.array_equal(self._placed[0], poses):
+            self._place(poses, light)
+            self._placed = (poses.copy(), light)
+        inverse, seen = self._buffers(intrinsics)
+        inverse.fill(1.0 / Z_FAR)
+        seen.fill(-1)
+        camera_from_world, pixels = world_from_camera.inv().as_matrix(), _pixels_from_camera(intrinsics)
+        sound = self._order[_sound(poses[self._order])]
+        centres = poses[sound, :, 3] @ camera_from_world[:3, :3].T + camera_from_world[:3, 3]
+        visible = sound[_in_view(centres, self._radius[sound], intrinsics)]
+        project_corners(self._places, visible, self._first_corner, pixels @ camera_from_world, self._corners)
+        draw = (self._corners, visible, self._first_triangle, self._triangles)
+        draw_triangles(*draw, Z_NEAR, inverse, seen)
+        write_normals(self._corners, self._triangles, self._normals, seen, self._ready, self._planes)
+        rays = world_from_camera.as_matrix() @ np.linalg.inv(pixels)
+        rgb = np.empty((*seen.shape, 3), np.uint8)
+        shade(
+            inverse,
+            seen,
+            self._planes,
+            self._item_of,
+            self._colors,
+            rays.astype(np.float32),
+            (self._texels_from_world @ rays).astype(np.float32),
+            self._shadows,
+            (np.float32(light.ambient), np.float32(light.diffuse), np.float32(_OFFSET)),
+            np.rint(255 * np.array(BACKGROUND)).astype(np.uint8),
+            rgb,
+        )
+        return rgb
+
+    def close(self) -> None:
+        """Nothing need be freed."""
+
+    def _place(self, poses: NDArray[np.float32], light: LightState) -> None:
+        """Move all corners and draw the shadow map: texels hold how near to the light its nearest surface is."""
+        casters = [mesh for mesh in self._meshes if mesh.radius < self._parameters.largest_caster]
+        to_light = np.asarray(light.direction, float) / np.linalg.norm(light.direction)
+        matrix, radius = light_from_world(casters, poses, to_light)
+        turn = (2 * radius * matrix[:3, :3]).astype(np.float32)
+        place_corners(self._local, self._order, self._first_corner, poses, turn, self._places, self._normals)
+        size = self._parameters.size
+        texels = np.array([[size, 0, 0, -0.5], [0, size, 0, -0.5], [0, 0, -1, 1], [0, 0, 0, 1]])
+        self._texels_from_world = texels @ matrix
+        self._shadows.fill(0.0)
+        rows = np.array([row for mesh in casters for row in mesh.rows], np.int64)
+        rows = rows[_sound(poses[rows])]
+        view = self._texels_from_world[[0, 1, 3, 2]]
+        project_corners(self._places, rows, self._first_corner, view, self._corners)
+        draw_triangles(self._corners, rows, self._first_triangle, self._triangles, 0.0, self._shadows, None)
+
+    def _buffers(self, k: Intrinsics) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+        """Inverse depth and triangles seen, of a picture's size."""
+        size = (k.height, k.width)
+        if size not in self._buffers_by_size:
+            self._buffers_by_size[size] = np.empty(size, np.float32), np.empty(size, np.int32)
+        return self._buffers_by_size[size]
+
+
+def _starts(lengths: list[int]) -> NDArray[np.int64]:
+    return np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)
+
+
+def _stack(rows: Sequence[NDArray[Any]], width: int, kind: DTypeLike) -> NDArray[Any]:
+    return np.concatenate([np.empty((0, width)), *rows]).astype(kind)
+
+
+def _pixels_from_camera(k: Intrinsics) -> FloatArray:
+    """The matrix (4, 4) from a point to its pixel times its depth, its depth, and 1."""
+    return np.array([[k.fx, 0.0, k.cx, 0.0], [0.0, k.fy, k.cy, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
+
+
+def _sound(poses: NDArray[np.float32]) -> NDArray[np.bool_]:
+    """Which poses are of numbers that can be drawn; those of a world that has blown up are not."""
+    return np.abs(poses).reshape(len(poses), 12).max(axis=1) < _LARGEST
+
+
+def _in_view(centres: FloatArray, radius: FloatArray, k: Intrinsics) -> NDArray[np.bool_]:
+    """Which spheres about `centres` (n, 3) in the camera's frame may show in the picture."""
+    inwards = np.array(
+        [
+            [k.fx, 0, k.cx + 0.5],
+            [-k.fx, 0, k.width - 0.5 - k.cx],
+            [0, k.fy, k.cy + 0.5],
+            [0, -k.fy, k.height - 0.5 - k.cy],
+        ]
+    )
+    distance = centres @ (inwards / np.linalg.norm(inwards, axis=1, keepdims=True)).T
+    return (distance > -radius[:, None]).all(axis=1) & (centres[:, 2] + radius > Z_NEAR)
