@@ -6,6 +6,7 @@ fixed steps, so nothing depends on who reads them and how often.
 """
 
 import math
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
@@ -16,7 +17,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cell import PLUGGED_INTO, Cell, WristMount
 from regrasp.interfaces.scene import Gravity, SceneSetup
-from regrasp.interfaces.wall_time import counts_as
+from regrasp.interfaces.wall_time import counts_as, move_time
 from regrasp.sim.build import (
     OUT_OF_SIGHT,
     LayingParameters,
@@ -58,7 +59,6 @@ class WorldParameters:
 
 
 NOTHING_ADDED = SceneSetup()
-_simulate = counts_as("physics")(p.stepSimulation)
 
 
 class World:
@@ -82,6 +82,7 @@ class World:
         self._step_rate = cell.hidden.step_rate
         self.step_seconds = 1.0 / self._step_rate
         self._steps = 0
+        self._simulating = 0.0  # s of wall time in PyBullet's steps since `advance` began
         self._next_exposure = 0.0  # the step at which a camera exposes next
         errors_rng, light_rng = (np.random.default_rng(s) for s in np.random.SeedSequence([seed, 1]).spawn(2))
         configure(self.client, cell.hidden, gravity)
@@ -122,8 +123,10 @@ class World:
     @counts_as("step loop")
     def advance(self, seconds: float) -> None:
         """Run the physics for so long, rounded to whole steps."""
+        self._simulating = 0.0
         for _ in range(round(seconds / self.step_seconds)):
             self._step()
+        move_time("physics", self._simulating)
 
     def note_entered(self, node: str) -> None:
         """Note that the node with this tree path was entered now, for faults that wait for it."""
@@ -178,11 +181,14 @@ class World:
     def _step(self) -> None:
         for arm in self.arms.values():
             arm.step()
+        now = self.now()
         for fault in self.faults:
-            fault.step(self.now())
+            fault.step(now)
         self.cable.apply_springs()
         self.clip.step(self._connector)
-        _simulate(physicsClientId=self.client)
+        began = time.perf_counter()
+        p.stepSimulation(physicsClientId=self.client)
+        self._simulating += time.perf_counter() - began
         self._steps += 1
         self._connector = self.cable.connector_state()
         self.socket.step()

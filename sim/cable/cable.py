@@ -17,6 +17,7 @@ Rayleigh's mass-proportional term.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import chain
 from typing import NamedTuple
 
 import numba
@@ -109,7 +110,9 @@ class CableBody:
         """Set the joint torques for the next step from the present joint rotations and rates."""
         joints, no_turns = self._joints
         states = p.getJointStatesMultiDof(self.body, joints, physicsClientId=self.client)
-        torques = spring_torques(np.array([s[0] + s[1] for s in states]), self.stiffness, self.damping)
+        flat = chain.from_iterable([s[0] + s[1] for s in states])
+        values = np.fromiter(flat, float, 7 * self.links).reshape(-1, 7)
+        torques = spring_torques(values, self.stiffness, self.damping)
         p.setJointMotorControlMultiDofArray(
             self.body,
             joints,

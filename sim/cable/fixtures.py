@@ -145,7 +145,7 @@ class ClipHold:
         parameters: ClipParameters = ClipParameters(),
     ) -> None:
         self._target, self._clip, self._dt, self._parameters = link, clip, step, parameters
-        self._seat: FloatArray = clip.world_from_seat.translation
+        self._seat: list[float] = clip.world_from_seat.translation.tolist()
         self._axis: FloatArray = clip.world_from_seat.rotation.apply([1.0, 0.0, 0.0])
         self._cos = float(np.cos(np.deg2rad(clip.capture_angle_deg)))
         stiffness = clip.hold_force / parameters.lip_travel
@@ -175,7 +175,9 @@ class ClipHold:
             self.holds, self._resting = True, 0.0
 
     def _pull(self, connector: BodyState) -> None:
-        force, torque = _lip_wrench(np.concatenate(connector), self._seat, self._axis, self._force, self._torque)
+        force, torque = _lip_wrench(
+            np.concatenate(connector), np.array(self._seat), self._axis, self._force, self._torque
+        )
         at, target = connector.position, self._target
         client = target.client
         p.applyExternalForce(target.body, target.link, force.tolist(), at, p.WORLD_FRAME, physicsClientId=client)

@@ -177,7 +177,8 @@ class SimArm:
             self._drive(q, v)
         elif self._late_joints and self._late(self._target).any():
             self._drive(self._target, np.zeros(6))
-        self.gripper.step()
+        if self._steps * self._dt >= self.gripper.due:
+            self.gripper.sample()
         self._steps += 1
 
     def _drive(self, q: FloatArray, v: FloatArray) -> None:

@@ -27,7 +27,7 @@ class GripperParameters:
 class SimGripper:
     """Implements `regrasp.interfaces.devices.Gripper` with the fingers and pads among the `links` of an arm's `body`.
 
-    `now` gives the arm's simulated seconds. The arm calls `step()` before every physics step.
+    `now` gives the arm's simulated seconds. The arm calls `sample()` when it is `due`.
     """
 
     def __init__(
@@ -50,8 +50,7 @@ class SimGripper:
         self._force: float | None = None
         self._forced_open, self._stuck, self._force_share = False, False, 1.0
         self._backlash_gap = self.true_gap()
-        self._samples = 0
-        self._reading = self._sample()
+        self.restart_clock()
         self._drive()
 
     def open(self, gap: float) -> None:
@@ -88,17 +87,16 @@ class SimGripper:
 
     def restart_clock(self) -> None:
         """Set the count of samples to zero; the arm's clock is zero now."""
-        self._samples = 0
-        self._reading = self._sample()
+        self._samples = -1
+        self.sample()
 
-    def step(self) -> None:
-        """Sample the encoder if it is time."""
-        due = int(self._now() * self._errors.finger_rate + 1e-6)
-        if due > self._samples:
-            self._samples = due
-            self._reading = self._sample()
+    def sample(self) -> None:
+        """Sample the encoder; the next sample is due at the arm's second `due`."""
+        self._samples += 1
+        self.due = (self._samples + 1 - 1e-6) / self._errors.finger_rate
+        self._reading = self._sampled()
 
-    def _sample(self) -> GripperReading:
+    def _sampled(self) -> GripperReading:
         half = self._errors.finger_backlash / 2
         gap = self.true_gap()
         self._backlash_gap = min(max(self._backlash_gap, gap - half), gap + half)
