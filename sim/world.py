@@ -7,6 +7,7 @@ fixed steps, so nothing depends on who reads them and how often.
 
 import math
 import time
+import weakref
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
@@ -79,6 +80,7 @@ class World:
     ) -> None:
         self.cell, self.gravity, self._parameters = cell, gravity, parameters
         self.client: int = p.connect(p.GUI if gui else p.DIRECT)
+        self._disconnect = weakref.finalize(self, p.disconnect, self.client)  # also if nobody closes the world
         self._step_rate = cell.hidden.step_rate
         self.step_seconds = 1.0 / self._step_rate
         self._steps = 0
@@ -155,7 +157,7 @@ class World:
     def close(self) -> None:
         """Close the renderer and disconnect the client."""
         self.renderer.close()
-        p.disconnect(self.client)
+        self._disconnect()
 
     def pads_touching(self, arm: str) -> tuple[bool, bool]:
         """Whether the left and the right pad of that arm touch the connector now."""

@@ -1,5 +1,6 @@
 """The whole cell: what holds, what lets go, what touches, and that it is the same every time."""
 
+import gc
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -233,3 +234,12 @@ def test_two_processes_agree_bit_for_bit_whoever_looks() -> None:
     assert all(run.returncode == 0 for run in runs)
     assert len(digests[0]) == 64
     assert digests == [digests[0]] * 3
+
+
+def test_a_world_that_nobody_closes_leaves_no_client_behind(cell: Cell) -> None:
+    world = World(cell, "zero", 0)
+    client = world.client
+    assert p.getConnectionInfo(client)["isConnected"]
+    del world
+    gc.collect()
+    assert not p.getConnectionInfo(client)["isConnected"]
