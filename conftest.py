@@ -39,8 +39,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     items.sort(key=lambda item: not item.nodeid.startswith(LONG))
 
 
-# A shell starts background jobs with Ctrl-C ignored, and what tests start would inherit that.
+# A shell starts background jobs with Ctrl-C ignored, and nohup with SIGHUP; what tests start would inherit that.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+signal.signal(signal.SIGHUP, signal.SIG_DFL)
 settings.register_profile("without deadline", deadline=None)  # compilation and other workers take their time
 settings.load_profile("without deadline")
 
