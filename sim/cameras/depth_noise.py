@@ -129,40 +129,74 @@ def _measure(
     """
     height, width = depth.shape
     scale, noise, smallest, step, steps_per_metre, edge_step, flying_share = figures
-    rows, columns = tiles.shape[1] - 1, tiles.shape[2] - 1
+    rows = tiles.shape[1] - 1
     out = np.zeros((height, width), np.float32)
+    jitter, flown = np.empty(width, np.float32), np.empty(width, np.float32)
+    near, far = np.empty(width, np.float32), np.empty(width, np.float32)
     for v in range(height):
-        first = tiles[0, (v + shifts[0, 0]) & rows]
-        second = tiles[1, (v + shifts[1, 0]) & rows]
+        jitter[:] = np.float32(0.0)
+        for tile in range(2):
+            _add_wrapped(tiles[tile, (v + shifts[tile, 0]) & rows], shifts[tile, 1], jitter)
+        _neighbours(depth, v, near, far)
+        _fly(depth, v, near, far, key, edge_step, flying_share, flown)
         for u in range(width):
-            if not seen[v, u]:
-                continue
-            z = _flying(depth, v, u, key, edge_step, flying_share)
-            jitter = fixed[v, u]
-            jitter += first[(u + shifts[0, 1]) & columns] + second[(u + shifts[1, 1]) & columns]
-            z = scale * z / (np.float32(1.0) + noise * jitter * z)
-            if z >= smallest:
-                out[v, u] = np.float32(np.rint(z * steps_per_metre)) * step
+            z = flown[u]
+            z = scale * z / (np.float32(1.0) + noise * (fixed[v, u] + jitter[u]) * z)
+            measured = np.float32(np.rint(z * steps_per_metre)) * step
+            out[v, u] = measured if seen[v, u] and z >= smallest else np.float32(0.0)
     return out
 
 
-@numba.njit(cache=True, inline="always", error_model="numpy")
-def _flying(
-    depth: DepthImage, v: int, u: int, key: np.uint32, edge_step: np.float32, flying_share: np.float32
-) -> np.float32:
-    """The pixel's depth; beside an edge, for a share of the pixels, a random depth between the two surfaces."""
-    z = depth[v, u]
-    near = far = z
-    for dv, du in ((0, -1), (0, 1), (-1, 0), (1, 0)):
-        if 0 <= v + dv < depth.shape[0] and 0 <= u + du < depth.shape[1] and depth[v + dv, u + du] > 0:
-            near = min(near, depth[v + dv, u + du])
-            far = max(far, depth[v + dv, u + du])
-    if max(far - z, z - near) < edge_step * near:
-        return z
-    chance = _hash(key, v * depth.shape[1] + u)
-    if chance >= flying_share:
-        return z
-    return near + (far - near) * chance / flying_share
+@numba.njit(cache=True, error_model="numpy")
+def _add_wrapped(row: NDArray[np.float32], shift: int, out: NDArray[np.float32]) -> None:
+    """Add a periodic row, from its column `shift` on, to `out` (W,)."""
+    done = 0
+    while done < len(out):
+        begin = (shift + done) % len(row)
+        count = min(len(row) - begin, len(out) - done)
+        part, more = out[done : done + count], row[begin : begin + count]
+        for u in range(count):
+            part[u] += more[u]
+        done += count
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _neighbours(depth: DepthImage, v: int, near: NDArray[np.float32], far: NDArray[np.float32]) -> None:
+    """The least and the greatest depth of each pixel of row `v` and its four neighbours, those without depth aside."""
+    height, width = depth.shape
+    here, up, down = depth[v], depth[max(v - 1, 0)], depth[min(v + 1, height - 1)]
+    for u in range(width):
+        z, a, b = here[u], up[u], down[u]
+        near[u] = min(z, min(a if a > 0 else z, b if b > 0 else z))
+        far[u] = max(z, max(a, b))
+    for u in range(width - 1):
+        right = here[u + 1]
+        near[u], far[u] = min(near[u], right if right > 0 else near[u]), max(far[u], right)
+    for u in range(1, width):
+        left = here[u - 1]
+        near[u], far[u] = min(near[u], left if left > 0 else near[u]), max(far[u], left)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _fly(
+    depth: DepthImage,
+    v: int,
+    near: NDArray[np.float32],
+    far: NDArray[np.float32],
+    key: np.uint32,
+    edge_step: np.float32,
+    flying_share: np.float32,
+    out: NDArray[np.float32],
+) -> None:
+    """The depths of row `v`; beside an edge, for a share of the pixels, random depths between the two surfaces."""
+    width = depth.shape[1]
+    for u in range(width):
+        z = depth[v, u]
+        out[u] = z
+        if max(far[u] - z, z - near[u]) >= edge_step * near[u]:
+            chance = _hash(key, v * width + u)
+            if chance < flying_share:
+                out[u] = near[u] + (far[u] - near[u]) * chance / flying_share
 
 
 @numba.njit(cache=True, inline="always")
