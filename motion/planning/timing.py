@@ -8,6 +8,7 @@ from scipy.interpolate import BPoly
 
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.trajectory import Trajectory
+from regrasp.motion.planning.toppra_solver import time_optimal
 from regrasp.motion.robots.kinematics import ACCELERATION_LIMIT, VELOCITY_LIMIT
 
 
@@ -36,8 +37,6 @@ def time_path(path: FloatArray, speed: float = 1.0, parameters: TimingParameters
 
     .. math:: |q'(s) \dot s| \le v_{max}, \quad |q'(s) \ddot s + q''(s) \dot s^2| \le a_{max}
     """
-    from regrasp.motion.planning.toppra_solver import time_optimal  # late: a tree's check does not need it
-
     path = np.asarray(path, float).reshape(-1, 6)
     path = path[np.append(True, np.abs(np.diff(path, axis=0)).max(axis=1) > 1e-9)]
     if len(path) == 1:

@@ -4,6 +4,7 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
@@ -103,10 +104,14 @@ class SimCamera:
         return self._frame
 
     def preview(self, shrink: int) -> NDArray[np.uint8] | None:
-        """The colours (H / shrink, W / shrink, 3) of `latest()`, for a film; nothing else is drawn for it."""
+        """The colours (H / shrink, W / shrink, 3) of `latest()`, for a film; depth is not drawn for it."""
         newest = self._newest()
         if newest is None:
             return None
+        if self._frame is not None and self._frame.number == newest.number:  # somebody has read it
+            return np.asarray(
+                cv2.resize(self._frame.rgb, None, fx=1 / shrink, fy=1 / shrink, interpolation=cv2.INTER_AREA)
+            )
         small, pose = self._intrinsics.shrunk(shrink), newest.world_from_camera()
         return _darkened(self._renderer.render_color(newest.poses(), pose, small, newest.light), newest.transmission)
 

@@ -135,10 +135,12 @@ def test_a_preview_is_the_newest_frame_made_smaller(rig: Rig) -> None:
     rig.camera.expose()
     rig.move(-0.1)
     rig.time = 0.1
-    small, frame = rig.camera.preview(2), rig.camera.latest()
+    small, frame, again = rig.camera.preview(2), rig.camera.latest(), rig.camera.preview(2)
     assert small is not None
     assert frame is not None
+    assert again is not None
     height, width = small.shape[:2]
+    assert again.shape == small.shape
     assert (height, width) == (SPEC.height // 2, SPEC.width // 2)
     expected = cv2.resize(frame.rgb, (width, height), interpolation=cv2.INTER_AREA)
     off = np.abs(small.astype(int) - expected).max(axis=2)
