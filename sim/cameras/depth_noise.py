@@ -100,15 +100,20 @@ def _seen(depth: DepthImage, shift: np.float32, begin: np.float32, end: np.float
     image's begin (B f / Z pixels) is not seen at all.
     """
     height, width = depth.shape
-    seen = np.zeros((height, width), np.bool_)
+    seen = np.empty((height, width), np.bool_)
+    there, least = np.empty(width, np.float32), np.empty(width, np.float32)
+    nowhere = np.float32(1e9)
     for v in range(height):
-        leftmost = np.float32(1e9)
-        for u in range(width - 1, -1, -1):
+        # Three loops: the compiler works on several pixels at once in the first and the last.
+        for u in range(width):
             z = depth[v, u]
-            if z > 0:
-                there = np.float32(u) - shift / z
-                seen[v, u] = there < leftmost and there >= begin and u <= end
-                leftmost = min(leftmost, there)
+            there[u] = np.float32(u) - shift / z if z > 0 else nowhere
+        leftmost = nowhere
+        for u in range(width - 1, -1, -1):
+            least[u] = leftmost
+            leftmost = there[u] if there[u] < leftmost else leftmost
+        for u in range(width):
+            seen[v, u] = (there[u] < least[u]) & (there[u] >= begin) & (np.float32(u) <= end)
     return seen
 
 

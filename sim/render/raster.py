@@ -71,19 +71,21 @@ def draw_triangles(
     for item in items:
         for t in range(first_triangle[item], first_triangle[item + 1]):
             p, q, r = corners[triangles[t, 0]], corners[triangles[t, 1]], corners[triangles[t, 2]]
-            cut = min(p[2], q[2], r[2]) < near
+            top, bottom = 0, height - 1
+            cut = p[2] < near or q[2] < near or r[2] < near
             if not cut:
-                left, right = min(p[4], q[4], r[4]), max(p[4], q[4], r[4])
-                top, bottom = min(p[5], q[5], r[5]), max(p[5], q[5], r[5])
-                if right < 0.0 or bottom < 0.0 or left > width - 1 or top > height - 1:
+                left, right = _extent(p[4], q[4], r[4])
+                upper, lower = _extent(p[5], q[5], r[5])
+                if not (right >= 0.0 and lower >= 0.0 and left <= width - 1 and upper <= height - 1):
                     continue
-                if ceil(left) > floor(right) or ceil(top) > floor(bottom):
+                if ceil(left) > floor(right) or ceil(upper) > floor(lower):
                     continue
-                rows = max(ceil(top), 0), min(floor(bottom), height - 1)
-            elif max(p[2], q[2], r[2]) < near:
+                if upper > 0.0:
+                    top = ceil(upper)
+                if lower < bottom:
+                    bottom = floor(lower)
+            elif p[2] < near and q[2] < near and r[2] < near:
                 continue
-            else:
-                rows = 0, height - 1
             e0, e1, e2 = _cross(q, r), _cross(r, p), _cross(p, q)
             volume = p[0] * e0[0] + p[1] * e0[1] + p[2] * e0[2]
             if not volume < 0.0:  # seen from behind, or edge on
@@ -92,15 +94,24 @@ def draw_triangles(
             slope = a * e0[0] + b * e1[0] + c * e2[0]
             fall = a * e0[1] + b * e1[1] + c * e2[1]
             start = a * e0[2] + b * e1[2] + c * e2[2]
-            for v in range(rows[0], rows[1] + 1):
+            end = slope, fall, start - 1.0 / near
+            for v in range(top, bottom + 1):
                 low, high = _clip(e0, v, 0.0, float(width))
                 low, high = _clip(e1, v, low, high)
                 low, high = _clip(e2, v, low, high)
                 if cut:
-                    low, high = _clip((slope, fall, start - 1.0 / near), v, low, high)
+                    low, high = _clip(end, v, low, high)
                 if low < high:
-                    value = slope * ceil(low) + fall * v + start
-                    _fill(nearest[v], seen, v, ceil(low), ceil(high), np.float32(value), np.float32(slope), t)
+                    first = ceil(low)
+                    value = slope * first + fall * v + start
+                    _fill(nearest[v], seen, v, first, ceil(high), np.float32(value), np.float32(slope), t)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _extent(a: float, b: float, c: float) -> tuple[float, float]:
+    """The least and the greatest; written out, as it is much faster here than Python's min and max."""
+    low, high = (a, b) if a < b else (b, a)
+    return (c if c < low else low), (c if c > high else high)
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -115,10 +126,11 @@ def _clip(edge: tuple[float, float, float], v: int, low: float, high: float) -> 
     Two triangles with an edge in common find the same u for it: no pixel is left out, and none is drawn twice.
     """
     rest = edge[1] * v + edge[2]
+    u = -rest / edge[0]
     if edge[0] < 0.0:
-        return max(low, -rest / edge[0]), high
+        return (u if u > low else low), high
     if edge[0] > 0.0:
-        return low, min(high, -rest / edge[0])
+        return low, (u if u < high else high)
     inside = rest < 0.0 or (rest == 0.0 and edge[1] < 0.0)
     return (low, high) if inside else (low, low)
 
@@ -134,9 +146,14 @@ def _fill(
     slope: np.float32,
     number: int,
 ) -> None:
-    for u in range(low, high):
-        here = value + slope * np.float32(u - low)
-        if here >= row[u]:
-            row[u] = here
-            if seen is not None:
-                seen[v, u] = number
+    part = row[low:high]
+    if seen is None:
+        for i in range(high - low):
+            here = value + slope * np.float32(i)
+            part[i] = here if here >= part[i] else part[i]
+        return
+    numbers, mine = seen[v, low:high], np.int32(number)
+    for i in range(high - low):
+        here = value + slope * np.float32(i)
+        numbers[i] = mine if here >= part[i] else numbers[i]
+        part[i] = here if here >= part[i] else part[i]

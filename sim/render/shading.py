@@ -25,26 +25,44 @@ def sine(x: np.float32) -> np.float32:
 
 
 @numba.njit(cache=True, error_model="numpy")
+def find_runs(seen: NDArray[np.int32], first_run: NDArray[np.int32], ends: NDArray[np.int32]) -> None:
+    """Write where the runs of pixels that see one triangle end, row after row.
+
+    The runs of row v are first_run[v] to first_run[v + 1]; each begins where the one before it in its row ends.
+    """
+    height, width = seen.shape
+    run = 0
+    for v in range(height):
+        first_run[v] = run
+        row = seen[v]
+        for u in range(1, width):
+            if row[u] != row[u - 1]:
+                ends[run] = u
+                run += 1
+        ends[run] = width
+        run += 1
+    first_run[height] = run
+
+
+@numba.njit(cache=True, error_model="numpy")
 def write_normals(
     corners: NDArray[np.float64],
     triangles: NDArray[np.int32],
     normals: NDArray[np.float32],
     seen: NDArray[np.int32],
+    first_run: NDArray[np.int32],
+    ends: NDArray[np.int32],
     ready: NDArray[np.bool_],
     planes: NDArray[np.float32],
 ) -> None:
     """Write the `planes` (9) of each triangle that is in `seen`: (u, v, 1) times them is normal over depth."""
     ready[:] = False
-    height, width = seen.shape
-    for v in range(height):
-        last = -1
-        for u in range(width):
-            t = seen[v, u]
-            if t != last:
-                last = t
-                if t >= 0 and not ready[t]:
-                    ready[t] = True
-                    _write_normal(corners, triangles[t], normals, planes[t])
+    for v in range(len(seen)):
+        for run in range(first_run[v], first_run[v + 1]):
+            t = seen[v, ends[run] - 1]
+            if t >= 0 and not ready[t]:
+                ready[t] = True
+                _write_normal(corners, triangles[t], normals, planes[t])
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -70,6 +88,8 @@ def _write_normal(
 def shade(
     inverse: NDArray[np.float32],
     seen: NDArray[np.int32],
+    first_run: NDArray[np.int32],
+    ends: NDArray[np.int32],
     planes: NDArray[np.float32],
     item_of: NDArray[np.int32],
     colors: NDArray[np.float32],
@@ -78,9 +98,9 @@ def shade(
     shadows: NDArray[np.float32],
     strengths: tuple[np.float32, np.float32, np.float32],
     background: NDArray[np.uint8],
-    rgb: NDArray[np.uint8],
+    channels: NDArray[np.uint8],
 ) -> None:
-    """Write the colours (H, W, 3) of a picture with `inverse` depth (H, W), whose pixels see triangles or -1.
+    """Write red, green and blue (3, H, W) of a picture with `inverse` depth (H, W), whose pixels see triangles or -1.
 
     A pixel's ray runs to rays @ (u, v, 1) at depth 1 from rays[:, 3]: in the world, and in the light's texels and
     nearness. `colors` are of items, 0 to 255; `strengths` are of ambient and diffuse light, and the offset along the
@@ -89,14 +109,19 @@ def shade(
     height, width = seen.shape
     grain, facing = np.empty(width, np.float32), np.empty(width, np.float32)
     x, y, z = np.empty(width, np.float32), np.empty(width, np.float32), np.empty(width, np.float32)
-    depth = np.empty(width, np.float32)
+    depth, texel = np.empty(width, np.float32), np.empty(width, np.int32)
+    nearer = strengths[2] / np.float32(len(shadows))
     for v in range(height):
+        runs = ends[first_run[v] : first_run[v + 1]]
         _invert(inverse[v], depth)
         _grain(depth, world_rays, v, grain)
         _follow(depth, light_rays, v, x, y, z)
-        _face(seen[v], planes, depth, v, strengths[2], strengths[2] / np.float32(len(shadows)), facing, x, y, z)
-        _light(x, y, z, shadows, facing, grain, strengths)
-        _paint(seen[v], item_of, colors, grain, background, rgb[v])
+        _face(seen[v], runs, planes, depth, v, strengths[2], nearer, facing, x, y, z)
+        _find_texels(x, y, np.int32(len(shadows)), texel)
+        _light(x, y, z, shadows.ravel(), np.int32(len(shadows)), texel)
+        _brighten(x, facing, strengths[0], strengths[1], grain)
+        for channel in range(3):
+            _paint(seen[v], runs, item_of, colors[:, channel], background[channel], grain, channels[channel, v])
 
 
 @numba.njit(cache=True, error_model="numpy", fastmath={"contract"})
@@ -144,6 +169,7 @@ def _follow(
 @numba.njit(cache=True, error_model="numpy", fastmath={"contract"})
 def _face(
     seen: NDArray[np.int32],
+    runs: NDArray[np.int32],
     planes: NDArray[np.float32],
     depth: NDArray[np.float32],
     v: int,
@@ -155,11 +181,9 @@ def _face(
     z: NDArray[np.float32],
 ) -> None:
     """The cosine between normal and light; and move x, y, z off the surface, which else shadows itself in stripes."""
-    width, row, u = len(seen), np.float32(v), 0
-    while u < width:
-        t, end = seen[u], u + 1
-        while end < width and seen[end] == t:
-            end += 1
+    row, u = np.float32(v), 0
+    for end in runs:
+        t = seen[u]
         if t >= 0:
             plane = planes[t]
             ax, ay, az = plane[0], plane[3], plane[6]
@@ -186,11 +210,28 @@ def _add_product(
         out[i] += factor * (far[i] * (a * np.float32(begin + i) + b))
 
 
-@numba.njit(cache=True, error_model="numpy")
-def _within(x: np.float32, last: np.float32) -> np.float32:
-    """The number from 0 to `last` that is next to x; 0 for what is no number, which must not become an index."""
-    above = x if x > _ZERO else _ZERO
-    return above if above < last else last
+@numba.njit(cache=True, error_model="numpy", fastmath={"contract"})
+def _find_texels(x: NDArray[np.float32], y: NDArray[np.float32], size: np.int32, texel: NDArray[np.int32]) -> None:
+    """Write the number of the upper left of the four texels about x, y, and leave in x, y how far beyond it they lie.
+
+    What lies outside the map, or is no number, goes to its border. Comparisons are written out here, since Python's
+    min and max keep the compiler from working on several pixels at once.
+    """
+    last, corner = np.float32(size - 1), np.int32(size - 2)
+    for u in range(len(x)):
+        across = x[u] if x[u] > _ZERO else _ZERO
+        across = across if across < last else last
+        column = np.int32(across)
+        column = column if column < corner else corner
+        x[u] = across - np.float32(column)
+        texel[u] = column
+    for u in range(len(x)):
+        down = y[u] if y[u] > _ZERO else _ZERO
+        down = down if down < last else last
+        row = np.int32(down)
+        row = row if row < corner else corner
+        y[u] = down - np.float32(row)
+        texel[u] += np.int32(row * size)
 
 
 @numba.njit(cache=True, error_model="numpy", fastmath={"contract"})
@@ -198,66 +239,56 @@ def _light(
     x: NDArray[np.float32],
     y: NDArray[np.float32],
     z: NDArray[np.float32],
-    shadows: NDArray[np.float32],
-    facing: NDArray[np.float32],
-    grain: NDArray[np.float32],
-    strengths: tuple[np.float32, np.float32, np.float32],
+    texels: NDArray[np.float32],
+    size: np.int32,
+    texel: NDArray[np.int32],
 ) -> None:
-    """Multiply `grain` by the light, where the four texels about x, y are weighted that are not nearer than z."""
-    ambient, diffuse, last = strengths[0], strengths[1], np.float32(shadows.shape[0] - 1)
-    texels, size = shadows.ravel(), np.int32(shadows.shape[0])
+    """Write to x the share of light: the four texels at `texel`, weighted by x and y, that are not nearer than z."""
     for u in range(len(x)):
-        if facing[u] <= _ZERO:
-            grain[u] *= ambient
-            continue
-        across, down = _within(x[u], last), _within(y[u], last)
-        i, j = np.int32(min(across, last - _ONE)), np.int32(min(down, last - _ONE))
-        near = max(z[u], _ZERO)
-        at = np.uint32(j * size + i)
-        open_texels = (
-            np.int32(near >= texels[at])
-            + 2 * np.int32(near >= texels[at + np.uint32(1)])
-            + 4 * np.int32(near >= texels[at + np.uint32(size)])
-            + 8 * np.int32(near >= texels[at + np.uint32(size + 1)])
-        )
-        lit = _ONE
-        if open_texels == 0:
-            lit = _ZERO
-        elif open_texels != 15:  # at a shadow's edge
-            right, low = across - np.float32(i), down - np.float32(j)
-            a, b = np.float32(open_texels & 1), np.float32((open_texels >> 1) & 1)
-            c, d = np.float32((open_texels >> 2) & 1), np.float32(open_texels >> 3)
-            upper, lower = a + right * (b - a), c + right * (d - c)
-            lit = upper + low * (lower - upper)
-        grain[u] *= ambient + diffuse * lit * facing[u]
+        at = np.uint32(texel[u])
+        near = z[u] if z[u] > _ZERO else _ZERO
+        a = np.float32(near >= texels[at])
+        b = np.float32(near >= texels[at + np.uint32(1)])
+        c = np.float32(near >= texels[at + np.uint32(size)])
+        d = np.float32(near >= texels[at + np.uint32(size + 1)])
+        upper, lower = a + x[u] * (b - a), c + x[u] * (d - c)
+        x[u] = upper + y[u] * (lower - upper)
+
+
+@numba.njit(cache=True, error_model="numpy", fastmath={"contract"})
+def _brighten(
+    lit: NDArray[np.float32],
+    facing: NDArray[np.float32],
+    ambient: np.float32,
+    diffuse: np.float32,
+    grain: NDArray[np.float32],
+) -> None:
+    for u in range(len(lit)):
+        cosine = facing[u] if facing[u] > _ZERO else _ZERO
+        grain[u] *= ambient + diffuse * lit[u] * cosine
 
 
 @numba.njit(cache=True, error_model="numpy", fastmath={"contract"})
 def _paint(
     seen: NDArray[np.int32],
+    runs: NDArray[np.int32],
     item_of: NDArray[np.int32],
     colors: NDArray[np.float32],
+    background: np.uint8,
     brightness: NDArray[np.float32],
-    background: NDArray[np.uint8],
-    rgb: NDArray[np.uint8],
+    out: NDArray[np.uint8],
 ) -> None:
-    """The colours of a row, from its items' colours times brightness."""
-    top = np.float32(255.0)
-    width, u = len(seen), 0
-    while u < width:
-        t, end = seen[u], u + 1
-        while end < width and seen[end] == t:
-            end += 1
-        if t >= 0:
-            color = colors[item_of[t]]
-            red, green, blue = color[0], color[1], color[2]
-            for i in range(u, end):
-                rgb[i, 0] = np.uint8(np.int32(min(red * brightness[i], top) + _HALF))
-                rgb[i, 1] = np.uint8(np.int32(min(green * brightness[i], top) + _HALF))
-                rgb[i, 2] = np.uint8(np.int32(min(blue * brightness[i], top) + _HALF))
+    """One channel of a row: its items' colours times brightness."""
+    top, u = np.float32(255.0), 0
+    for end in runs:
+        if seen[u] >= 0:
+            color = colors[item_of[seen[u]]]
+            part, light = out[u:end], brightness[u:end]
+            for i in range(end - u):
+                value = color * light[i]
+                part[i] = np.uint8(np.int32((value if value < top else top) + _HALF))
         else:
-            for i in range(u, end):
-                rgb[i, 0], rgb[i, 1], rgb[i, 2] = background[0], background[1], background[2]
+            out[u:end] = background
         u = end
 
 
@@ -265,19 +296,23 @@ def _paint(
 def read_out(
     inverse: NDArray[np.float32],
     seen: NDArray[np.int32],
+    first_run: NDArray[np.int32],
+    ends: NDArray[np.int32],
     item_of: NDArray[np.int32],
     ids_of: NDArray[np.int32],
     depth: NDArray[np.float32],
     ids: NDArray[np.int32],
 ) -> None:
     """Write depth, 0 for none, and ids, -1 for none, of all pixels."""
-    height, width = seen.shape
-    for v in range(height):
-        for u in range(width):
+    for v in range(len(seen)):
+        u = 0
+        for end in ends[first_run[v] : first_run[v + 1]]:
             t = seen[v, u]
             if t >= 0:
-                depth[v, u] = _ONE / inverse[v, u]
-                ids[v, u] = ids_of[item_of[t]]
+                ids[v, u:end] = ids_of[item_of[t]]
+                part, row = depth[v, u:end], inverse[v, u:end]
+                for i in range(end - u):
+                    part[i] = _ONE / row[i]
             else:
-                depth[v, u] = _ZERO
-                ids[v, u] = -1
+                ids[v, u:end], depth[v, u:end] = -1, _ZERO
+            u = end

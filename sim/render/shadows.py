@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,19 +22,25 @@ class ShadowParameters:
 DEFAULT_SHADOWS = ShadowParameters()
 
 
+def casters(meshes: Sequence[SharedMesh], largest: float) -> tuple[NDArray[np.int64], FloatArray]:
+    """The rows (n,) of the items that cast shadows, of a radius below `largest` (m), and their radii (n,) in m."""
+    small = [mesh for mesh in meshes if mesh.radius < largest]
+    rows = [(row, mesh.radius) for mesh in small for row in mesh.rows]
+    return np.array([row for row, _ in rows], np.int64), np.array([radius for _, radius in rows])
+
+
 def light_from_world(
-    casters: Sequence[SharedMesh], poses: NDArray[np.float32], to_light: FloatArray
+    centres: NDArray[np.floating[Any]], radii: FloatArray, to_light: FloatArray
 ) -> tuple[FloatArray, float]:
     """Matrix (4, 4) from the world to the light's view, and the radius (m) of the casters' bounding sphere.
 
+    `centres` (n, 3) m and `radii` (n,) m are spheres about the casters; `to_light` (3,) is a unit vector.
     The light's view maps the sphere to 0..1. Its rows run downwards as the picture's do, so that the same sides of
     triangles are drawn.
     """
     low, high = -np.ones(3), np.ones(3)
-    if casters:
-        centres = poses[np.concatenate([mesh.rows for mesh in casters]), :, 3]
-        radii = np.repeat([mesh.radius for mesh in casters], [len(mesh.rows) for mesh in casters])[:, None]
-        low, high = (centres - radii).min(axis=0), (centres + radii).max(axis=0)
+    if len(centres):
+        low, high = (centres - radii[:, None]).min(axis=0), (centres + radii[:, None]).max(axis=0)
     centre, radius = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
     side = np.cross(to_light, [1.0, 0.0, 0.0] if abs(to_light[0]) < 0.9 else [0.0, 1.0, 0.0])
     side /= np.linalg.norm(side)

@@ -1,8 +1,10 @@
 """The renderer without OpenGL: it draws what the OpenGL renderer draws, on one processor core."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 from scipy.spatial.transform import RigidTransform
@@ -12,12 +14,31 @@ from regrasp.interfaces.frame import Intrinsics
 from regrasp.sim.render.meshes import shared_meshes
 from regrasp.sim.render.picture import BACKGROUND, Z_FAR, Z_NEAR, Image, LightState
 from regrasp.sim.render.raster import draw_triangles, place_corners, project_corners
-from regrasp.sim.render.shading import read_out, shade, write_normals
-from regrasp.sim.render.shadows import DEFAULT_SHADOWS, ShadowParameters, light_from_world
+from regrasp.sim.render.shading import find_runs, read_out, shade, write_normals
+from regrasp.sim.render.shadows import DEFAULT_SHADOWS, ShadowParameters, casters, light_from_world
 from regrasp.sim.render.visuals import Visuals
 
 _LARGEST = 1e6  # m; what is farther from the origin is not drawn
 _OFFSET = 1.5  # texels along the normal, at which shadows are looked up, as the OpenGL renderer does
+
+
+@dataclass(frozen=True, eq=False)
+class _Pixels:
+    """What is worked out for the pixels of pictures (H, W) of one size, written anew for each.
+
+    Attributes:
+        inverse: Inverse depth (H, W), 1/m.
+        seen: The triangle that each pixel sees (H, W), -1 for none.
+        first_run: See `find_runs`.
+        ends: See `find_runs`.
+        channels: Red, green and blue (3, H, W).
+    """
+
+    inverse: NDArray[np.float32]
+    seen: NDArray[np.int32]
+    first_run: NDArray[np.int32]
+    ends: NDArray[np.int32]
+    channels: NDArray[np.uint8]
 
 
 class SoftwareRenderer:
@@ -28,12 +49,13 @@ class SoftwareRenderer:
     device = "compiled loops on one core"
 
     def __init__(self, visuals: Visuals, shadow_parameters: ShadowParameters = DEFAULT_SHADOWS) -> None:
-        self.visuals, self._parameters = visuals, shadow_parameters
-        self._meshes = shared_meshes(visuals)
-        mesh_of = {int(row): mesh for mesh in self._meshes for row in mesh.rows}
+        self.visuals = visuals
+        shared = shared_meshes(visuals)
+        mesh_of = {int(row): mesh for mesh in shared for row in mesh.rows}
         meshes = [mesh_of[row] for row in range(len(visuals.items))]
-        self._order = np.array([row for mesh in self._meshes for row in mesh.rows], np.int64)  # small ones first
+        self._order = np.array([row for mesh in shared for row in mesh.rows], np.int64)  # small ones first
         self._radius = np.array([mesh.radius for mesh in meshes])
+        self._casters, self._caster_radii = casters(shared, shadow_parameters.largest_caster)
         self._first_corner = _starts([len(mesh.corners) for mesh in meshes])
         self._first_triangle = _starts([len(mesh.triangles) for mesh in meshes])
         self._local = _stack([mesh.corners for mesh in meshes], 6, np.float32)
@@ -47,7 +69,7 @@ class SoftwareRenderer:
         self._ready = np.empty(len(self._triangles), bool)
         self._shadows = np.empty((shadow_parameters.size,) * 2, np.float32)
         self._texels_from_world: FloatArray = np.eye(4)
-        self._buffers_by_size: dict[tuple[int, int], tuple[NDArray[np.float32], NDArray[np.int32]]] = {}
+        self._pixels_by_size: dict[tuple[int, int], _Pixels] = {}
         self._placed: tuple[NDArray[np.float32], LightState] | None = None
 
     def render(
@@ -55,9 +77,9 @@ class SoftwareRenderer:
     ) -> Image:
         """See `Renderer.render`. Where nothing has moved since the last picture, no shadows are drawn anew."""
         rgb = self.render_color(poses, world_from_camera, intrinsics, light)
-        inverse, seen = self._buffers(intrinsics)
-        depth, ids = np.empty(seen.shape, np.float32), np.empty(seen.shape, np.int32)
-        read_out(inverse, seen, self._item_of, self.visuals.ids, depth, ids)
+        at = self._pixels(intrinsics)
+        depth, ids = np.empty(at.seen.shape, np.float32), np.empty(at.seen.shape, np.int32)
+        read_out(at.inverse, at.seen, at.first_run, at.ends, self._item_of, self.visuals.ids, depth, ids)
         return Image(rgb, depth, ids)
 
     def render_color(
@@ -67,22 +89,23 @@ class SoftwareRenderer:
         if self._placed is None or self._placed[1] is not light or not np.array_equal(self._placed[0], poses):
             self._place(poses, light)
             self._placed = (poses.copy(), light)
-        inverse, seen = self._buffers(intrinsics)
-        inverse.fill(1.0 / Z_FAR)
-        seen.fill(-1)
+        at = self._pixels(intrinsics)
+        at.inverse.fill(1.0 / Z_FAR)
+        at.seen.fill(-1)
         camera_from_world, pixels = world_from_camera.inv().as_matrix(), _pixels_from_camera(intrinsics)
         sound = self._order[_sound(poses[self._order])]
         centres = poses[sound, :, 3] @ camera_from_world[:3, :3].T + camera_from_world[:3, 3]
         visible = sound[_in_view(centres, self._radius[sound], intrinsics)]
         project_corners(self._places, visible, self._first_corner, pixels @ camera_from_world, self._corners)
         draw = (self._corners, visible, self._first_triangle, self._triangles)
-        draw_triangles(*draw, Z_NEAR, inverse, seen)
-        write_normals(self._corners, self._triangles, self._normals, seen, self._ready, self._planes)
+        draw_triangles(*draw, Z_NEAR, at.inverse, at.seen)
+        find_runs(at.seen, at.first_run, at.ends)
+        runs = (at.seen, at.first_run, at.ends)
+        write_normals(self._corners, self._triangles, self._normals, *runs, self._ready, self._planes)
         rays = world_from_camera.as_matrix() @ np.linalg.inv(pixels)
-        rgb = np.empty((*seen.shape, 3), np.uint8)
         shade(
-            inverse,
-            seen,
+            at.inverse,
+            *runs,
             self._planes,
             self._item_of,
             self._colors,
@@ -91,36 +114,39 @@ class SoftwareRenderer:
             self._shadows,
             (np.float32(light.ambient), np.float32(light.diffuse), np.float32(_OFFSET)),
             np.rint(255 * np.array(BACKGROUND)).astype(np.uint8),
-            rgb,
+            at.channels,
         )
-        return rgb
+        return np.asarray(cv2.merge(tuple(at.channels)), np.uint8)
 
     def close(self) -> None:
         """Nothing need be freed."""
 
     def _place(self, poses: NDArray[np.float32], light: LightState) -> None:
         """Move all corners and draw the shadow map: texels hold how near to the light its nearest surface is."""
-        casters = [mesh for mesh in self._meshes if mesh.radius < self._parameters.largest_caster]
         to_light = np.asarray(light.direction, float) / np.linalg.norm(light.direction)
-        matrix, radius = light_from_world(casters, poses, to_light)
+        matrix, radius = light_from_world(poses[self._casters, :, 3], self._caster_radii, to_light)
         turn = (2 * radius * matrix[:3, :3]).astype(np.float32)
         place_corners(self._local, self._order, self._first_corner, poses, turn, self._places, self._normals)
-        size = self._parameters.size
+        size = len(self._shadows)
         texels = np.array([[size, 0, 0, -0.5], [0, size, 0, -0.5], [0, 0, -1, 1], [0, 0, 0, 1]])
         self._texels_from_world = texels @ matrix
         self._shadows.fill(0.0)
-        rows = np.array([row for mesh in casters for row in mesh.rows], np.int64)
-        rows = rows[_sound(poses[rows])]
+        rows = self._casters[_sound(poses[self._casters])]
         view = self._texels_from_world[[0, 1, 3, 2]]
         project_corners(self._places, rows, self._first_corner, view, self._corners)
         draw_triangles(self._corners, rows, self._first_triangle, self._triangles, 0.0, self._shadows, None)
 
-    def _buffers(self, k: Intrinsics) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
-        """Inverse depth and triangles seen, of a picture's size."""
+    def _pixels(self, k: Intrinsics) -> "_Pixels":
         size = (k.height, k.width)
-        if size not in self._buffers_by_size:
-            self._buffers_by_size[size] = np.empty(size, np.float32), np.empty(size, np.int32)
-        return self._buffers_by_size[size]
+        if size not in self._pixels_by_size:
+            self._pixels_by_size[size] = _Pixels(
+                inverse=np.empty(size, np.float32),
+                seen=np.empty(size, np.int32),
+                first_run=np.empty(k.height + 1, np.int32),
+                ends=np.empty(k.height * k.width, np.int32),
+                channels=np.empty((3, *size), np.uint8),
+            )
+        return self._pixels_by_size[size]
 
 
 def _starts(lengths: list[int]) -> NDArray[np.int64]:
