@@ -17,7 +17,7 @@ class Trajectory:
     positions: FloatArray
     velocities: FloatArray
 
-    @property
+    @cached_property
     def duration(self) -> float:
         """Time of the last sample, s."""
         return float(self.times[-1])

@@ -1,5 +1,6 @@
 """Builds a world: physics settings, fixed bodies, collision filters, and the cable in its socket."""
 
+import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -10,6 +11,7 @@ from scipy.spatial.transform import RigidTransform, Rotation, Slerp
 from regrasp.interfaces.cell import Box, KnownCell, Socket
 from regrasp.interfaces.hidden_world import HiddenWorld
 from regrasp.interfaces.scene import EARTH_GRAVITY, Gravity, Obstacle, Prop
+from regrasp.interfaces.wall_time import move_time
 from regrasp.sim.cable.cable import CableBody
 from regrasp.sim.cable.fixtures import BodyLink, Hold
 from regrasp.sim.render.fiducials import compound_visual, tag_boxes
@@ -106,11 +108,15 @@ def lay_cable(
     s = s * s * (3 - 2 * s)
     way = RigidTransform.from_components(np.outer(1 - s, start.translation) + np.outer(s, goal.translation), turn(s))
     positions, quaternions = way.translation.tolist(), way.rotation.as_quat().tolist()
+    simulating = 0.0
     for i in range(steps + round(parameters.settle_seconds / step)):
         if i < steps:
             hold.move(positions[i], quaternions[i])
         cable.apply_springs()
+        began = time.perf_counter()
         p.stepSimulation(physicsClientId=client)
+        simulating += time.perf_counter() - began
+    move_time("physics", simulating)
     return hold
 
 

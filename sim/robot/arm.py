@@ -86,7 +86,10 @@ class SimArm:
         self._gains = [parameters.position_gain] * 6, [parameters.velocity_gain] * 6, STALL_TORQUES.tolist()
         self._trajectory: Trajectory | None = None
         self._started = 0.0
-        self._servo: FloatArray = np.array(spec.sleep, float)
+        self._servo: FloatArray = np.array(spec.sleep, float)  # where the servos stand, rad
+        self._target = self._servo.copy()  # where they were told to go, rad
+        self._next_q, self._next_v = np.empty(6), np.empty(6)
+        self._command = np.empty((2, 6))  # the same for PyBullet, and the velocities: URDF signs, rad and rad/s
         self.place(self._servo)
         self.gripper = SimGripper(
             client, self.body, self.links, self.now, hidden, rng, gripper_parameters or GripperParameters()
@@ -171,10 +174,11 @@ class SimArm:
         if self._trajectory is not None:
             t = self.now() + self._dt - self._started
             q, v = self._trajectory.sample(t)
-            ended, q, v = _servo_target(self._target, q, v, t >= self._trajectory.duration, self._dt)
+            over = t >= self._trajectory.duration
+            ended = _servo_target(self._target, q, v, over, self._dt, self._next_q, self._next_v)
             if ended:
                 self._trajectory = None
-            self._drive(q, v)
+            self._drive(self._next_q, self._next_v)
         elif self._late_joints and self._late(self._target).any():
             self._drive(self._target, np.zeros(6))
         if self._steps * self._dt >= self.gripper.due:
@@ -182,15 +186,16 @@ class SimArm:
         self._steps += 1
 
     def _drive(self, q: FloatArray, v: FloatArray) -> None:
-        self._late_joints, self._servo, v = _servo_command(self._servo, q, v, self._speed_share, self._dt)
-        self._target = q
+        shares, offsets = self._speed_share, self.offsets
+        self._late_joints = _servo_command(self._servo, q, v, shares, offsets, self._dt, self._target, self._command)
+        positions, velocities = self._command.tolist()
         position_gains, velocity_gains, torques = self._gains
         p.setJointMotorControlArray(
             self.body,
             self.joints,
             p.POSITION_CONTROL,
-            targetPositions=(JOINT_SIGNS * (self._servo + self.offsets)).tolist(),
-            targetVelocities=(JOINT_SIGNS * v).tolist(),
+            targetPositions=positions,
+            targetVelocities=velocities,
             positionGains=position_gains,
             velocityGains=velocity_gains,
             forces=torques,
@@ -204,7 +209,7 @@ class SimArm:
     def place(self, q: FloatArray) -> None:
         """Set the joints to `q` (6,) rad at once, for the start of a run and for pictures without physics."""
         self._reset_joints(q + self.offsets)
-        self._servo = q
+        self._servo[:] = q
         self._drive(q, np.zeros(6))
 
     def _reset_joints(self, q: FloatArray) -> None:
@@ -228,16 +233,21 @@ class SimArm:
 
 @numba.njit(cache=True)
 def _servo_target(
-    before: FloatArray, q: FloatArray, v: FloatArray, over: bool, dt: float
-) -> tuple[bool, FloatArray, FloatArray]:
-    """The servos' next targets, (6,) rad and rad/s, on the way from `before` (6,) rad to a trajectory's `q` and `v`.
+    before: FloatArray,
+    q: FloatArray,
+    v: FloatArray,
+    over: bool,
+    dt: float,
+    position: FloatArray,
+    velocity: FloatArray,
+) -> bool:
+    """Write the servos' next targets, (6,) rad and rad/s, from `before` (6,) rad to a trajectory's `q` and `v`.
 
     A servo turns no faster than its rated speed; it follows a faster trajectory late. `over`: the trajectory's time is
-    over. The first value says whether the servos are at its end, too.
+    over. Says whether the servos are at its end, too.
     """
     reach = MAX_JOINT_SPEED * dt
     ended = over and np.max(np.abs(q - before)) <= reach
-    position, velocity = np.empty(6), np.empty(6)
     for i in range(6):
         wanted = q[i] - before[i]
         step = min(max(wanted, -reach), reach)
@@ -246,25 +256,36 @@ def _servo_target(
             velocity[i] = step / dt
         else:
             velocity[i] = 0.0 if ended else v[i]
-    return ended, position, velocity
+    return ended
 
 
 @numba.njit(cache=True)
 def _servo_command(
-    servo: FloatArray, q: FloatArray, v: FloatArray, speed_share: FloatArray, dt: float
-) -> tuple[bool, FloatArray, FloatArray]:
-    """What the servos, which stand at `servo` (6,) rad, do next towards `q` (6,) rad with velocities `v` (6,) rad/s.
+    servo: FloatArray,
+    q: FloatArray,
+    v: FloatArray,
+    speed_share: FloatArray,
+    offsets: FloatArray,
+    dt: float,
+    target: FloatArray,
+    command: FloatArray,
+) -> bool:
+    """Move the `servo` (6,) rad towards `q` (6,) rad with velocities `v` (6,) rad/s, and write down what that is.
 
-    A slow joint's servo goes as far as it can. The first value says whether any is late.
+    A slow joint's servo goes as far as it can. Writes `q` to `target` (6,), and to `command` (2, 6) the positions and
+    velocities by the URDF's signs. Says whether any servo is late.
     """
-    late, position, velocity = False, np.empty(6), np.empty(6)
+    late = False
     for i in range(6):
         reach = speed_share[i] * MAX_JOINT_SPEED * dt
-        position[i], velocity[i] = q[i], v[i]
+        position, velocity = q[i], v[i]
         if abs(q[i] - servo[i]) > reach + 1e-9:
-            late, velocity[i] = True, 0.0
-            position[i] = servo[i] + min(max(q[i] - servo[i], -reach), reach)
-    return late, position, velocity
+            late, velocity = True, 0.0
+            position = servo[i] + min(max(q[i] - servo[i], -reach), reach)
+        target[i], servo[i] = q[i], position
+        command[0, i] = JOINT_SIGNS[i] * (position + offsets[i])
+        command[1, i] = JOINT_SIGNS[i] * velocity
+    return late
 
 
 def _camera_offset(cell: Cell, arm: ArmName) -> tuple[float, float, float] | None:

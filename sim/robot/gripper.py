@@ -1,6 +1,6 @@
 """The ViperX's gripper: two coupled fingers that hold by friction alone, and their noisy encoder."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -44,7 +44,7 @@ class SimGripper:
         self._spec, self._errors, self._parameters = hidden.gripper, hidden.errors, parameters
         self._fingers = (links["left_finger_link"], links["right_finger_link"])
         self.pads = (links["left_pad"], links["right_pad"])
-        self._noise = np.random.default_rng(int(rng.integers(2**31)))
+        self._noise = _noise(hidden.errors.finger_noise, int(rng.integers(2**31)))
         self._build(links["gripper_prop_link"])
         self._gap_command = parameters.closed_gap
         self._force: float | None = None
@@ -100,7 +100,7 @@ class SimGripper:
         half = self._errors.finger_backlash / 2
         gap = self.true_gap()
         self._backlash_gap = min(max(self._backlash_gap, gap - half), gap + half)
-        noise = self._noise.normal(0.0, self._errors.finger_noise)
+        noise = next(self._noise)
         step = self._errors.finger_resolution
         return GripperReading(self._now(), max(0.0, round((self._backlash_gap + noise) / step) * step))
 
@@ -168,3 +168,10 @@ class SimGripper:
                 maxVelocity=self._spec.speed,
                 physicsClientId=self._client,
             )
+
+
+def _noise(deviation: float, seed: int, block: int = 256) -> Iterator[float]:
+    """Normal noise; numbers that are drawn `block` at a time cost a tenth of those that are drawn one by one."""
+    rng = np.random.default_rng(seed)
+    while True:
+        yield from rng.normal(0.0, deviation, block).tolist()
