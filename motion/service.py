@@ -5,6 +5,7 @@ latency on the simulated clock.
 """
 
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -62,6 +63,14 @@ class Motion(PlanningScene):
         self.planner = plan
         self.execution = Execution(arms, grippers, clock, known.latencies.plan, parameters.execution)
         self._clock, self._seed = clock, seed
+
+    def warm_up(self) -> None:
+        """Try a grasp of the plugged connector in thought: compiled functions are loaded now, not in a tick."""
+        known = self.known
+        plugged = known.socket(known.plugged_into).world_from_plug(known.connector.length)
+        for arm in self.arms:
+            with suppress(PlanningError):
+                self._approaches(arm, self.model(arm), plugged, 0.0)
 
     def move(self, arm: str, goals: FloatArray, *, margin: float | None = None, tight: bool = True) -> MotionTask:
         """Plan a path to one of the goals (n, 6) rad and follow it, `margin` m from everything (default: as set).

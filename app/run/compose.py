@@ -58,6 +58,7 @@ def build_services(world: World, seed: int, log: Any) -> Services:
 def assemble(scenario: Scenario, world: World, seed: int, log: Any) -> Episode:
     """Services with the scenario's software faults, the tree on an empty blackboard, its attempts and the judge."""
     services = build_services(world, seed, log)
+    services.motion.warm_up()
     break_services(services, world.faults, world.now)
     py_trees.blackboard.Blackboard.clear()
     tree = py_trees.trees.BehaviourTree(load_tree(scenario.tree, LEAVES, scenario.inputs))

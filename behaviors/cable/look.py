@@ -18,6 +18,8 @@ from regrasp.perception.pose.estimate import Estimate
 if TYPE_CHECKING:
     from scipy.spatial.transform import RigidTransform
 
+    from regrasp.motion.scene.collision import CollisionModel
+
 
 @dataclass(frozen=True)
 class LookParameters:
@@ -35,14 +37,13 @@ class LookLeaf(HandLeaf):
 
     view: ClassVar[LookParameters] = LookParameters()
 
-    def view_goals(self, world_from_camera: "RigidTransform") -> NDArray[np.float64]:
-        """Free joint vectors (n, 6) rad of the camera arm that bring its camera there."""
+    def view_goals(self, world_from_camera: "RigidTransform", model: "CollisionModel") -> NDArray[np.float64]:
+        """Joint vectors (n, 6) rad of the camera arm that bring its camera there and are free in its `model`."""
         from regrasp.interfaces.cell import WristMount
 
         motion = self.services.motion
         mount = self.services.known.camera("wrist").mount
         assert isinstance(mount, WristMount)
-        model = motion.model(CAMERA_ARM)
         views = motion.kinematics[CAMERA_ARM].ik_view(world_from_camera, mount.wrist_from_camera)
         return np.array([q for q in views if model.free(q, self.view.margin)]).reshape(-1, 6)
 
@@ -55,13 +56,14 @@ class LookLeaf(HandLeaf):
         It looks from another side than the lines of sight `taken`, unit vectors (3,) in the world. `connector` is
         world_from_connector. Raises PlanningError when there is none.
         """
+        model = self.services.motion.model(CAMERA_ARM)
         half = 0.5 * self.services.known.connector.length
         points = connector.apply([[-half, 0.0, 0.0], [0.0, 0.0, 0.0], [half, 0.0, 0.0]])
         for view in closer_views(connector, self.view.close_views):
             sight = view.rotation.apply([0.0, 0.0, 1.0])
             if any(float(sight @ other) > self.view.max_cosine for other in taken):
                 continue
-            if self.services.motion.sees(view, points) and len(goals := self.view_goals(view)):
+            if self.services.motion.sees(view, points) and len(goals := self.view_goals(view, model)):
                 return view, goals
         raise PlanningError(CauseCode.OUT_OF_REACH, "no free place from which the whole connector shows")
 

@@ -145,9 +145,10 @@ class SpiralSearch(LookLeaf):
         """Joints (n, 6) rad for the first view that can be reached. Raises PlanningError when there is none."""
         from scipy.spatial.transform import RigidTransform
 
+        model = self.services.motion.model(CAMERA_ARM)
         for view, approach in product(views, self.parameters.approaches):
             pose = view * RigidTransform.from_translation([0.0, 0.0, approach])
-            goals = self.view_goals(pose)
+            goals = self.view_goals(pose, model)
             if len(goals):
                 return goals
         raise PlanningError(CauseCode.OUT_OF_REACH, "no free place to look from")

@@ -14,7 +14,7 @@ from eaik.IK_HP import HPRobot
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
-from regrasp.interfaces.arrays import FloatArray
+from regrasp.interfaces.arrays import FloatArray, Mask
 from regrasp.interfaces.wall_time import counts_as
 from regrasp.motion.robots.poses import multiply, rotation_matrix
 
@@ -122,10 +122,13 @@ def _with_straight_wrist(base: FloatArray, raw: FloatArray, target: FloatArray) 
 @nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
 def _is_new(row: FloatArray, rows: FloatArray, count: int, distinct: float) -> bool:
     """Whether no row of the first `count` differs from this one by `distinct` rad at most in each joint."""
-    same = False
     for other in range(count):
-        same = same or np.max(np.abs(wrap(row - rows[other]))) <= distinct
-    return not same
+        joint = 0
+        while joint < len(row) and abs((row[joint] - rows[other, joint] + np.pi) % (2 * np.pi) - np.pi) <= distinct:
+            joint += 1
+        if joint == len(row):
+            return False
+    return True
 
 
 @nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
@@ -133,9 +136,9 @@ def _solutions(
     base: FloatArray, raw: FloatArray, target: FloatArray, max_distance: float, max_angle: float, distinct: float
 ) -> FloatArray:
     """The solver's answers `raw` (n, 6) that bring the tool to a target (4, 4), wrapped, without repetitions."""
-    out, count = np.empty_like(raw), 0
+    out, count, wrapped = np.empty_like(raw), 0, wrap(raw)
     for row in range(raw.shape[0]):
-        q = wrap(raw[row])
+        q = wrapped[row]
         if not _reaches(base, q, target, max_distance, max_angle):
             q = _with_straight_wrist(base, q, target)
             if not _reaches(base, q, target, max_distance, max_angle):
@@ -208,9 +211,11 @@ class ArmKinematics:
         mount = wrist_from_camera.as_matrix()
         if mount[0, 2] < 1 - 1e-6:
             raise ValueError(f"the camera must look along the wrist link's x axis, not along {mount[:3, 2]}")
-        found = [q for q in self._view_solutions(wanted, mount) if self._sees(q, wanted, mount)]
-        found.sort(key=lambda q: -float(self._camera_up(q, mount) @ -wanted[:3, 1]))
-        return np.asarray(_within_limits(self._distinct(found)))
+        limits = self._parameters
+        found = np.array(list(self._view_solutions(wanted, mount))).reshape(-1, 6)
+        near, upright = _views(self.base, found, wanted, mount, limits.camera_position, np.sin(limits.camera_axis))
+        order = np.argsort(-upright[near], kind="stable")
+        return np.asarray(_within_limits(_distinct(found[near][order], limits.distinct)))
 
     def _solve(self, target: FloatArray) -> FloatArray:
         """`ik` of a (4, 4) matrix without regard to the joint limits."""
@@ -223,37 +228,78 @@ class ArmKinematics:
         tool_from_mount = mount.copy()
         tool_from_mount[0, 3] -= ORIGINS[5, 0] + TOOL_OFFSET[0]
         tool_target = wanted @ np.linalg.inv(tool_from_mount)
-        for start in self._parameters.roll_starts:
+        limits = self._parameters
+        tolerances = (limits.position, limits.angle, limits.distinct)
+        for start in limits.roll_starts:
             for q in self._solve(_rolled(tool_target, wanted, start)):
                 roll = start
-                for _ in range(self._parameters.roll_iterations):
-                    if abs(q[5]) < self._parameters.roll:
+                for _ in range(limits.roll_iterations):
+                    if abs(q[5]) < limits.roll:
                         yield np.append(q[:5], 0.0)
                         break
                     roll -= q[5]
-                    branches = self._solve(_rolled(tool_target, wanted, roll))
-                    if not len(branches):
+                    target, in_base = _rolled_target(self._base_inverse, tool_target, wanted, roll)
+                    raw = np.array(self._solver.IK(in_base).Q, float).reshape(-1, 6)
+                    q, reached = _nearest_solution(self.base, raw, target, q, *tolerances)
+                    if not reached:
                         break
-                    q = branches[_nearest(branches, q)]
 
-    def _sees(self, q: FloatArray, wanted: FloatArray, mount: FloatArray) -> bool:
-        camera = self.link_frames(q)[5] @ mount
-        near = float(np.linalg.norm(camera[:3, 3] - wanted[:3, 3])) < self._parameters.camera_position
-        cross = float(np.linalg.norm(np.cross(camera[:3, 2], wanted[:3, 2])))
-        return near and cross < np.sin(self._parameters.camera_axis) and float(camera[:3, 2] @ wanted[:3, 2]) > 0
 
-    def _camera_up(self, q: FloatArray, mount: FloatArray) -> FloatArray:
-        up: FloatArray = -(self.link_frames(q)[5] @ mount)[:3, 1]
-        return up
+@nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
+def _distinct(rows: FloatArray, distinct: float) -> FloatArray:
+    """The rows (n, 6) without repetitions, order kept."""
+    kept, count = np.empty_like(rows), 0
+    for row in rows:
+        if _is_new(row, kept, count, distinct):
+            kept[count] = row
+            count += 1
+    return kept[:count]
 
-    def _distinct(self, rows: list[FloatArray]) -> FloatArray:
-        """The rows as (n, 6) without repetitions, order kept."""
-        kept, count = np.empty((len(rows), 6)), 0
-        for row in rows:
-            if _is_new(row, kept, count, self._parameters.distinct):
-                kept[count] = row
-                count += 1
-        return kept[:count]
+
+@nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
+def _views(
+    base: FloatArray, rows: FloatArray, wanted: FloatArray, mount: FloatArray, max_distance: float, max_sine: float
+) -> tuple[Mask, FloatArray]:
+    """Which joint vectors (n, 6) bring the camera to `wanted`, and the cosines (n,) between its up and the wanted."""
+    near, upright = np.empty(len(rows), np.bool_), np.empty(len(rows))
+    for n in range(len(rows)):
+        camera = multiply(link_frames_in(base, rows[n])[5], mount)
+        distance, sine, cosine, up = 0.0, 0.0, 0.0, 0.0
+        for i in range(3):
+            j, k = (i + 1) % 3, (i + 2) % 3
+            distance += (camera[i, 3] - wanted[i, 3]) ** 2
+            sine += (camera[j, 2] * wanted[k, 2] - camera[k, 2] * wanted[j, 2]) ** 2
+            cosine += camera[i, 2] * wanted[i, 2]
+            up += camera[i, 1] * wanted[i, 1]
+        near[n] = distance < max_distance**2 and sine < max_sine**2 and cosine > 0.0
+        upright[n] = up
+    return near, upright
+
+
+@nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
+def _rolled_target(
+    base_inverse: FloatArray, tool_target: FloatArray, wanted: FloatArray, roll: float
+) -> tuple[FloatArray, FloatArray]:
+    """`_rolled` in the world and in the base frame."""
+    target = _rolled(tool_target, wanted, roll)
+    return target, multiply(base_inverse, target)
+
+
+@nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
+def _nearest_solution(
+    base: FloatArray,
+    raw: FloatArray,
+    target: FloatArray,
+    q: FloatArray,
+    max_distance: float,
+    max_angle: float,
+    distinct: float,
+) -> tuple[FloatArray, bool]:
+    """The one of `_solutions` that is nearest to `q` (6,) rad, and whether there is any."""
+    branches = _solutions(base, raw, target, max_distance, max_angle, distinct)
+    if len(branches) == 0:
+        return q, False
+    return branches[_nearest(branches, q)], True
 
 
 @nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
@@ -271,7 +317,10 @@ def _nearest(branches: FloatArray, q: FloatArray) -> int:
     """The branch whose first five joints are nearest to those of `q` and whose last joint is nearest to 0."""
     best, least = 0, np.inf
     for row in range(len(branches)):
-        off = np.sum(np.abs(wrap(branches[row, :5] - q[:5]))) + abs(branches[row, 5])
+        off = 0.0
+        for joint in range(5):
+            off += abs((branches[row, joint] - q[joint] + np.pi) % (2 * np.pi) - np.pi)
+        off += abs(branches[row, 5])
         if off < least:
             best, least = row, off
     return best

@@ -111,7 +111,7 @@ def observe(frame: RgbdFrame, found: BlobMask, scale: float, stereo: Stereo, par
         stereo.noise * z**2 + parameters.quantization_noise,
         rays,
         np.full(len(rays), parameters.silhouette_deviation / k.fx),
-        silhouette.occluded[some],
+        silhouette.occluded[some].copy(),
         min(1.0, independent),
         min(1.0, parameters.independent_silhouette_share * len(silhouette.pixels) / max(1, len(rays))),
     )

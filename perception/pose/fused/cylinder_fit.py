@@ -101,12 +101,13 @@ def fit_cylinder(
 def thinned(observation: Observation, count: int) -> Observation:
     """The observation with about `count` points and as many rays; each also counts for those left out."""
     p, r = 1 + len(observation.points) // count, 1 + len(observation.rays) // count
+    # Copies, as the fit is compiled for arrays without gaps.
     return Observation(
-        observation.points[::p],
-        observation.point_deviations[::p],
-        observation.rays[::r],
-        observation.ray_deviations[::r],
-        observation.occluded[::r],
+        observation.points[::p].copy(),
+        observation.point_deviations[::p].copy(),
+        observation.rays[::r].copy(),
+        observation.ray_deviations[::r].copy(),
+        observation.occluded[::r].copy(),
         observation.point_share * p,
         observation.ray_share * r,
     )
