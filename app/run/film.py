@@ -1,5 +1,9 @@
 """Films a run: overview, rear and wrist camera side by side, the active leaf and the clock."""
 
+import sys
+from collections import deque
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -7,12 +11,17 @@ from types import TracebackType
 from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from regrasp.app.run.video import OVERVIEW_SIZE, RgbImage, VideoWriter, compose
 from regrasp.interfaces.cell import FixedMount
 from regrasp.interfaces.frame import Intrinsics
 from regrasp.interfaces.wall_time import counts_as
+from regrasp.sim.render.picture import LightState
+from regrasp.sim.render.renderer import Renderer, make_renderer
 from regrasp.sim.world import World
+
+Preview = Callable[[Renderer], RgbImage] | None
 
 
 @dataclass(frozen=True)
@@ -25,47 +34,83 @@ class FilmParameters:
     )
     shrink: int = 2  # of the cameras' pictures, which are shown this much smaller
     overview_fov: float = 0.95  # rad, horizontal; the whole cell is in the picture
+    max_waiting: int = 8  # frames that wait to be drawn before the run waits for them
+    # s after which the run's thread must let the film's go on; Python's own 5 ms would add up to more than the drawing
+    switch_interval: float = 1e-4
 
 
 class Film:
-    """Films a world while the context is open; with None as the path it does nothing."""
+    """Films a world while the context is open; with None as the path it does nothing.
+
+    A thread of its own draws and encodes the frames, with a renderer of its own, while the run goes on: `show` only
+    notes what is to be seen.
+    """
 
     def __init__(self, path: Path | None, world: World, parameters: FilmParameters = FilmParameters()) -> None:
         self._path, self._world, self._parameters = path, world, parameters
         self._stack = ExitStack()
         self._writer: VideoWriter | None = None
+        self._renderer: Future[Renderer]
+        self._waiting: deque[Future[None]] = deque()
         self._frames = 0
 
     def __enter__(self) -> Self:
         if self._path is not None:
             self._writer = self._stack.enter_context(VideoWriter(self._path, self._parameters.rate))
+            interval = sys.getswitchinterval()
+            self._stack.callback(sys.setswitchinterval, interval)
+            sys.setswitchinterval(self._parameters.switch_interval)
+            self._thread = self._stack.enter_context(ThreadPoolExecutor(1, "film"))
+            self._renderer = self._thread.submit(make_renderer, self._world.visuals, self._world.renderer.name)
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._stack.close()
+        with self._stack:
+            if self._writer is not None:
+                self._wait(0)
+                self._thread.submit(self._renderer.result().close).result()
 
     @counts_as("film")
     def show(self, leaf: str) -> None:
-        """Write a frame of the present instant if one is due; `leaf` is the active leaf's name."""
+        """Take a frame of the present instant if one is due; `leaf` is the active leaf's name."""
         world = self._world
         if self._writer is None or world.now() * self._parameters.rate < self._frames - 1e-6:
             return
         self._frames += 1
-        rear, wrist = (world.cameras[name].preview(self._parameters.shrink) for name in ("rear", "wrist"))
+        previews = [world.cameras[name].deferred_preview(self._parameters.shrink) for name in ("rear", "wrist")]
         lines = [
             f"{world.now():6.1f} s",
             f"{leaf}",
             f"gravity: {world.gravity}",
             f"renderer: {world.renderer.name}",
         ]
-        overview = render_overview(world, self._parameters)
-        self._writer.write(compose(overview, rear, wrist, lines))
+        poses, light = world.visuals.deferred_snapshot(), world.light
+        self._waiting.append(self._thread.submit(self._draw, self._writer, poses, light, previews, lines))
+        self._wait(self._parameters.max_waiting)
+
+    def _draw(
+        self,
+        writer: VideoWriter,
+        poses: Callable[[], NDArray[np.float32]],
+        light: LightState,
+        previews: list[Preview],
+        lines: list[str],
+    ) -> None:
+        renderer = self._renderer.result()
+        rear, wrist = (None if preview is None else preview(renderer) for preview in previews)
+        writer.write(compose(render_overview(renderer, poses(), light, self._parameters), rear, wrist, lines))
+
+    def _wait(self, count: int) -> None:
+        """Wait until no more than `count` frames wait to be drawn. Raises what went wrong in the thread."""
+        while len(self._waiting) > count:
+            self._waiting.popleft().result()
 
 
-def render_overview(world: World, parameters: FilmParameters = FilmParameters()) -> RgbImage:
-    """The whole cell from behind and above the right arm: (480, 856, 3) uint8 RGB."""
-    pose = parameters.overview.world_from_camera
+def render_overview(
+    renderer: Renderer, poses: NDArray[np.float32], light: LightState, parameters: FilmParameters = FilmParameters()
+) -> RgbImage:
+    """The whole cell from behind and above the right arm: (480, 856, 3) uint8 RGB; `poses` are a `Visuals.snapshot`."""
     intrinsics = Intrinsics.from_fov(*OVERVIEW_SIZE, parameters.overview_fov)
-    return np.asarray(world.renderer.render_color(world.visuals.snapshot(), pose, intrinsics, world.light))
+    return np.asarray(renderer.render_color(poses, parameters.overview.world_from_camera, intrinsics, light))

@@ -103,17 +103,24 @@ class SimCamera:
             self._frame, self._ids = self._draw(newest)
         return self._frame
 
-    def preview(self, shrink: int) -> NDArray[np.uint8] | None:
-        """The colours (H / shrink, W / shrink, 3) of `latest()`, for a film; depth is not drawn for it."""
-        newest = self._newest()
+    def deferred_preview(self, shrink: int) -> Callable[[Renderer], NDArray[np.uint8]] | None:
+        """What gives the colours (H / shrink, W / shrink, 3) of the present `latest()`; None before it.
+
+        It may be called later and in another thread, with a renderer of its own. Depth is not drawn for it.
+        """
+        newest, read = self._newest(), self._frame
         if newest is None:
             return None
-        if self._frame is not None and self._frame.number == newest.number:  # somebody has read it
-            return np.asarray(
-                cv2.resize(self._frame.rgb, None, fx=1 / shrink, fy=1 / shrink, interpolation=cv2.INTER_AREA)
-            )
-        small, pose = self._intrinsics.shrunk(shrink), newest.world_from_camera()
-        return _darkened(self._renderer.render_color(newest.poses(), pose, small, newest.light), newest.transmission)
+        if read is not None and read.number == newest.number:  # somebody has read it
+            rgb, scale = read.rgb, 1 / shrink
+            return lambda _: np.asarray(cv2.resize(rgb, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA))
+        small = self._intrinsics.shrunk(shrink)
+
+        def draw(renderer: Renderer) -> NDArray[np.uint8]:
+            rgb = renderer.render_color(newest.poses(), newest.world_from_camera(), small, newest.light)
+            return _darkened(rgb, newest.transmission)
+
+        return draw
 
     def _newest(self) -> _Exposure | None:
         """The newest exposure that can be read."""

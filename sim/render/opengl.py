@@ -12,7 +12,7 @@ from scipy.spatial.transform import RigidTransform
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.frame import Intrinsics
 from regrasp.sim.render.meshes import SharedMesh, shared_meshes
-from regrasp.sim.render.picture import BACKGROUND, Z_FAR, Z_NEAR, Image, LightState
+from regrasp.sim.render.picture import BACKGROUND, Z_FAR, Z_NEAR, Image, LightState, RendererName
 from regrasp.sim.render.shaders import (
     BACKDROP_FRAGMENT,
     BACKDROP_VERTEX,
@@ -45,7 +45,7 @@ class GlRenderer:
     Raises whatever moderngl raises where no EGL context can be made.
     """
 
-    name = "moderngl"
+    name: RendererName = "moderngl"
 
     def __init__(self, visuals: Visuals, shadow_parameters: ShadowParameters = DEFAULT_SHADOWS) -> None:
         self.visuals, self._parameters = visuals, shadow_parameters

@@ -1,12 +1,16 @@
 """A renderer's light and its picture."""
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Z_NEAR, Z_FAR = 0.02, 10.0  # m along the optical axis: clip planes, nothing outside them is drawn
 BACKGROUND = (0.72, 0.74, 0.78)  # RGB: the lab's distant wall
+
+
+RendererName = Literal["software", "moderngl"]
 
 
 @dataclass(frozen=True, eq=False)

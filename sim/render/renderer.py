@@ -1,26 +1,24 @@
 """The renderers' common protocol, and the choice between them."""
 
-from typing import Literal, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.frame import Intrinsics
-from regrasp.sim.render.picture import Image, LightState
+from regrasp.sim.render.picture import Image, LightState, RendererName
 from regrasp.sim.render.software import SoftwareRenderer
 from regrasp.sim.render.visuals import Visuals
 
 __all__ = ["Image", "LightState", "Renderer", "RendererName", "make_renderer"]
-
-RendererName = Literal["software", "moderngl"]
 
 
 class Renderer(Protocol):
     """Draws the items of `visuals`. `device` says in words what draws."""
 
     visuals: Visuals
-    name: str
+    name: RendererName
     device: str
 
     def render(

@@ -13,7 +13,7 @@ _HALF, _ONE, _ZERO = np.float32(0.5), np.float32(1.0), np.float32(0.0)
 _PI, _PER_PI = np.float32(np.pi), np.float32(1.0 / np.pi)
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath={"contract"})
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
 def sine(x: np.float32) -> np.float32:
     """The sine to 1e-4 for |x| < 1000, by a polynomial of its angle to the next multiple of pi."""
     half_turns = (x * _PER_PI + _ROUND) - _ROUND
@@ -24,7 +24,7 @@ def sine(x: np.float32) -> np.float32:
     return y * (_ONE - np.float32(2.0) * odd * odd)
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def find_runs(seen: NDArray[np.int32], first_run: NDArray[np.int32], ends: NDArray[np.int32]) -> None:
     """Write where the runs of pixels that see one triangle end, row after row.
 
@@ -44,7 +44,7 @@ def find_runs(seen: NDArray[np.int32], first_run: NDArray[np.int32], ends: NDArr
     first_run[height] = run
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def write_normals(
     corners: NDArray[np.float64],
     triangles: NDArray[np.int32],
@@ -65,7 +65,7 @@ def write_normals(
                 _write_normal(corners, triangles[t], normals, planes[t])
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _write_normal(
     corners: NDArray[np.float64], triangle: NDArray[np.int32], normals: NDArray[np.float32], out: NDArray[np.float32]
 ) -> None:
@@ -84,7 +84,7 @@ def _write_normal(
             )
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath={"contract"})
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
 def shade(
     inverse: NDArray[np.float32],
     seen: NDArray[np.int32],
@@ -124,13 +124,13 @@ def shade(
             _paint(seen[v], runs, item_of, colors[:, channel], background[channel], grain, channels[channel, v])
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath={"contract"})
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
 def _invert(inverse: NDArray[np.float32], depth: NDArray[np.float32]) -> None:
     for u in range(len(depth)):
         depth[u] = _ONE / inverse[u]
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath={"contract"})
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
 def _grain(depth: NDArray[np.float32], rays: NDArray[np.float32], v: int, grain: NDArray[np.float32]) -> None:
     """Faint grain, fixed in the world, so that surfaces are not of one colour."""
     row = np.float32(v)
@@ -145,7 +145,7 @@ def _grain(depth: NDArray[np.float32], rays: NDArray[np.float32], v: int, grain:
         grain[u] = _ONE + np.float32(0.03) * waves
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath={"contract"})
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
 def _follow(
     depth: NDArray[np.float32],
     rays: NDArray[np.float32],
@@ -166,7 +166,7 @@ def _follow(
         z[u] = oz + far * (az * column + bz)
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath={"contract"})
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
 def _face(
     seen: NDArray[np.int32],
     runs: NDArray[np.int32],
@@ -202,7 +202,7 @@ def _face(
         u = end
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath={"contract"})
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
 def _add_product(
     out: NDArray[np.float32], factor: np.float32, far: NDArray[np.float32], a: np.float32, b: np.float32, begin: int
 ) -> None:
@@ -210,7 +210,7 @@ def _add_product(
         out[i] += factor * (far[i] * (a * np.float32(begin + i) + b))
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath={"contract"})
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
 def _find_texels(x: NDArray[np.float32], y: NDArray[np.float32], size: np.int32, texel: NDArray[np.int32]) -> None:
     """Write the number of the upper left of the four texels about x, y, and leave in x, y how far beyond it they lie.
 
@@ -234,7 +234,7 @@ def _find_texels(x: NDArray[np.float32], y: NDArray[np.float32], size: np.int32,
         texel[u] += np.int32(row * size)
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath={"contract"})
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
 def _light(
     x: NDArray[np.float32],
     y: NDArray[np.float32],
@@ -255,7 +255,7 @@ def _light(
         x[u] = upper + y[u] * (lower - upper)
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath={"contract"})
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
 def _brighten(
     lit: NDArray[np.float32],
     facing: NDArray[np.float32],
@@ -268,7 +268,7 @@ def _brighten(
         grain[u] *= ambient + diffuse * lit[u] * cosine
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath={"contract"})
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
 def _paint(
     seen: NDArray[np.int32],
     runs: NDArray[np.int32],
@@ -292,7 +292,7 @@ def _paint(
         u = end
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def read_out(
     inverse: NDArray[np.float32],
     seen: NDArray[np.int32],

@@ -12,7 +12,7 @@ from scipy.spatial.transform import RigidTransform
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.frame import Intrinsics
 from regrasp.sim.render.meshes import shared_meshes
-from regrasp.sim.render.picture import BACKGROUND, Z_FAR, Z_NEAR, Image, LightState
+from regrasp.sim.render.picture import BACKGROUND, Z_FAR, Z_NEAR, Image, LightState, RendererName
 from regrasp.sim.render.raster import draw_triangles, place_corners, project_corners
 from regrasp.sim.render.shading import find_runs, read_out, shade, write_normals
 from regrasp.sim.render.shadows import DEFAULT_SHADOWS, ShadowParameters, casters, light_from_world
@@ -44,8 +44,7 @@ class _Pixels:
 class SoftwareRenderer:
     """A `Renderer` of compiled loops: it finds the triangle that each pixel sees, then colours each pixel once."""
 
-    name = "software"
-
+    name: RendererName = "software"
     device = "compiled loops on one core"
 
     def __init__(self, visuals: Visuals, shadow_parameters: ShadowParameters = DEFAULT_SHADOWS) -> None:

@@ -1,3 +1,6 @@
+import sys
+import threading
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
@@ -6,6 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
+from regrasp.app.run import film as film_module
 from regrasp.app.run.film import Film, FilmParameters
 from regrasp.app.run.video import OVERVIEW_SIZE, SIZE
 from regrasp.sim.world import World
@@ -13,20 +17,36 @@ from regrasp.sim.world import World
 TICK = 0.05
 
 
-def a_world(rear: Any = None) -> Any:
+def a_world() -> Any:
     """As much of a world as a film looks at: it turns from black to green over two seconds."""
     world = SimpleNamespace(t=0.0, gravity="zero", light=None)
     world.now = lambda: world.t
-    world.visuals = SimpleNamespace(snapshot=lambda: None)
-    world.cameras = {name: SimpleNamespace(preview=lambda shrink: rear) for name in ("rear", "wrist")}
+    world.visuals = SimpleNamespace(deferred_snapshot=lambda: partial(float, world.t))
+    world.cameras = {name: SimpleNamespace(deferred_preview=lambda shrink: None) for name in ("rear", "wrist")}
+    world.renderer = SimpleNamespace(name="toy")
+    return world
 
-    def render_color(_poses: Any, _pose: Any, intrinsics: Any, _light: Any) -> Any:
+
+class ToyRenderer:
+    """Poses are a second here."""
+
+    def __init__(self, *_: Any) -> None:
+        self.thread = threading.get_ident()
+
+    def render_color(self, second: Any, _pose: Any, intrinsics: Any, _light: Any) -> Any:
+        if second > 100:
+            raise ZeroDivisionError
         rgb = np.zeros((intrinsics.height, intrinsics.width, 3), np.uint8)
-        rgb[..., 1] = min(255, int(100 * world.t))
+        rgb[..., 1] = min(255, int(100 * second))
         return rgb
 
-    world.renderer = SimpleNamespace(render_color=render_color, name="toy")
-    return world
+    def close(self) -> None:
+        assert threading.get_ident() == self.thread
+
+
+@pytest.fixture(autouse=True)
+def _toy_renderer(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(film_module, "make_renderer", ToyRenderer)
 
 
 def green(path: Path) -> list[float]:
@@ -62,6 +82,21 @@ def test_a_film_cut_short_by_an_error_can_be_seen(tmp_path: Path) -> None:
 def test_without_a_path_nothing_is_drawn(tmp_path: Path) -> None:
     world = a_world()
     del world.renderer
+    threads = threading.active_count()
     with Film(None, cast(World, world)) as film:
         film.show("carry")
+        assert threading.active_count() == threads
     assert list(tmp_path.iterdir()) == []
+
+
+def test_an_error_while_drawing_ends_the_run_and_leaves_nothing_behind(tmp_path: Path) -> None:
+    world, threads, interval = a_world(), threading.active_count(), sys.getswitchinterval()
+    film = Film(tmp_path / "video.mp4", cast(World, world)).__enter__()
+    film.show("carry")
+    world.t = 101.0
+    film.show("carry")
+    with pytest.raises(ZeroDivisionError):
+        film.__exit__(None, None, None)
+    assert threading.active_count() == threads
+    assert sys.getswitchinterval() == interval
+    assert len(green(tmp_path / "video.mp4")) == 1

@@ -130,15 +130,19 @@ def test_the_same_frame_again_until_the_next_is_there(rig: Rig) -> None:
 
 
 def test_a_preview_is_the_newest_frame_made_smaller(rig: Rig) -> None:
-    assert rig.camera.preview(2) is None
+    renderer = make_renderer(rig.visuals)
+    assert rig.camera.deferred_preview(2) is None
     rig.move(0.05)
     rig.camera.expose()
     rig.move(-0.1)
     rig.time = 0.1
-    small, frame, again = rig.camera.preview(2), rig.camera.latest(), rig.camera.preview(2)
-    assert small is not None
+    draw, frame, shrink = rig.camera.deferred_preview(2), rig.camera.latest(), rig.camera.deferred_preview(2)
+    assert draw is not None
     assert frame is not None
-    assert again is not None
+    assert shrink is not None
+    rig.camera.expose()
+    rig.time = 0.2
+    small, again = draw(renderer), shrink(renderer)  # of the instant when they were asked for
     height, width = small.shape[:2]
     assert again.shape == small.shape
     assert (height, width) == (SPEC.height // 2, SPEC.width // 2)
@@ -147,9 +151,10 @@ def test_a_preview_is_the_newest_frame_made_smaller(rig: Rig) -> None:
     assert float((off > 12).mean()) < 0.02  # the ball's edge
     rig.camera.transmission = 0.5
     rig.camera.expose()
-    rig.time = 0.2
-    dark = rig.camera.preview(2)
-    assert dark is not None
+    rig.time = 0.3
+    draw = rig.camera.deferred_preview(2)
+    assert draw is not None
+    dark = draw(renderer)
     assert float(dark.mean()) < 0.6 * float(small.mean())
 
 

@@ -132,7 +132,7 @@ def test_the_rows_are_the_derivatives(in_image: float, to_camera: float, seed: i
         step = np.zeros(5)
         step[k] = 2e-5
         slope = (at(step)[1] - at(-step)[1]) / 4e-5
-        assert slope == pytest.approx(gradient[k], abs=0.1 * float(np.abs(gradient).max()))
+        assert slope == pytest.approx(gradient[k], abs=0.2 * float(np.abs(gradient).max()))
 
 
 def test_exact_observations_give_the_exact_pose() -> None:
