@@ -14,7 +14,7 @@ PARTS_HEADER = ("part", "ms per simulated s", "x physics", "floor")
 _FLOORS = {
     "physics": 1.0,
     "step loop": 0.23,
-    "rendering": 0.87,
+    "rendering": 0.40,
     "perception": 0.34,
     "planning": 0.18,
     "start": 0.07,

@@ -49,7 +49,19 @@ def environment(tmp_path_factory: pytest.TempPathFactory) -> Path:
     # What it requires is here already. A path in a .pth file brings no .pth files of its own, hence not our checkout.
     purelib = sysconfig.get_path("purelib", vars={"base": str(made)})
     Path(purelib, "required.pth").write_text(sysconfig.get_path("purelib"))
+    take_compiled(Path(purelib, "regrasp"))
     return made / "bin"
+
+
+def take_compiled(installed: Path) -> None:
+    """Copy what numba has compiled for this checkout, which takes a minute; it wants sources of the same times."""
+    for name in tracked():
+        source, target = ROOT / name, installed / name
+        if target.suffix == ".py" and target.is_file():
+            shutil.copystat(source, target)
+            (target.parent / "__pycache__").mkdir(exist_ok=True)
+            for compiled in (source.parent / "__pycache__").glob(f"{source.stem}.*.nb[ic]"):
+                shutil.copy2(compiled, target.parent / "__pycache__")
 
 
 @pytest.fixture
