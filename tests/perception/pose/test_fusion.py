@@ -84,8 +84,8 @@ def contradiction(one: Estimate, other: Estimate) -> float:
 
 
 def alike(one: Estimate, other: Estimate) -> None:
-    assert one.position == pytest.approx(other.position, abs=1e-7)
-    assert one.axis == pytest.approx(other.axis, abs=1e-7)
+    assert one.position == pytest.approx(other.position, abs=1e-6)
+    assert one.axis == pytest.approx(other.axis, abs=1e-6)
     assert one.covariance == pytest.approx(other.covariance, rel=1e-5, abs=1e-9)
 
 
