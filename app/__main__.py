@@ -3,6 +3,7 @@
 import io
 import os
 import sys
+import warnings
 
 from regrasp.app.interrupts import EXIT_INTERRUPTED, stoppable
 
@@ -14,6 +15,7 @@ EXIT_NO_READER = 141
 def main() -> None:
     """Run the command line; SIGTERM and SIGHUP end it as Ctrl-C does, with the record kept."""
     _open_streams()
+    warnings.formatwarning = _in_one_line
     with stoppable():
         _run()
 
@@ -35,6 +37,11 @@ def _run() -> None:
             raise
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # for what is flushed at exit
         sys.exit(EXIT_NO_READER)
+
+
+def _in_one_line(message: Warning | str, *_: object, **__: object) -> str:
+    """A warning without the place in our code and its source line, which say nothing to a user."""
+    return f"warning: {message}\n"
 
 
 def _open_streams() -> None:

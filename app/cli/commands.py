@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from regrasp.app.cli import calibrate, detector, perceive, records, run, scenarios, studies, trees
+from regrasp.app.cli import calibrate, detector, migrate, perceive, records, run, scenarios, studies, trees
 from regrasp.app.cli.options import EXIT_BAD_INPUT, EXIT_UNMET
 from regrasp.app.files.findings import Findings
 from regrasp.app.interrupts import EXIT_INTERRUPTED
@@ -18,6 +18,7 @@ COMMANDS = (  # in the order in which a newcomer uses them
     "replay",
     "diff",
     "scenarios",
+    "migrate",
     "trees",
     "study",
     "doctor",
@@ -65,6 +66,7 @@ app.add_typer(trees.app, name="trees")
 app.add_typer(studies.app, name="study")
 perceive.add_to(app)
 calibrate.add_to(app)
+migrate.add_to(app)
 detector.add_to(app)
 
 

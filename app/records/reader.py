@@ -14,7 +14,7 @@ from pydantic_core import from_json
 from regrasp.app.files.findings import Finding, Findings, shown
 from regrasp.app.records import folders
 from regrasp.app.records.record import leaf_at_work
-from regrasp.app.records.result import SCHEMA, NodeStatus, Result
+from regrasp.app.records.result import OLD_OUTCOMES, SCHEMA, NodeStatus, Result
 from regrasp.trees.wiring import MAX_TREE_DEPTH
 
 MAX_RESULT_BYTES, MAX_LINES_BYTES = 16 << 20, 64 << 20  # bytes of result.json, of each of the others: hours of a run
@@ -160,6 +160,8 @@ def _result(path: Path, found: list[Finding]) -> Result | None:
             raise ValueError(f"no 'schema' with a number; a result.json that this program reads has {SCHEMA}")
         if schema > SCHEMA:
             raise ValueError(f"schema {schema} is newer than {SCHEMA}, which this program reads; take a newer Regrasp")
+        if schema == 1:
+            value["outcome"] = OLD_OUTCOMES.get(str(value.get("outcome")), value.get("outcome"))
         result = _adapter(Result).validate_python(value)
         for number, attempt in enumerate(result.attempts):
             if attempt.path.count("/") > MAX_TREE_DEPTH:

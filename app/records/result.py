@@ -9,10 +9,11 @@ from typing import Any, Literal
 
 from regrasp.interfaces.cause import Cause
 
-Outcome = Literal["stowed", "safe_stop", "time_limit", "wall_limit", "interrupted", "internal_error"]
+Outcome = Literal["success", "failure", "time_limit", "wall_limit", "interrupted", "internal_error"]
 NodeStatus = Literal["RUNNING", "SUCCESS", "FAILURE", "INVALID"]
 DEFAULT_CASE = "default"  # name of the only case of a scenario that varies nothing
-SCHEMA = 1  # version of result.json; fields may be added without a new version, but none changes its meaning
+SCHEMA = 2  # version of result.json; fields may be added without a new version, but none changes its meaning
+OLD_OUTCOMES = {"stowed": "success", "safe_stop": "failure"}  # the words of schema 1, and of scenarios of its time
 
 _PACKAGES = (
     "regrasp",
@@ -136,7 +137,7 @@ class Result:
     succeeded: bool
     case: str = DEFAULT_CASE  # which of the scenario's cases, if its values vary
     cause: Cause | None = None
-    chain: tuple[Link, ...] | None = None  # None if the run ended stowed, or in no node
+    chain: tuple[Link, ...] | None = None  # None if the run ended in success, or in no node
     traceback: str | None = None  # of an internal_error
     expectations: tuple[Expectation, ...] = ()
     slips: tuple[Slip, ...] = ()

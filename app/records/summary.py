@@ -60,7 +60,7 @@ def limit_words(expectation: "Expectation") -> str:
     limit = _plain(expectation.limit)
     if expectation.name == "slips":
         return f"at least {limit}, all noticed"
-    return limit if expectation.name in ("outcome", "cause", "hidden") else f"at most {limit}"
+    return limit if expectation.name in ("outcome", "end", "cause", "hidden") else f"at most {limit}"
 
 
 def slip_lines(result: "Result") -> Iterator[str]:

@@ -137,10 +137,10 @@ def _loop(episode: Episode, scenario: Scenario, film: Film, on_tick: Progress, w
         on_tick(world.now(), leaf)
         raise_if_swallowed()
         if root.status is Status.SUCCESS:
-            return Ending("stowed")
+            return Ending("success")
         if root.status is Status.FAILURE:
             cause = attempts.cause() or (belief.causes[-1] if belief.causes else None)
-            return Ending("safe_stop", cause, attempts.failed_chain())
+            return Ending("failure", cause, attempts.failed_chain())
         world.advance(TICK)
         wall.lap()
     message = f"not done after {limit:g} simulated seconds"

@@ -16,6 +16,7 @@ from regrasp.app.files.yaml_lines import Path as KeyPath
 from regrasp.app.records.result import DEFAULT_CASE
 from regrasp.app.scenario import vary
 from regrasp.app.scenario.cell_file import load_cell
+from regrasp.app.scenario.old_words import warn_of_old_words
 from regrasp.app.scenario.placement import check_obstacles
 from regrasp.app.scenario.references import check_names, check_tree_inputs, tree_text
 from regrasp.app.scenario.schema import ScenarioFile
@@ -164,6 +165,7 @@ class _Source:
             catch_findings(apply_assignments, document, [a for a in assignments if not a.key.startswith("cell.")])[1],
             case,
         )
+        warn_of_old_words(document)
         file = self._read(case, document, {a.path[0] for a in assignments})
         cell, tree = self._cell_and_tree(case, document, of_cell)
         inputs, obstacles, faults = (

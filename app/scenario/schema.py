@@ -163,8 +163,8 @@ class ScenarioFile(Model):
     expect: Annotated[
         Expect,
         Field(
-            description="What must come out, by ground truth; alone, that the end is stowed.",
-            examples=[{"outcome": "safe_stop", "cause": "search_exhausted"}],
+            description="What must come out, by ground truth; left out: success, with the connector stowed.",
+            examples=[{"outcome": "failure", "cause": "search_exhausted"}],
         ),
     ] = Expect()
     markers: Annotated[

@@ -54,7 +54,7 @@ light:
 limits:
   sim_seconds: 600
 expect:
-  outcome: safe_stop
+  outcome: failure
   cause: search_exhausted
   slips: 1
 markers: [slow]
@@ -134,7 +134,7 @@ MISTAKES = [
         ("  brightness: 0.5", "  brightness: 5", "light.brightness is 5; expected a number (at least 0, at most 3)"),
         ("  sim_seconds: 600", "  sim_seconds: 1e3", "'1e3' is text to YAML, not a number; write 1.0e+3"),
         ("limits:", "limts:", "unknown key 'limts'; did you mean 'limits'?"),
-        ("  outcome: safe_stop", "  outcome: safe_stp", "expect.outcome: no 'safe_stp'; did you mean 'safe_stop'?"),
+        ("  outcome: failure", "  outcome: failre", "expect.outcome: no 'failre'; did you mean 'failure'?"),
         ("  cause: search_exhausted", "  cause: search", "expect.cause: no 'search'; there are"),
         ("  slips: 1", "  slips: -1", "expect.slips is -1; expected a whole number (at least 0"),
         ("markers: [slow]", "markers: [slow!]", "markers.0 is 'slow!'; expected text such as 'slow'"),

@@ -49,7 +49,7 @@ def test_each_case_is_a_test_that_fails_with_the_explanation_alone(suite: pytest
             "cells.scenario.yaml::gravity=zero PASSED*",
             "cells.scenario.yaml::gravity=earth FAILED*",
             "*_ cells.scenario.yaml: gravity=earth _*",
-            "cells*, seed 0: safe_stop, 0 of 1 expectations met*",
+            "cells*, seed 0: failure, 0 of 1 expectations met*",
             "Why it ended so",
             "*search_exhausted: not seen from 18 stops",
             "record *cells-gravity=earth-0",

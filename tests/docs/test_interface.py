@@ -23,7 +23,7 @@ def resting(tmp_path_factory: pytest.TempPathFactory) -> regrasp.Scenario:
     folder = tmp_path_factory.mktemp("resting")
     (folder / "tree.xml").write_text(TREE)
     (folder / "rest.yaml").write_text(
-        "description: rest\ncell: thesis\ntree: tree.xml\ngravity: zero\nexpect: {outcome: safe_stop}\n"
+        "description: rest\ncell: thesis\ntree: tree.xml\ngravity: zero\nexpect: {outcome: failure}\n"
     )
     return regrasp.load_scenario(folder / "rest.yaml")
 
@@ -49,12 +49,12 @@ def test_a_run_calls_back_and_leaves_a_record(resting: regrasp.Scenario, tmp_pat
     result = regrasp.run(
         resting, seed=3, out=tmp_path / "run", on_tick=lambda *tick: ticks.append(tick), on_event=events.append
     )
-    assert (result.outcome, result.succeeded, result.seed) == ("safe_stop", True, 3)
+    assert (result.outcome, result.succeeded, result.seed) == ("failure", True, 3)
     assert {leaf for _, leaf in ticks[:-1]} == {"rest"}
     assert [event["event"] for event in events][:: len(events) - 1] == ["begin", "end"]
     record = regrasp.read_record(tmp_path / "run")
     assert record.result is not None
-    assert (record.result.outcome, len(record.events)) == ("safe_stop", len(events))
+    assert (record.result.outcome, len(record.events)) == ("failure", len(events))
 
 
 def test_a_run_is_stopped_from_another_thread(resting: regrasp.Scenario) -> None:

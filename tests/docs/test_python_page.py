@@ -22,7 +22,7 @@ def test_the_examples_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsy
         exec(compile(example, str(PAGE), "exec"), names)
     told = capsys.readouterr().out
     for sentence in (
-        "safe_stop True",
+        "failure True",
         "back_2",
         "no 'mars'; there are earth, zero",
         "interrupted recovery/mission/unplug",

@@ -16,7 +16,7 @@ cell: thesis
 tree: recovery
 gravity: zero
 faults: [{type: joint_stalls, when: {at: [0.0, 0.0]}, arm: right, joint: shoulder}]
-expect: {outcome: safe_stop, cause: arm_failed}
+expect: {outcome: failure, cause: arm_failed}
 """
 OWN = """\
 from app import NAME

@@ -45,7 +45,7 @@ def check_result(folder: Path, scenario: str, expected: set[str]) -> None:
     read = json.loads((folder / "result.json").read_text())
     assert list(read) == FIELDS
     assert (read["schema"], read["scenario"], read["seed"]) == (1, scenario, 0)
-    assert (read["outcome"], read["succeeded"], read["cause"]) == ("stowed", True, None)
+    assert (read["outcome"], read["succeeded"], read["cause"]) == ("success", True, None)
     assert {e["name"] for e in read["expectations"]} == expected
     assert all(set(e) == {"name", "met", "value", "limit"} and e["met"] is True for e in read["expectations"])
     assert read["chain"] is None

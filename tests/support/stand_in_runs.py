@@ -20,10 +20,10 @@ def by_gravity(scenario: Any, folder: Path) -> Result:
     result = Result(
         scenario.name,
         scenario.file.seed,
-        "stowed" if stowed else "safe_stop",
+        "success" if stowed else "failure",
         succeeded=stowed,
         cause=None if stowed else Cause(CauseCode.SEARCH_EXHAUSTED, "not seen from 18 stops"),
-        expectations=(Expectation("outcome", stowed, "stowed" if stowed else "safe_stop", "stowed"),),
+        expectations=(Expectation("outcome", stowed, "success" if stowed else "failure", "success"),),
     )
     with Record(folder, scenario.name, scenario.file.seed) as record:
         record.finish(result)

@@ -65,11 +65,11 @@ def write_record(folder: Path, seed: int = 7, gap: float = 0.0443, **changes: An
             log.info("slip", node="root/mission/tries/one/try/grasp", by="gap", value=gap)
         clock[0] += 0.5
     fields: dict[str, Any] = {
-        "outcome": "safe_stop",
+        "outcome": "failure",
         "succeeded": False,
         "cause": attempts.cause(),
         "chain": attempts.failed_chain(),
-        "expectations": (Expectation("outcome", False, "safe_stop", "stowed"), Expectation("slips", True, 1, 1)),
+        "expectations": (Expectation("outcome", False, "failure", "success"), Expectation("slips", True, 1, 1)),
         "slips": (Slip(0.4, 0.5, "gap"),),
         "sim_seconds": clock[0],
         "belief": BELIEF,

@@ -24,7 +24,7 @@ faults:
   - {type: jaw_opens, when: {carried: [0.3, 0.8]}, seconds: 1.0}
 limits: {sim_seconds: 600}
 expect:
-  outcome: stowed
+  outcome: success
   slips: 1
   hidden: true
   unintended_force: 5.0

@@ -2,10 +2,13 @@
 
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
+from regrasp.app.records.result import OLD_OUTCOMES
 from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.fields import Model, NotNegative
+
+EndState = Literal["stowed", "plugged", "held", "lost"]
 
 
 class PoseError(Model):
@@ -23,10 +26,16 @@ class Expect(Model):
     """What must come out, by ground truth; what is left out is not looked at."""
 
     outcome: Annotated[
-        Literal["stowed", "safe_stop"],
-        Field(description="The end: connector in the clip, or arms stopped after a failure.", examples=["safe_stop"]),
-    ] = "stowed"
-    cause: Annotated[CauseCode | None, Field(description="Why a safe stop came.", examples=["search_exhausted"])] = None
+        Literal["success", "failure"], Field(description="How the tree ends the run.", examples=["failure"])
+    ] = "success"
+    end: Annotated[
+        EndState | None,
+        Field(
+            description="Where the connector is then, by ground truth; left out: stowed if the outcome is success.",
+            examples=["plugged"],
+        ),
+    ] = None
+    cause: Annotated[CauseCode | None, Field(description="Why it failed.", examples=["search_exhausted"])] = None
     sim_seconds: Annotated[NotNegative | None, Field(description="Simulated seconds at most.", examples=[120.0])] = None
     tries: Annotated[
         int | None,
@@ -58,8 +67,18 @@ class Expect(Model):
         ),
     ] = None
 
+    @property
+    def end_state(self) -> EndState | None:
+        """`end`, or what it is when it is left out."""
+        return "stowed" if self.end is None and self.outcome == "success" else self.end
+
+    @field_validator("outcome", mode="before")
+    @classmethod
+    def _of_schema_1(cls, word: object) -> object:
+        return OLD_OUTCOMES.get(word, word) if isinstance(word, str) else word
+
     @model_validator(mode="after")
-    def _cause_of_a_stop(self) -> Self:
-        if self.cause is not None and self.outcome == "stowed":
-            raise ValueError("a run that ends stowed has no cause; write outcome: safe_stop beside cause")
+    def _cause_of_a_failure(self) -> Self:
+        if self.cause is not None and self.outcome == "success":
+            raise ValueError("a run that ends in success has no cause; write outcome: failure beside cause")
         return self

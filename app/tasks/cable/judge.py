@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from regrasp.app.records.result import Expectation, Slip
-from regrasp.app.tasks.cable.expectations import Expect
+from regrasp.app.tasks.cable.expectations import EndState, Expect
 from regrasp.behaviors.services import Belief
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.wall_time import counts_as
@@ -102,8 +102,10 @@ class Judge:
     def expectations(self, outcome: str, cause: str | None, belief: Belief) -> tuple[Expectation, ...]:
         """Every expectation of the scenario, met or not, given how the run ended and what the robot believes."""
         wanted = self._expect
-        ended = "lost" if outcome == "stowed" and not self._truth.stowed() else outcome
-        found = [Expectation("outcome", ended == wanted.outcome, ended, wanted.outcome)]
+        found = [Expectation("outcome", outcome == wanted.outcome, outcome, wanted.outcome)]
+        if wanted.end_state is not None:
+            end = self._end_state()
+            found.append(Expectation("end", end == wanted.end_state, end, wanted.end_state))
         if wanted.cause is not None:
             found.append(Expectation("cause", cause == wanted.cause, cause, wanted.cause.value))
         if wanted.slips is not None:
@@ -114,6 +116,13 @@ class Judge:
             hidden = self.settled_pixels == 0 and self.found_by == "wrist"
             found.append(Expectation("hidden", hidden == wanted.hidden, hidden, wanted.hidden))
         return (*found, *self._limits(belief))
+
+    def _end_state(self) -> EndState:
+        if self._truth.stowed():
+            return "stowed"
+        if self._truth.plugged():
+            return "plugged"
+        return "held" if self._truth.held() else "lost"
 
     def _limits(self, belief: Belief) -> Iterator[Expectation]:
         """The expectations that are upper limits."""

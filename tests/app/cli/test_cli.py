@@ -37,7 +37,7 @@ def result(**changes: Any) -> Result:
     fields: dict[str, Any] = {
         "scenario": "mine",
         "seed": 7,
-        "outcome": "stowed",
+        "outcome": "success",
         "succeeded": True,
         "expectations": (Expectation("slips", True, 1, 1), Expectation("unintended_force", True, 1.23456, 5.0)),
         "slips": (Slip(12.0, 12.25, "gap"),),
@@ -73,7 +73,7 @@ def test_run_ends_with_a_summary_on_stdout_and_progress_on_stderr(calls: list[Si
     ran = invoke("run", "mine.yaml", "--seed", "7", "--video", "--set", "inputs.tries=2")
     assert ran.exit_code == 0
     assert ran.stdout.splitlines() == [
-        "mine, seed 7: stowed, 2 of 2 expectations met",
+        "mine, seed 7: success, 2 of 2 expectations met",
         "  ✓ slips: 1 (expected: at least 1, all noticed)",
         "  ✓ unintended_force: 1.23 (expected: at most 5)",
         "  slip    lost at 12.00 s, noticed at 12.25 s by gap",
@@ -94,7 +94,7 @@ def test_quiet_shows_the_summary_alone(calls: list[SimpleNamespace]) -> None:
 def test_what_was_not_met_exits_1_with_the_cause(monkeypatch: pytest.MonkeyPatch) -> None:
     cause = Cause(CauseCode.SEARCH_EXHAUSTED, "18 stops, nothing seen", "root/search")
     unmet = result(
-        outcome="safe_stop", succeeded=False, cause=cause, expectations=(Expectation("slips", False, 0, 1),), slips=()
+        outcome="failure", succeeded=False, cause=cause, expectations=(Expectation("slips", False, 0, 1),), slips=()
     )
     use_episode(monkeypatch, lambda *_, **__: unmet)
     ran = invoke("run", "mine.yaml")

@@ -35,7 +35,7 @@ def episode(scenario: Scenario, out: Path | None, *, seed: int, video: bool, ren
     result = Result(
         scenario=scenario.name,
         seed=seed,
-        outcome="stowed" if met else "safe_stop",
+        outcome="success" if met else "failure",
         succeeded=met,
         case=scenario.case,
         cause=None
@@ -51,7 +51,7 @@ def episode(scenario: Scenario, out: Path | None, *, seed: int, video: bool, ren
 
 
 def good(*args: Any, seed: int, video: bool, renderer: str) -> Result:
-    return Result(args[0].name, seed, "stowed", succeeded=True)
+    return Result(args[0].name, seed, "success", succeeded=True)
 
 
 def test_every_case_leaves_a_line_a_record_and_a_testcase(
@@ -62,7 +62,7 @@ def test_every_case_leaves_a_line_a_record_and_a_testcase(
     out, err = capfd.readouterr()
     lines = [line.split() for line in out.splitlines()]
     assert lines[0] == ["case", "as", "expected", "outcome", "simulated", "s", "seconds"]
-    assert lines[1] == ["seed=0", "yes", "stowed", "80.0", "12.5"]
+    assert lines[1] == ["seed=0", "yes", "success", "80.0", "12.5"]
     assert lines[3] == ["seed=2", "no", "internal_error", "0.0", "0.0"]
     assert "seed=1: search_exhausted: 18 stops; slips is 0, expected at least 1, all noticed" in out.splitlines()
     assert out.splitlines()[-1] == "mine: 1 of 4 cases as expected; records in out"
@@ -88,7 +88,7 @@ def test_every_case_leaves_a_line_a_record_and_a_testcase(
     }
     page = suite[1][0].text or ""
     assert page == CliRunner().invoke(app, ["explain", "out/seed=1"]).stdout
-    assert page.startswith("mine seed=1, seed 1: safe_stop, 0 of 1 expectations met, 80.0 simulated seconds\n")
+    assert page.startswith("mine seed=1, seed 1: failure, 0 of 1 expectations met, 80.0 simulated seconds\n")
     assert "Why it ended so\n  search_exhausted: 18 stops\n" in page
     assert suite[2][0].text == suite[2][0].attrib["message"]  # it left no record
     assert suite[2][0].attrib["message"] == "internal_error: the process died with exit code 7"

@@ -21,7 +21,7 @@ def page(folder: Path, width: int = 100) -> str:
 
 def test_the_page_of_a_run_that_stopped_safely(tmp_path: Path) -> None:
     assert page(write_record(tmp_path / "run")).splitlines() == [
-        "toy, seed 7: safe_stop, 1 of 2 expectations met, 2.0 simulated seconds",
+        "toy, seed 7: failure, 1 of 2 expectations met, 2.0 simulated seconds",
         *explain_head(),
         "",
         "Why it ended so",
@@ -63,7 +63,7 @@ def test_the_page_of_a_run_that_stopped_safely(tmp_path: Path) -> None:
         "  noticed a loss at 1.50 s by gap",
         "",
         "What was expected",
-        "  ✗ outcome: safe_stop (expected: stowed)",
+        "  ✗ outcome: failure (expected: success)",
         "  ✓ slips: 1 (expected: at least 1, all noticed)",
     ]
 
@@ -74,13 +74,13 @@ def explain_head() -> list[str]:
     return [f"  gravity zero, regrasp {version('regrasp')}", "  changed: limits.tries=2"]
 
 
-@pytest.mark.parametrize("outcome", ["stowed", "time_limit", "interrupted", "internal_error"])
+@pytest.mark.parametrize("outcome", ["success", "time_limit", "interrupted", "internal_error"])
 def test_every_outcome_has_its_page(tmp_path: Path, outcome: str) -> None:
-    cause = None if outcome == "stowed" else Cause(CauseCode(outcome), "why", "root/mission")
+    cause = None if outcome == "success" else Cause(CauseCode(outcome), "why", "root/mission")
     trace = "Traceback (most recent call last):\n  at home\n" if outcome == "internal_error" else None
     told = page(write_record(tmp_path / "run", outcome=outcome, cause=cause, chain=None, traceback=trace))
     assert told.startswith(f"toy, seed 7: {outcome}, ")
-    assert ("Why it ended so" in told) == (outcome != "stowed")
+    assert ("Why it ended so" in told) == (outcome != "success")
     assert ("\nTraceback\n  Traceback (most recent call last):\n    at home\n" in told) == (trace is not None)
 
 

@@ -29,7 +29,7 @@ def a_result() -> Result:
     return Result(
         scenario="short_obstacle",
         seed=3,
-        outcome="safe_stop",
+        outcome="failure",
         succeeded=False,
         cause=Cause(CauseCode.OUT_OF_REACH, "0.82 m from the right arm, reach 0.75 m", "root/regrasp/reach"),
         expectations=(
@@ -46,7 +46,7 @@ def test_the_result_file_has_exactly_its_fields(tmp_path: Path) -> None:
         record.finish(a_result())
     read = json.loads((tmp_path / "a" / "run" / "result.json").read_text())
     assert list(read) == FIELDS
-    assert read["schema"] == 1
+    assert read["schema"] == 2
     assert read["cause"] == {
         "code": "out_of_reach",
         "message": "0.82 m from the right arm, reach 0.75 m",
@@ -99,7 +99,7 @@ def test_a_result_given_before_the_interrupt_is_kept(tmp_path: Path) -> None:
     record.finish(a_result())
     with pytest.raises(KeyboardInterrupt), record:
         raise KeyboardInterrupt
-    assert json.loads((tmp_path / "result.json").read_text())["outcome"] == "safe_stop"
+    assert json.loads((tmp_path / "result.json").read_text())["outcome"] == "failure"
 
 
 def test_copies_of_what_is_run_are_there_from_the_beginning(tmp_path: Path) -> None:

@@ -23,14 +23,14 @@ def test_what_was_run_and_how_it_ended_are_compared(tmp_path: Path) -> None:
     b = write_record(
         tmp_path / "b",
         seed=8,
-        outcome="stowed",
+        outcome="success",
         succeeded=True,
         cause=None,
         versions={"numpy": "2.1", "python": "3.11"},
     )
     assert beginnings(read_record(a), read_record(b)) == ["seed: 7 | 8", "versions.numpy: 2.0 | 2.1"]
     assert differ(a, b) == [
-        "outcome: safe_stop | stowed",
+        "outcome: failure | success",
         "succeeded: False | True",
         "cause.code: slipped | -",
         "cause.message: grasp 1 mm | -",
@@ -69,7 +69,7 @@ def test_a_run_that_goes_on_where_the_other_was_killed(tmp_path: Path) -> None:
     a, b = (write_record(tmp_path / name) for name in ("a", "b"))
     kill(b)
     told = differ(a, b)
-    assert "outcome: safe_stop | -" in told
+    assert "outcome: failure | -" in told
     assert "first differing tick at 1.00 s: root/mission/tries: FAILURE | RUNNING" in told
 
 

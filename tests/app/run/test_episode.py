@@ -112,7 +112,7 @@ def scenario(folder: Path, body: str, *overrides: str) -> Scenario:
     )
     (folder / "mine.yaml").write_text(
         f"description: a toy\ncell: thesis\ntree: {folder / 'tree.xml'}\ngravity: zero\n"
-        "limits: {sim_seconds: 1.0}\nexpect: {outcome: safe_stop}\n"
+        "limits: {sim_seconds: 1.0}\nexpect: {outcome: failure}\n"
     )
     return load_scenario(str(folder / "mine.yaml"), overrides)
 
@@ -227,7 +227,7 @@ def test_ctrl_c_between_two_ticks_leaves_a_whole_record(tmp_path: Path, ends: li
 def test_a_failed_tree_ends_in_a_safe_stop_with_the_cause_of_its_leaf(tmp_path: Path) -> None:
     result = run_episode(scenario(tmp_path, '<GivesUp name="reach"/>'), tmp_path / "run", seed=0)
     read = check_record(tmp_path / "run", result)
-    assert (result.outcome, result.succeeded) == ("safe_stop", True)  # as this scenario expects
+    assert (result.outcome, result.succeeded) == ("failure", True)  # as this scenario expects
     assert read["cause"]["code"] == "out_of_reach"
     assert "0.82 m" in read["cause"]["message"]
     assert read["cause"]["node"].endswith("reach")
@@ -248,13 +248,18 @@ def test_what_a_fallback_caught_is_in_the_record_of_a_run(tmp_path: Path) -> Non
     assert "the right hand holds nothing" in page
 
 
-def test_a_tree_that_says_stowed_is_not_believed(tmp_path: Path) -> None:
-    made = scenario(tmp_path, '<Done name="done"/>', "expect.outcome=stowed")
+def test_a_tree_that_says_success_is_not_believed(tmp_path: Path) -> None:
+    made = scenario(tmp_path, '<Done name="done"/>', "expect.outcome=success")
     result = run_episode(made, None, seed=0)
-    assert result.outcome == "stowed"
+    assert result.outcome == "success"
     assert not result.succeeded
-    [outcome] = result.expectations
-    assert (outcome.value, outcome.limit) == ("lost", "stowed")
+    outcome, end = result.expectations
+    assert (outcome.met, end.met, end.value, end.limit) == (True, False, "plugged", "stowed")
+
+
+def test_a_tree_alone_may_end_with_the_connector_plugged(tmp_path: Path) -> None:
+    result = run_episode(scenario(tmp_path, '<Done name="done"/>', "expect={end: plugged}"), None, seed=0)
+    assert result.succeeded
 
 
 def test_a_film_does_not_change_the_run(tmp_path: Path) -> None:

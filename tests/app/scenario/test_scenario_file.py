@@ -60,7 +60,7 @@ def test_a_scenario_brings_its_cell_and_tree(scenario: Path) -> None:
 def test_what_is_left_out_has_its_default(scenario: Path) -> None:
     scenario.write_text("description: bare\ncell: thesis\ntree: tree.xml\ngravity: earth\n")
     file = load_scenario("mine.yaml").file
-    assert (file.obstacles, file.faults, file.expect.outcome, file.expect.slips) == ((), (), "stowed", None)
+    assert (file.obstacles, file.faults, file.expect.outcome, file.expect.slips) == ((), (), "success", None)
     assert (file.limits.sim_seconds, file.inputs, file.seed) == (600.0, {}, 0)
 
 
@@ -72,7 +72,7 @@ def test_overrides_change_scenario_and_cell(scenario: Path) -> None:
             "gravity=earth",
             "obstacles.0.size=[0.1, 0.1, 0.1]",
             "inputs.tries=2",
-            "expect={outcome: safe_stop, cause: search_exhausted}",
+            "expect={outcome: failure, cause: search_exhausted}",
             "cell.hidden.errors.arm_tool=0",
             "cell.known.sockets.0.depth=0.02",
         ],
@@ -116,7 +116,7 @@ def test_shipped_cells_are_right(name: str) -> None:
         ("tries: 4", "tries: many", "mine.yaml:5: inputs.tries: Retry 'again': num_failures={tries} is 'many' here"),
         ("tries: 4", "tries: '{x}'", "mine.yaml:5: inputs.tries is '{x}'; expected"),
         ("hidden: true", "hidden: yep", "mine.yaml:19: expect.hidden is 'yep'; expected true or false"),
-        ("slips: 1", "cause: slipped", "mine.yaml:16: expect: a run that ends stowed has no cause; write"),
+        ("slips: 1", "cause: slipped", "mine.yaml:16: expect: a run that ends in success has no cause; write"),
         ("[0.3, 0.8]", "[0.8, 0.3]", "mine.yaml:14: faults.0.when.carried: runs backwards; put the smaller first"),
         ("jaw_opens", "jaw_open", "mine.yaml:14: faults.0.type: no 'jaw_open'; did you mean 'jaw_opens'?"),
         ("type: jaw_opens, ", "", "mine.yaml:14: faults.0.type: it is missing; there are cable_snags, camera_dark"),

@@ -30,11 +30,11 @@ def episode(scenario: Scenario, out: Path | None, *, seed: int, video: bool, ren
     return Result(
         scenario=name,
         seed=seed,
-        outcome="safe_stop" if failed else "stowed",
+        outcome="failure" if failed else "success",
         succeeded=not failed,
         cause=Cause(CauseCode.SEARCH_EXHAUSTED, "18 stops") if failed else None,
         expectations=(
-            Expectation("outcome", not failed, "stowed", "stowed"),
+            Expectation("outcome", not failed, "success", "success"),
             Expectation("unintended_force", True, 1.0 + seed, 5.0),
         ),
         slips=(Slip(10.0, 10.5, "fingers"), Slip(20.0, None, None)),
@@ -60,7 +60,7 @@ def test_a_study_goes_on_to_its_end_and_counts_every_run(tmp_path: Path, capfd: 
     assert (good["slips"], good["unintended_force"], good["unmet"]) == (2, 1.0, [])
     assert good["peak_memory_mb"] > 5
     bad = rows["tall_obstacle", "zero", 1]
-    assert (bad["outcome"], bad["unmet"], bad["cause"]["code"]) == ("safe_stop", ["outcome"], "search_exhausted")
+    assert (bad["outcome"], bad["unmet"], bad["cause"]["code"]) == ("failure", ["outcome"], "search_exhausted")
     assert rows["no_obstacle", "earth", 0]["cause"]["message"] == "ValueError: no such joint"
     assert rows["short_obstacle", "zero", 1]["cause"]["message"] == "the process died with exit code 7"
     kept = json.loads((tmp_path / "runs" / "tall_obstacle-gravity=earth-0" / "result.json").read_text())
@@ -99,7 +99,7 @@ def slow_after_two(scenario: Scenario, out: Path | None, *, seed: int, video: bo
         except KeyboardInterrupt:
             (out / "interrupted").touch()
             raise
-    return Result(scenario.name, seed, "stowed", succeeded=True)
+    return Result(scenario.name, seed, "success", succeeded=True)
 
 
 def test_ctrl_c_keeps_what_was_done_and_stops_what_runs(tmp_path: Path) -> None:

@@ -21,6 +21,7 @@ class Truth:
 
     fingers: int = 0  # that touch the connector
     in_clip: bool = False
+    in_socket: bool = False
     speed: float = 0.0
     pixels: int = 0
     peaks: dict[str, float] = field(default_factory=dict)
@@ -35,6 +36,9 @@ class Truth:
 
     def stowed(self) -> bool:
         return self.in_clip
+
+    def plugged(self) -> bool:
+        return self.in_socket
 
     def connector_in_hand(self) -> NDArray[np.float64]:
         return np.array([0.0, 0.0, self.in_hand])
@@ -74,7 +78,7 @@ class Run:
             self.tick += 1
         return begin
 
-    def verdict(self, name: str, outcome: str = "stowed", cause: str | None = None) -> tuple[bool, Any]:
+    def verdict(self, name: str, outcome: str = "success", cause: str | None = None) -> tuple[bool, Any]:
         [found] = [e for e in self.judge.expectations(outcome, cause, self.belief) if e.name == name]
         return found.met, found.value
 
@@ -209,21 +213,25 @@ def test_an_end_in_sight_or_found_by_the_rear_camera_was_not_hidden(pixels: int,
     assert run.verdict("hidden") == (False, False)
 
 
-def test_stowed_is_by_the_truth_not_by_what_the_robot_says() -> None:
-    run = Run(Expect(outcome="stowed"))
+def test_the_end_is_by_the_truth_not_by_what_the_robot_says() -> None:
+    run = Run()
     run.go(0.1, in_clip=False)
-    assert run.verdict("outcome") == (False, "lost")
-    run.go(0.1, in_clip=True)
-    assert run.verdict("outcome") == (True, "stowed")
+    assert run.verdict("end") == (False, "lost")
+    run.go(0.1, fingers=2)
+    assert run.verdict("end") == (False, "held")
+    run.go(0.1, in_socket=True)
+    assert run.verdict("end") == (False, "plugged")
+    run.go(0.1, in_socket=False, in_clip=True)
+    assert run.verdict("end") == (True, "stowed")
     assert run.verdict("outcome", outcome="time_limit") == (False, "time_limit")
 
 
-def test_a_safe_stop_that_is_expected_is_met_by_its_cause() -> None:
-    run = Run(Expect(outcome="safe_stop", cause=CauseCode.OUT_OF_REACH))
-    assert run.verdict("outcome", "safe_stop") == (True, "safe_stop")
-    assert run.verdict("cause", "safe_stop", "out_of_reach") == (True, "out_of_reach")
-    assert run.verdict("cause", "safe_stop", "slipped") == (False, "slipped")
-    assert run.verdict("cause", "safe_stop", None) == (False, None)
+def test_a_failure_that_is_expected_is_met_by_its_cause() -> None:
+    run = Run(Expect(outcome="failure", cause=CauseCode.OUT_OF_REACH))
+    assert run.verdict("outcome", "failure") == (True, "failure")
+    assert run.verdict("cause", "failure", "out_of_reach") == (True, "out_of_reach")
+    assert run.verdict("cause", "failure", "slipped") == (False, "slipped")
+    assert run.verdict("cause", "failure", None) == (False, None)
 
 
 @pytest.mark.parametrize(("peaks", "met"), [({}, True), ({"left arm - floor": 4.9}, True), ({"a": 1, "b": 5.1}, False)])
@@ -233,7 +241,9 @@ def test_the_largest_unintended_force_counts(peaks: dict[str, float], met: bool)
 
 
 def test_what_is_not_expected_is_not_judged() -> None:
-    assert [e.name for e in Run().judge.expectations("stowed", None, Belief())] == ["outcome"]
+    failing = Run(Expect(outcome="failure"))
+    assert [e.name for e in failing.judge.expectations("failure", None, Belief())] == ["outcome"]
+    assert [e.name for e in Run().judge.expectations("success", None, Belief())] == ["outcome", "end"]
 
 
 def test_the_last_second_counts_against_a_time_limit() -> None:
@@ -272,6 +282,6 @@ def test_the_end_s_place_and_axis_in_the_clip_are_judged_apart() -> None:
     assert run.verdict("pose_error.position") == (True, 0.002)
     assert run.verdict("pose_error.angle_deg") == (False, 1.5)
     names = [
-        e.name for e in Run(Expect(pose_error=PoseError(angle_deg=2.0))).judge.expectations("stowed", None, Belief())
+        e.name for e in Run(Expect(pose_error=PoseError(angle_deg=2.0))).judge.expectations("success", None, Belief())
     ]
-    assert names == ["outcome", "pose_error.angle_deg"]
+    assert names == ["outcome", "end", "pose_error.angle_deg"]
