@@ -65,7 +65,10 @@ class Motion(PlanningScene):
         self._clock, self._seed = clock, seed
 
     def warm_up(self) -> None:
-        """Try a grasp of the plugged connector in thought: compiled functions are loaded now, not in a tick."""
+        """Look for a grasp of the plugged connector and drop it.
+
+        The compiled functions of a pick are then loaded now, and no tick waits for it.
+        """
         known = self.known
         plugged = known.socket(known.plugged_into).world_from_plug(known.connector.length)
         for arm in self.arms:

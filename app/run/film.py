@@ -4,7 +4,7 @@ import sys
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
@@ -43,34 +43,40 @@ class Film:
     """Films a world while the context is open; with None as the path it does nothing.
 
     A thread of its own draws and encodes the frames, with a renderer of its own, while the run goes on: `show` only
-    notes what is to be seen.
+    notes what is to be seen. It waits while too many frames are not drawn yet, and raises what went wrong in the
+    thread.
     """
 
     def __init__(self, path: Path | None, world: World, parameters: FilmParameters = FilmParameters()) -> None:
         self._path, self._world, self._parameters = path, world, parameters
         self._stack = ExitStack()
         self._writer: VideoWriter | None = None
+        self._thread: ThreadPoolExecutor
         self._renderer: Future[Renderer]
         self._waiting: deque[Future[None]] = deque()
         self._frames = 0
 
     def __enter__(self) -> Self:
-        if self._path is not None:
-            self._writer = self._stack.enter_context(VideoWriter(self._path, self._parameters.rate))
-            interval = sys.getswitchinterval()
-            self._stack.callback(sys.setswitchinterval, interval)
+        if self._path is None:
+            return self
+        with ExitStack() as stack:  # undoes what is done if a step fails
+            self._writer = stack.enter_context(VideoWriter(self._path, self._parameters.rate))
+            stack.callback(sys.setswitchinterval, sys.getswitchinterval())
             sys.setswitchinterval(self._parameters.switch_interval)
-            self._thread = self._stack.enter_context(ThreadPoolExecutor(1, "film"))
+            self._thread = stack.enter_context(ThreadPoolExecutor(1, "film"))
             self._renderer = self._thread.submit(make_renderer, self._world.visuals, self._world.renderer.name)
+            stack.callback(self._close_renderer)
+            self._stack = stack.pop_all()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        with self._stack:
-            if self._writer is not None:
-                self._wait(0)
-                self._thread.submit(self._renderer.result().close).result()
+        self._stack.close()
+
+    def finish(self) -> None:
+        """Wait until all frames are drawn. Raises what went wrong in the thread."""
+        self._wait(0)
 
     @counts_as("film")
     def show(self, leaf: str) -> None:
@@ -103,9 +109,18 @@ class Film:
         writer.write(compose(render_overview(renderer, poses(), light, self._parameters), rear, wrist, lines))
 
     def _wait(self, count: int) -> None:
-        """Wait until no more than `count` frames wait to be drawn. Raises what went wrong in the thread."""
-        while len(self._waiting) > count:
-            self._waiting.popleft().result()
+        """Wait until no more than `count` frames wait to be drawn. Raises, once, what went wrong in the thread."""
+        while self._waiting and (len(self._waiting) > count or self._waiting[0].done()):
+            try:
+                self._waiting.popleft().result()
+            except Exception:
+                self._waiting.clear()
+                raise
+
+    def _close_renderer(self) -> None:
+        """Close the renderer in the thread that made it, as OpenGL wants it."""
+        with suppress(Exception):  # if it could not be made, a frame has raised that
+            self._thread.submit(lambda: self._renderer.result().close()).result()
 
 
 def render_overview(

@@ -124,7 +124,7 @@ def _is_new(row: FloatArray, rows: FloatArray, count: int, distinct: float) -> b
     """Whether no row of the first `count` differs from this one by `distinct` rad at most in each joint."""
     for other in range(count):
         joint = 0
-        while joint < len(row) and abs((row[joint] - rows[other, joint] + np.pi) % (2 * np.pi) - np.pi) <= distinct:
+        while joint < len(row) and abs(wrap(row[joint] - rows[other, joint])) <= distinct:
             joint += 1
         if joint == len(row):
             return False
@@ -219,9 +219,13 @@ class ArmKinematics:
 
     def _solve(self, target: FloatArray) -> FloatArray:
         """`ik` of a (4, 4) matrix without regard to the joint limits."""
-        raw = np.array(self._solver.IK(multiply(self._base_inverse, target)).Q, float).reshape(-1, 6)
+        raw = self._raw(multiply(self._base_inverse, target))
         limits = self._parameters
         return np.asarray(_solutions(self.base, raw, target, limits.position, limits.angle, limits.distinct))
+
+    def _raw(self, base_from_tool: FloatArray) -> FloatArray:
+        """The solver's answers (n, 6) rad, some of which miss the pose."""
+        return np.array(self._solver.IK(base_from_tool).Q, float).reshape(-1, 6)
 
     def _view_solutions(self, wanted: FloatArray, mount: FloatArray) -> Iterator[FloatArray]:
         """Fixed-point iteration over the camera's roll: a solution's last joint says by how much the roll is off."""
@@ -239,8 +243,7 @@ class ArmKinematics:
                         break
                     roll -= q[5]
                     target, in_base = _rolled_target(self._base_inverse, tool_target, wanted, roll)
-                    raw = np.array(self._solver.IK(in_base).Q, float).reshape(-1, 6)
-                    q, reached = _nearest_solution(self.base, raw, target, q, *tolerances)
+                    q, reached = _nearest_solution(self.base, self._raw(in_base), target, q, *tolerances)
                     if not reached:
                         break
 
@@ -319,7 +322,7 @@ def _nearest(branches: FloatArray, q: FloatArray) -> int:
     for row in range(len(branches)):
         off = 0.0
         for joint in range(5):
-            off += abs((branches[row, joint] - q[joint] + np.pi) % (2 * np.pi) - np.pi)
+            off += abs(wrap(branches[row, joint] - q[joint]))
         off += abs(branches[row, 5])
         if off < least:
             best, least = row, off

@@ -104,9 +104,9 @@ class SimCamera:
         return self._frame
 
     def deferred_preview(self, shrink: int) -> Callable[[Renderer], NDArray[np.uint8]] | None:
-        """What gives the colours (H / shrink, W / shrink, 3) of the present `latest()`; None before it.
+        """A function that draws the colours (H / shrink, W / shrink, 3) of the present `latest()`; None without one.
 
-        It may be called later and in another thread, with a renderer of its own. Depth is not drawn for it.
+        It may be called later and in another thread, with a renderer of that thread. Depth is not drawn for it.
         """
         newest, read = self._newest(), self._frame
         if newest is None:

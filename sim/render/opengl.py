@@ -21,7 +21,7 @@ from regrasp.sim.render.shaders import (
     SHADOW_VERTEX,
     VERTEX,
 )
-from regrasp.sim.render.shadows import DEFAULT_SHADOWS, ShadowParameters, casters, light_from_world
+from regrasp.sim.render.shadows import DEFAULT_SHADOWS, ShadowParameters, light_from_world, rows_and_radii
 from regrasp.sim.render.visuals import Visuals
 
 _ROWS = ("row0", "row1", "row2")
@@ -62,8 +62,8 @@ class GlRenderer:
         self._backdrop = self._gl.vertex_array(behind, [])
         # small ones first: floor and panels are then not shaded where something hides them
         self._groups = [self._make_group(mesh) for mesh in shared_meshes(visuals)]
-        meshes = [group.mesh for group in self._groups]
-        self._casters, self._caster_radii = casters(meshes, shadow_parameters.largest_caster)
+        self._casting = [group for group in self._groups if group.mesh.radius < shadow_parameters.largest_caster]
+        self._casters, self._caster_radii = rows_and_radii([group.mesh for group in self._casting])
         self._shadows = self._gl.depth_texture((shadow_parameters.size, shadow_parameters.size))
         self._shadows.compare_func = "<="
         self._shadows.repeat_x = self._shadows.repeat_y = False
@@ -135,9 +135,8 @@ class GlRenderer:
         _set(self._draw, texel=texel, to_light=tuple(to_light), ambient=light.ambient, diffuse=light.diffuse)
         self._shadow_target.use()
         self._shadow_target.clear()
-        for group in self._groups:
-            if group.mesh.radius < self._parameters.largest_caster:
-                group.cast.render(instances=len(group.mesh.rows))
+        for group in self._casting:
+            group.cast.render(instances=len(group.mesh.rows))
 
     def _target(self, width: int, height: int, color_only: bool = False) -> Any:
         """The frame buffer of that size, with planes for colour, depth and ids, or for colour alone."""

@@ -107,19 +107,19 @@ def draw_triangles(
                     _fill(nearest[v], seen, v, first, ceil(high), np.float32(value), np.float32(slope), t)
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(cache=True, error_model="numpy")
 def _extent(a: float, b: float, c: float) -> tuple[float, float]:
     """The least and the greatest; written out, as it is much faster here than Python's min and max."""
     low, high = (a, b) if a < b else (b, a)
     return (c if c < low else low), (c if c > high else high)
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(cache=True, error_model="numpy")
 def _cross(p: NDArray[np.float64], q: NDArray[np.float64]) -> tuple[float, float, float]:
     return p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(cache=True, error_model="numpy")
 def _clip(edge: tuple[float, float, float], v: int, low: float, high: float) -> tuple[float, float]:
     """What of low <= u < high in row `v` lies where the plane is negative.
 
@@ -135,7 +135,7 @@ def _clip(edge: tuple[float, float, float], v: int, low: float, high: float) -> 
     return (low, high) if inside else (low, low)
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(cache=True, error_model="numpy")
 def _fill(
     row: NDArray[np.float32],
     seen: NDArray[np.int32] | None,

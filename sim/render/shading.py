@@ -13,7 +13,7 @@ _HALF, _ONE, _ZERO = np.float32(0.5), np.float32(1.0), np.float32(0.0)
 _PI, _PER_PI = np.float32(np.pi), np.float32(1.0 / np.pi)
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
+@numba.njit(cache=True, error_model="numpy", fastmath={"contract"})
 def sine(x: np.float32) -> np.float32:
     """The sine to 1e-4 for |x| < 1000, by a polynomial of its angle to the next multiple of pi."""
     half_turns = (x * _PER_PI + _ROUND) - _ROUND
@@ -65,7 +65,7 @@ def write_normals(
                 _write_normal(corners, triangles[t], normals, planes[t])
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(cache=True, error_model="numpy")
 def _write_normal(
     corners: NDArray[np.float64], triangle: NDArray[np.int32], normals: NDArray[np.float32], out: NDArray[np.float32]
 ) -> None:
@@ -104,33 +104,34 @@ def shade(
 
     A pixel's ray runs to rays @ (u, v, 1) at depth 1 from rays[:, 3]: in the world, and in the light's texels and
     nearness. `colors` are of items, 0 to 255; `strengths` are of ambient and diffuse light, and the offset along the
-    normal, per texel.
+    normal, in texels.
     """
     height, width = seen.shape
     grain, facing = np.empty(width, np.float32), np.empty(width, np.float32)
     x, y, z = np.empty(width, np.float32), np.empty(width, np.float32), np.empty(width, np.float32)
     depth, texel = np.empty(width, np.float32), np.empty(width, np.int32)
-    nearer = strengths[2] / np.float32(len(shadows))
+    texels, size = shadows.ravel(), np.int32(len(shadows))
+    nearer = strengths[2] / np.float32(size)
     for v in range(height):
         runs = ends[first_run[v] : first_run[v + 1]]
         _invert(inverse[v], depth)
         _grain(depth, world_rays, v, grain)
         _follow(depth, light_rays, v, x, y, z)
         _face(seen[v], runs, planes, depth, v, strengths[2], nearer, facing, x, y, z)
-        _find_texels(x, y, np.int32(len(shadows)), texel)
-        _light(x, y, z, shadows.ravel(), np.int32(len(shadows)), texel)
+        _find_texels(x, y, size, texel)
+        _light(x, y, z, texels, size, texel)
         _brighten(x, facing, strengths[0], strengths[1], grain)
         for channel in range(3):
             _paint(seen[v], runs, item_of, colors[:, channel], background[channel], grain, channels[channel, v])
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
+@numba.njit(cache=True, error_model="numpy", fastmath={"contract"})
 def _invert(inverse: NDArray[np.float32], depth: NDArray[np.float32]) -> None:
     for u in range(len(depth)):
         depth[u] = _ONE / inverse[u]
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
+@numba.njit(cache=True, error_model="numpy", fastmath={"contract"})
 def _grain(depth: NDArray[np.float32], rays: NDArray[np.float32], v: int, grain: NDArray[np.float32]) -> None:
     """Faint grain, fixed in the world, so that surfaces are not of one colour."""
     row = np.float32(v)
@@ -145,7 +146,7 @@ def _grain(depth: NDArray[np.float32], rays: NDArray[np.float32], v: int, grain:
         grain[u] = _ONE + np.float32(0.03) * waves
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
+@numba.njit(cache=True, error_model="numpy", fastmath={"contract"})
 def _follow(
     depth: NDArray[np.float32],
     rays: NDArray[np.float32],
@@ -166,7 +167,7 @@ def _follow(
         z[u] = oz + far * (az * column + bz)
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
+@numba.njit(cache=True, error_model="numpy", fastmath={"contract"})
 def _face(
     seen: NDArray[np.int32],
     runs: NDArray[np.int32],
@@ -202,7 +203,7 @@ def _face(
         u = end
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
+@numba.njit(cache=True, error_model="numpy", fastmath={"contract"})
 def _add_product(
     out: NDArray[np.float32], factor: np.float32, far: NDArray[np.float32], a: np.float32, b: np.float32, begin: int
 ) -> None:
@@ -210,7 +211,7 @@ def _add_product(
         out[i] += factor * (far[i] * (a * np.float32(begin + i) + b))
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
+@numba.njit(cache=True, error_model="numpy", fastmath={"contract"})
 def _find_texels(x: NDArray[np.float32], y: NDArray[np.float32], size: np.int32, texel: NDArray[np.int32]) -> None:
     """Write the number of the upper left of the four texels about x, y, and leave in x, y how far beyond it they lie.
 
@@ -234,7 +235,7 @@ def _find_texels(x: NDArray[np.float32], y: NDArray[np.float32], size: np.int32,
         texel[u] += np.int32(row * size)
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
+@numba.njit(cache=True, error_model="numpy", fastmath={"contract"})
 def _light(
     x: NDArray[np.float32],
     y: NDArray[np.float32],
@@ -255,7 +256,7 @@ def _light(
         x[u] = upper + y[u] * (lower - upper)
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
+@numba.njit(cache=True, error_model="numpy", fastmath={"contract"})
 def _brighten(
     lit: NDArray[np.float32],
     facing: NDArray[np.float32],
@@ -268,7 +269,7 @@ def _brighten(
         grain[u] *= ambient + diffuse * lit[u] * cosine
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
+@numba.njit(cache=True, error_model="numpy", fastmath={"contract"})
 def _paint(
     seen: NDArray[np.int32],
     runs: NDArray[np.int32],
@@ -292,7 +293,7 @@ def _paint(
         u = end
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(cache=True, error_model="numpy")
 def read_out(
     inverse: NDArray[np.float32],
     seen: NDArray[np.int32],

@@ -22,10 +22,9 @@ class ShadowParameters:
 DEFAULT_SHADOWS = ShadowParameters()
 
 
-def casters(meshes: Sequence[SharedMesh], largest: float) -> tuple[NDArray[np.int64], FloatArray]:
-    """The rows (n,) of the items that cast shadows, of a radius below `largest` (m), and their radii (n,) in m."""
-    small = [mesh for mesh in meshes if mesh.radius < largest]
-    rows = [(row, mesh.radius) for mesh in small for row in mesh.rows]
+def rows_and_radii(meshes: Sequence[SharedMesh]) -> tuple[NDArray[np.int64], FloatArray]:
+    """The rows (n,) of the items with these meshes, and their radii (n,) in m."""
+    rows = [(row, mesh.radius) for mesh in meshes for row in mesh.rows]
     return np.array([row for row, _ in rows], np.int64), np.array([radius for _, radius in rows])
 
 

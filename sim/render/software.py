@@ -15,7 +15,7 @@ from regrasp.sim.render.meshes import shared_meshes
 from regrasp.sim.render.picture import BACKGROUND, Z_FAR, Z_NEAR, Image, LightState, RendererName
 from regrasp.sim.render.raster import draw_triangles, place_corners, project_corners
 from regrasp.sim.render.shading import find_runs, read_out, shade, write_normals
-from regrasp.sim.render.shadows import DEFAULT_SHADOWS, ShadowParameters, casters, light_from_world
+from regrasp.sim.render.shadows import DEFAULT_SHADOWS, ShadowParameters, light_from_world, rows_and_radii
 from regrasp.sim.render.visuals import Visuals
 
 _LARGEST = 1e6  # m; what is farther from the origin is not drawn
@@ -54,7 +54,8 @@ class SoftwareRenderer:
         meshes = [mesh_of[row] for row in range(len(visuals.items))]
         self._order = np.array([row for mesh in shared for row in mesh.rows], np.int64)  # small ones first
         self._radius = np.array([mesh.radius for mesh in meshes])
-        self._casters, self._caster_radii = casters(shared, shadow_parameters.largest_caster)
+        casters = [mesh for mesh in shared if mesh.radius < shadow_parameters.largest_caster]
+        self._casters, self._caster_radii = rows_and_radii(casters)
         self._first_corner = _starts([len(mesh.corners) for mesh in meshes])
         self._first_triangle = _starts([len(mesh.triangles) for mesh in meshes])
         self._local = _stack([mesh.corners for mesh in meshes], 6, np.float32)
@@ -122,15 +123,16 @@ class SoftwareRenderer:
 
     def _place(self, poses: NDArray[np.float32], light: LightState) -> None:
         """Move all corners and draw the shadow map: texels hold how near to the light its nearest surface is."""
+        sound = _sound(poses[self._casters])
+        rows = self._casters[sound]
         to_light = np.asarray(light.direction, float) / np.linalg.norm(light.direction)
-        matrix, radius = light_from_world(poses[self._casters, :, 3], self._caster_radii, to_light)
+        matrix, radius = light_from_world(poses[rows, :, 3], self._caster_radii[sound], to_light)
         turn = (2 * radius * matrix[:3, :3]).astype(np.float32)
         place_corners(self._local, self._order, self._first_corner, poses, turn, self._places, self._normals)
         size = len(self._shadows)
         texels = np.array([[size, 0, 0, -0.5], [0, size, 0, -0.5], [0, 0, -1, 1], [0, 0, 0, 1]])
         self._texels_from_world = texels @ matrix
         self._shadows.fill(0.0)
-        rows = self._casters[_sound(poses[self._casters])]
         view = self._texels_from_world[[0, 1, 3, 2]]
         project_corners(self._places, rows, self._first_corner, view, self._corners)
         draw_triangles(self._corners, rows, self._first_triangle, self._triangles, 0.0, self._shadows, None)

@@ -88,8 +88,8 @@ class SimArm:
         self._started = 0.0
         self._servo: FloatArray = np.array(spec.sleep, float)  # where the servos stand, rad
         self._target = self._servo.copy()  # where they were told to go, rad
-        self._next_q, self._next_v = np.empty(6), np.empty(6)
-        self._command = np.empty((2, 6))  # the same for PyBullet, and the velocities: URDF signs, rad and rad/s
+        self._speeds = np.empty(6)  # of the targets, rad/s
+        self._command = np.empty((2, 6))  # what PyBullet is told: positions with the offsets, velocities; URDF signs
         self.place(self._servo)
         self.gripper = SimGripper(
             client, self.body, self.links, self.now, hidden, rng, gripper_parameters or GripperParameters()
@@ -175,10 +175,9 @@ class SimArm:
             t = self.now() + self._dt - self._started
             q, v = self._trajectory.sample(t)
             over = t >= self._trajectory.duration
-            ended = _servo_target(self._target, q, v, over, self._dt, self._next_q, self._next_v)
-            if ended:
+            if _move_target(self._target, self._speeds, q, v, over, self._dt):
                 self._trajectory = None
-            self._drive(self._next_q, self._next_v)
+            self._drive(self._target, self._speeds)
         elif self._late_joints and self._late(self._target).any():
             self._drive(self._target, np.zeros(6))
         if self._steps * self._dt >= self.gripper.due:
@@ -232,30 +231,22 @@ class SimArm:
 
 
 @numba.njit(cache=True)
-def _servo_target(
-    before: FloatArray,
-    q: FloatArray,
-    v: FloatArray,
-    over: bool,
-    dt: float,
-    position: FloatArray,
-    velocity: FloatArray,
-) -> bool:
-    """Write the servos' next targets, (6,) rad and rad/s, from `before` (6,) rad to a trajectory's `q` and `v`.
+def _move_target(target: FloatArray, speeds: FloatArray, q: FloatArray, v: FloatArray, over: bool, dt: float) -> bool:
+    """Move the servos' `target` (6,) rad towards a trajectory's `q`, with its `v`; write the `speeds` (6,) rad/s.
 
     A servo turns no faster than its rated speed; it follows a faster trajectory late. `over`: the trajectory's time is
     over. Says whether the servos are at its end, too.
     """
     reach = MAX_JOINT_SPEED * dt
-    ended = over and np.max(np.abs(q - before)) <= reach
+    ended = over and np.max(np.abs(q - target)) <= reach
     for i in range(6):
-        wanted = q[i] - before[i]
+        wanted = q[i] - target[i]
         step = min(max(wanted, -reach), reach)
-        position[i] = before[i] + step
+        target[i] += step
         if step != wanted:
-            velocity[i] = step / dt
+            speeds[i] = step / dt
         else:
-            velocity[i] = 0.0 if ended else v[i]
+            speeds[i] = 0.0 if ended else v[i]
     return ended
 
 
@@ -270,10 +261,10 @@ def _servo_command(
     target: FloatArray,
     command: FloatArray,
 ) -> bool:
-    """Move the `servo` (6,) rad towards `q` (6,) rad with velocities `v` (6,) rad/s, and write down what that is.
+    """Move the `servo` (6,) rad towards `q` (6,) rad with velocities `v` (6,) rad/s; whether any servo is late.
 
-    A slow joint's servo goes as far as it can. Writes `q` to `target` (6,), and to `command` (2, 6) the positions and
-    velocities by the URDF's signs. Says whether any servo is late.
+    A slow joint's servo goes as far as it can. Writes `q` to `target` (6,), and to `command` (2, 6) the servos'
+    positions plus `offsets` and their velocities, with the URDF's signs.
     """
     late = False
     for i in range(6):

@@ -54,7 +54,7 @@ def environment(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def take_compiled(installed: Path) -> None:
-    """Copy what numba has compiled for this checkout, which takes a minute; it wants sources of the same times."""
+    """Copy numba's cache of this checkout, which takes a minute to make; it counts only if the source is as old."""
     for name in tracked():
         source, target = ROOT / name, installed / name
         if target.suffix == ".py" and target.is_file():

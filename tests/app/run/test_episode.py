@@ -270,6 +270,21 @@ def test_a_film_does_not_change_the_run(tmp_path: Path) -> None:
     assert not (tmp_path / "without/video.mp4").exists()
 
 
+def test_a_film_that_cannot_be_drawn_is_an_internal_error_with_a_whole_result(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(*_: object) -> Any:
+        raise ZeroDivisionError("no film")
+
+    monkeypatch.setattr("regrasp.app.run.film.make_renderer", broken)
+    result = run_episode(scenario(tmp_path, '<Done name="done"/>'), tmp_path / "run", seed=0, video=True)
+    assert result.outcome == "internal_error"
+    assert result.cause is not None
+    assert result.cause.message == "ZeroDivisionError: no film"
+    assert result.expectations
+    assert result.sim_seconds >= 0.3
+
+
 def test_a_folder_that_holds_a_run_is_refused_before_anything_moves(
     tmp_path: Path, ends: list[tuple[bool, float]]
 ) -> None:
