@@ -1,4 +1,4 @@
-"""Leaves of the behaviour trees (py_trees), one module for each state of a task. A tree file may name the `LEAVES`."""
+"""Leaves of the behaviour trees (py_trees), and our own decorators. A tree file may name the `LEAVES`."""
 
 from regrasp.behaviors.cable.carry import Carry, Insert
 from regrasp.behaviors.cable.detect_slip import DetectSlip
@@ -11,12 +11,14 @@ from regrasp.behaviors.cable.stow import LetGo, LookAtStow
 from regrasp.behaviors.cable.unplug import Unplug
 from regrasp.behaviors.common.check_cameras import CheckCameras
 from regrasp.behaviors.common.holding import Holding
+from regrasp.behaviors.common.log import Log
 from regrasp.behaviors.common.safe_stop import SafeStop
 from regrasp.behaviors.common.start_up import StartUp
+from regrasp.behaviors.common.time import TimeLimit, Wait
 from regrasp.behaviors.common.use_technique import UseTechnique
-from regrasp.behaviors.leaf import Leaf
+from regrasp.behaviors.leaf import Leaf, WithServices
 
-LEAVES: dict[str, type[Leaf]] = {
+LEAVES: dict[str, type[WithServices]] = {
     leaf.__name__: leaf
     for leaf in (
         Carry,
@@ -25,6 +27,7 @@ LEAVES: dict[str, type[Leaf]] = {
         Holding,
         Insert,
         LetGo,
+        Log,
         LookAtStow,
         LookCloser,
         MakeRoom,
@@ -33,8 +36,10 @@ LEAVES: dict[str, type[Leaf]] = {
         SafeStop,
         SpiralSearch,
         StartUp,
+        TimeLimit,
         Unplug,
         UseTechnique,
+        Wait,
         WaitUntilStill,
     )
 }

@@ -34,7 +34,40 @@ class LeafPort(PortInformation):
     names: str | None = None
 
 
-class Leaf(BehaviourWithPorts):
+class WithServices:
+    """A node of a tree that has the run's services, and says why it fails."""
+
+    name: str
+    feedback_message: str
+    services: Services
+
+    def setup(self, **kwargs: Any) -> None:
+        """Keep the services that `BehaviourTree.setup(services=...)` passes to every node."""
+        self.services = kwargs["services"]
+
+    @property
+    def path(self) -> str:
+        """Where the node stands in its tree, such as root/carry/move."""
+        return str(self.name.replace(".", "/"))
+
+    def fail(self, code: CauseCode, message: str) -> Status:
+        """Record the cause and return FAILURE."""
+        return self.fail_with(Cause(code, message, self.path))
+
+    def fail_with(self, cause: Cause) -> Status:
+        """Record a cause, which may be another node's, and return FAILURE."""
+        self.services.belief.causes.append(cause)
+        self.feedback_message = cause.message
+        values = {} if cause.node == self.path else {"of": cause.node}
+        self.services.log.warning("failed", node=self.path, code=cause.code.value, message=cause.message, **values)
+        return Status.FAILURE
+
+    def say(self, event: str, **values: Any) -> None:
+        """Write an event of this node into the run's log."""
+        self.services.log.info(event, node=self.path, **values)
+
+
+class Leaf(WithServices, BehaviourWithPorts):
     """A leaf with services, which says why it fails. Override `work`; py_trees calls it through `update`.
 
     When a service raises ServiceError the arms stop and the leaf fails. Any other exception is a programming error and
@@ -43,7 +76,6 @@ class Leaf(BehaviourWithPorts):
 
     # The statuses that `update` may return. The tree's check needs them to find nodes that are never reached.
     RETURNS: ClassVar[frozenset[Status]] = frozenset({Status.SUCCESS, Status.FAILURE, Status.RUNNING})
-    services: Services
 
     def work(self) -> Status:
         """Do one tick of the work."""
@@ -56,31 +88,6 @@ class Leaf(BehaviourWithPorts):
         except ServiceError as error:
             self.services.motion.stop()
             return self.fail(CauseCode.SERVICE_FAILED, str(error))
-
-    def setup(self, **kwargs: Any) -> None:
-        """Keep the services that `BehaviourTree.setup(services=...)` passes to every leaf."""
-        self.services = kwargs["services"]
-
-    @property
-    def path(self) -> str:
-        """Where the leaf stands in its tree, such as root/carry/move."""
-        return str(self.name.replace(".", "/"))
-
-    def fail(self, code: CauseCode, message: str) -> Status:
-        """Record the cause and return FAILURE."""
-        return self.fail_with(Cause(code, message, self.path))
-
-    def fail_with(self, cause: Cause) -> Status:
-        """Record a cause, which may be another leaf's, and return FAILURE."""
-        self.services.belief.causes.append(cause)
-        self.feedback_message = cause.message
-        values = {} if cause.node == self.path else {"of": cause.node}
-        self.services.log.warning("failed", node=self.path, code=cause.code.value, message=cause.message, **values)
-        return Status.FAILURE
-
-    def say(self, event: str, **values: Any) -> None:
-        """Write an event of this leaf into the run's log."""
-        self.services.log.info(event, node=self.path, **values)
 
 
 class StepsLeaf(Leaf):

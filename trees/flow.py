@@ -47,6 +47,7 @@ _TO: dict[str, dict[Status, tuple[Status, ...]]] = {  # what decorators make of 
     "RunningIsSuccess": {RUNNING: (SUCCESS,)},
     "SuccessIsFailure": {SUCCESS: (FAILURE,)},
     "SuccessIsRunning": {SUCCESS: (RUNNING,)},
+    "TimeLimit": {RUNNING: (RUNNING, FAILURE)},
 }
 _GOES_ON = {"Sequence": SUCCESS, "Fallback": FAILURE, "Selector": FAILURE}
 

@@ -12,6 +12,7 @@ is "1 success", and "running" never ends.
 import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, ClassVar, NamedTuple, cast
 
 import py_trees
@@ -133,6 +134,10 @@ def _able(act: Act, returns: frozenset[Status]) -> Act:
     return Act(1, status if status in returns else min(returns, key=str))
 
 
+def _nothing(*_: object, **__: object) -> None:
+    return None
+
+
 def _listed(statuses: Iterable[Status]) -> str:
     return ", ".join(sorted(status.value for status in statuses))
 
@@ -166,6 +171,9 @@ class ScriptedTree:
             leaves = LEAVES
         self.tree = py_trees.trees.BehaviourTree(load_tree(path, stand_ins(leaves), inputs))
         self.ticks = 0
+        silent = SimpleNamespace(info=_nothing, warning=_nothing)
+        services = SimpleNamespace(clock=self, belief=SimpleNamespace(causes=[]), log=silent)  # for our decorators
+        self.tree.setup(services=services)
         self._table = TickTable(self.tree.root)
         self.tree.add_visitor(self._table)
         paths = node_paths(self.tree.root)

@@ -128,7 +128,9 @@ COUNTERPARTS = {  # for elements of BehaviorTree.CPP, and those of py_trees that
     "ReactiveFallback": '<Fallback memory="false">',
     "ReactiveSequence": '<Sequence memory="false">',
     "RetryUntilSuccessful": '<Retry num_failures="...">',
-    "Timeout": "a leaf with a time limit of its own, such as <SpiralSearch>, in simulated seconds",
+    "Delay": '<Wait seconds="..."> before it',
+    "Sleep": '<Wait seconds="...">',
+    "Timeout": '<TimeLimit seconds="...">, in simulated seconds',
 }
 
 

@@ -156,8 +156,11 @@ class Attempts(py_trees.visitors.VisitorBase):
     def _failure(self, node: Behaviour) -> _Failure:
         """The failure of a node with children."""
         child = self._deciding_child(node)
-        below = self._failures[id(child)] if child is not None else None
-        return _Failure(self._tick, self._link(node, _why(node, child)), None, False, below)
+        if child is not None:
+            return _Failure(self._tick, self._link(node, _why(node, child)), None, False, self._failures[id(child)])
+        cause, _ = self._new_cause()  # such as a time limit's
+        why = f"{cause.code.value}: {cause.message}" if cause else _why(node, child)
+        return _Failure(self._tick, self._link(node, why), cause, False, None)
 
     def _deciding_child(self, node: Behaviour) -> Behaviour | None:
         """The child whose failure made the node fail; None if no child's did.

@@ -127,7 +127,7 @@ CASES = {
         "<Go ",
         '<Timeout name="t" duration="1.0"><Fail name="f"/></Timeout><Go ',
         9,
-        "unknown element 'Timeout'; write a leaf with a time limit of its own",
+        "unknown element 'Timeout'; write <TimeLimit seconds=",
     ),
     "reactive fallback of BehaviorTree.CPP": (
         "<Go ",
