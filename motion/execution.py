@@ -43,7 +43,8 @@ class ExecutionParameters:
 class Execution:
     """Carries out motions of the arms on the simulated clock; planning one takes `latency` s.
 
-    An arm or jaw that fails is out of order: from then on every task of it fails with the same cause.
+    An arm or jaw that fails is out of order: from then on every task of it fails with the same cause. `on_anomaly` is
+    told, in a sentence, of an arm or a jaw that does not follow.
     """
 
     def __init__(
@@ -53,9 +54,9 @@ class Execution:
         clock: Clock,
         latency: float,
         parameters: ExecutionParameters = ExecutionParameters(),
+        on_anomaly: Callable[[str], None] = lambda sentence: None,
     ) -> None:
-        self.parameters = parameters
-        self.on_anomaly: Callable[[str], None] = lambda sentence: None  # told of an arm or a jaw that does not follow
+        self.parameters, self._on_anomaly = parameters, on_anomaly
         self._arms, self._grippers, self._clock, self._latency = arms, grippers, clock, latency
         self._watches = {name: ArmWatch(name, parameters.watch) for name in arms}
         self._speed_share = dict.fromkeys(arms, 1.0)  # of the speed asked for; less for an arm that fell behind
@@ -78,7 +79,7 @@ class Execution:
 
     def give_up(self, arm: str, code: CauseCode, message: str) -> PlanningError:
         """Put an arm or its jaw out of order with this cause; the error is for the caller to raise."""
-        self.on_anomaly(f"{message}: out of order")
+        self._on_anomaly(f"{message}: out of order")
         self._out_of_order[arm] = PlanningError(code, message)
         return self._out_of_order[arm]
 
@@ -98,7 +99,7 @@ class Execution:
             if trouble is None:
                 break
             self.halt(arm)
-            self.on_anomaly(trouble)
+            self._on_anomaly(trouble)
             self._speed_share[arm] *= self.parameters.slowdown
             path = remaining_waypoints(path, trajectory.sample(elapsed)[0])
             yield from self._pause(self.parameters.retry_pause)

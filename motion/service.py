@@ -47,7 +47,7 @@ class MotionParameters:
 
 
 class Motion(PlanningScene):
-    """Requests to the two arms. `seed` makes the planner's draws repeatable."""
+    """Requests to the two arms. `seed` makes the planner's draws repeatable; `on_anomaly`: see `Execution`."""
 
     def __init__(
         self,
@@ -57,11 +57,12 @@ class Motion(PlanningScene):
         clock: Clock,
         seed: int,
         parameters: MotionParameters = MotionParameters(),
+        on_anomaly: Callable[[str], None] = lambda sentence: None,
     ) -> None:
         super().__init__(known, arms, grippers, parameters.scene)
         self.parameters = parameters
         self.planner = plan
-        self.execution = Execution(arms, grippers, clock, known.latencies.plan, parameters.execution)
+        self.execution = Execution(arms, grippers, clock, known.latencies.plan, parameters.execution, on_anomaly)
         self._clock, self._seed = clock, seed
 
     def warm_up(self) -> None:

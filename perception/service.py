@@ -63,7 +63,7 @@ class Perception:
         self._health = {name: CameraHealth(name, parameters.health) for name in cameras}
         self._results: dict[str, tuple[int, Estimate | NoEstimate]] = {}
         self.track = ConnectorTrack(parameters.track)
-        self.hint: FloatArray | None = None  # (3,), world, from cable to tip, where it is known; see `Technique`
+        self._axis: FloatArray | None = None  # see `expect_in_hand`
         region = np.array(parameters.region_lower), np.array(parameters.region_upper)
         self.occupancy = Occupancy(*region, known.solids(), known.connector, parameters.occupancy)
 
@@ -88,10 +88,19 @@ class Perception:
         if camera in self._results and self._results[camera][0] == newest.number:
             return self._results[camera][1]
         near = self.track.position(self._clock.now())
-        result = self._technique.estimate(newest, self._pose_of(newest), axis=self.hint, near=near)
+        result = self._technique.estimate(newest, self._pose_of(newest), axis=self._axis, near=near)
         self._results[camera] = (newest.number, result)
         self.track.feed(result)
         return result
+
+    def expect_in_hand(self, position: FloatArray | None, axis: FloatArray | None) -> None:
+        """From now on, a connector that is not seen may be hidden by the hand, which is at `position` (3,) m.
+
+        `axis` (3,) is the connector's from cable to tip in the world, where the robot knows it; see `Technique`. None
+        ends either.
+        """
+        self.track.set_holding_tool(position)
+        self._axis = axis
 
     def use(self, technique: TechniqueName) -> None:
         """Look by this technique from now on. Raises ValueError if the cell lacks what it needs."""

@@ -49,8 +49,14 @@ def build_services(world: World, seed: int, log: Any) -> Services:
     """
     known = world.cell.known
     grippers = {name: arm.gripper for name, arm in world.arms.items()}
-    motion = Motion(known, world.arms, grippers, world, seed * 1000)
-    motion.execution.on_anomaly = lambda sentence: log.warning("does not follow", why=sentence)
+    motion = Motion(
+        known,
+        world.arms,
+        grippers,
+        world,
+        seed * 1000,
+        on_anomaly=lambda sentence: log.warning("does not follow", why=sentence),
+    )
     perception = Perception(known, world.cameras, world, motion.camera_pose, motion.spheres)
     return Services(known, world, motion, perception, log)
 

@@ -26,8 +26,8 @@ class Monitor(Leaf):
         """See the class."""
         perception, now = self.services.perception, self.services.clock.now()
         tool, held = self.services.motion.tool(HANDLING_ARM), self.services.belief.held
-        perception.track.set_holding_tool(tool.translation)
-        perception.hint = None if held is None else (tool * held).rotation.apply([1.0, 0.0, 0.0])
+        axis = None if held is None else (tool * held).rotation.apply([1.0, 0.0, 0.0])
+        perception.expect_in_hand(tool.translation, axis)
         if now >= self._due - 1e-9:
             perception.look("rear")
             self._due = now + self.get_input("period")
@@ -42,8 +42,7 @@ class Monitor(Leaf):
             self.say("camera", camera="rear", trusted=not self._trouble, why=trouble or "its frames are sound again")
 
     def terminate(self, new_status: Status) -> None:
-        """When the tree stops the leaf, forget the hand and the hint: the carrying is over."""
+        """When the tree stops the leaf, forget the hand: the carrying is over."""
         if new_status is Status.INVALID:
-            self.services.perception.track.set_holding_tool(None)
-            self.services.perception.hint = None
+            self.services.perception.expect_in_hand(None, None)
             self._due = 0.0

@@ -72,14 +72,12 @@ def test_an_arm_that_does_not_follow_is_led_on_slower_and_then_given_up(
 ) -> None:
     rig.arms["right"].at = ASIDE
     rig.arms["right"].stuck = 0.0
-    remarks: list[str] = []
-    rig.motion.execution.on_anomaly = remarks.append
     with pytest.raises(PlanningError, match=r"off its trajectory, limit 0.080, 3 times") as error:
         rig.run(work(rig.motion))
     assert error.value.code is CauseCode.ARM_FAILED
     assert rig.arms["right"].stops == 3
-    assert len(remarks) == 4
-    assert "out of order" in remarks[-1]
+    assert len(rig.remarks) == 4
+    assert "out of order" in rig.remarks[-1]
     lengths = [trajectory.duration for _, trajectory in rig.arms["right"].followed]
     assert lengths[1] == pytest.approx(2 * lengths[0], rel=0.1)
     with pytest.raises(PlanningError) as again:

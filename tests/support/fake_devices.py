@@ -99,7 +99,8 @@ class Rig:
             s.name: FakeArm(s.name, self.clock, np.array(s.sleep)) for s in self.known.arms
         }
         self.grippers: dict[str, FakeGripper] = {s.name: FakeGripper(self.clock) for s in self.known.arms}
-        self.motion = Motion(self.known, self.arms, self.grippers, self.clock, seed=0)
+        self.remarks: list[str] = []  # of what does not follow
+        self.motion = Motion(self.known, self.arms, self.grippers, self.clock, seed=0, on_anomaly=self.remarks.append)
 
     def run(self, task: MotionTask, seconds: float = 60.0) -> None:
         """Poll a task at every tick until it is done."""

@@ -142,10 +142,14 @@ class FakePerception:
         self.shows: Callable[[str, float], Seen] = lambda camera, stamp: None
         self.frames: Callable[[float], RgbdFrame | None] = lambda stamp: None
         self.track = ConnectorTrack()
-        self.hint: Vector | None = None
+        self.axis: Vector | None = None
         self.looks: list[float] = []
         self.troubles: dict[str, str] = {}
         self.occupancy = SimpleNamespace(occupied_points=lambda: np.empty((0, 3)), voxel_size=0.01)
+
+    def expect_in_hand(self, position: Vector | None, axis: Vector | None) -> None:
+        self.track.set_holding_tool(position)
+        self.axis = axis
 
     def use(self, technique: str) -> None:
         """One technique is like the other."""

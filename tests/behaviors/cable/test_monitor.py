@@ -30,7 +30,7 @@ def test_it_looks_at_its_period_and_always_succeeds(stage: Stage) -> None:
 
 def test_the_eye_is_told_which_way_the_held_tip_points(stage: Stage) -> None:
     stage.run(stage.tree(MONITOR), 0.0)
-    assert stage.perception.hint == pytest.approx([0.0, 1.0, 0.0])
+    assert stage.perception.axis == pytest.approx([0.0, 1.0, 0.0])
 
 
 def test_what_the_hand_hides_is_not_lost_until_the_watch_ends(stage: Stage) -> None:
@@ -42,11 +42,11 @@ def test_what_the_hand_hides_is_not_lost_until_the_watch_ends(stage: Stage) -> N
     assert tree.root.feedback_message.startswith("hidden_by_hand")
     tree.root.stop(Status.INVALID)
     assert stage.perception.track.state(2.0)[0] is TrackState.LOST
-    assert stage.perception.hint is None
+    assert stage.perception.axis is None
 
 
-def test_nothing_held_gives_no_hint(stage: Stage) -> None:
+def test_nothing_held_has_no_axis(stage: Stage) -> None:
     stage.belief.held = None
-    stage.perception.hint = np.array([1.0, 0.0, 0.0])
+    stage.perception.axis = np.array([1.0, 0.0, 0.0])
     stage.run(stage.tree(MONITOR), 0.0)
-    assert stage.perception.hint is None
+    assert stage.perception.axis is None

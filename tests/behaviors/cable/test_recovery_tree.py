@@ -148,7 +148,7 @@ def test_stopped_after_any_tick_no_arm_moves_and_no_work_is_left(play: Make, gon
         assert [leaf.name for leaf in cut.leaves.values() if leaf.status is Status.RUNNING] == []
         works = [vars(leaf)["_work"] for leaf in cut.leaves.values() if "_work" in vars(leaf)]
         assert {inspect.getgeneratorstate(work) for work in works} == {inspect.GEN_CLOSED}
-        assert cut.eyes.hint is None
+        assert cut.eyes.axis is None
     assert caught == whole.seen
     assert moving > 10
     assert threading.active_count() == threads
