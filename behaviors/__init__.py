@@ -11,6 +11,7 @@ from regrasp.behaviors.cable.stow import LetGo, LookAtStow
 from regrasp.behaviors.cable.unplug import Unplug
 from regrasp.behaviors.common.check_cameras import CheckCameras
 from regrasp.behaviors.common.holding import Holding
+from regrasp.behaviors.common.keys import CheckKey, SetKey
 from regrasp.behaviors.common.log import Log
 from regrasp.behaviors.common.safe_stop import SafeStop
 from regrasp.behaviors.common.start_up import StartUp
@@ -23,6 +24,7 @@ LEAVES: dict[str, type[WithServices]] = {
     for leaf in (
         Carry,
         CheckCameras,
+        CheckKey,
         DetectSlip,
         Holding,
         Insert,
@@ -34,6 +36,7 @@ LEAVES: dict[str, type[WithServices]] = {
         Monitor,
         Regrasp,
         SafeStop,
+        SetKey,
         SpiralSearch,
         StartUp,
         TimeLimit,

@@ -24,6 +24,7 @@ class CauseCode(StrEnum):
     GRIPPER_FAILED = "gripper_failed"
     SERVICE_FAILED = "service_failed"
     TOO_MANY_TRIES = "too_many_tries"
+    KEY_DIFFERS = "key_differs"
     TIMED_OUT = "timed_out"
     TIME_LIMIT = "time_limit"
     WALL_LIMIT = "wall_limit"
