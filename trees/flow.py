@@ -166,7 +166,9 @@ class _Flow:
 
     def _rule(self, node: ExpandedNode) -> Callable[[ExpandedNode, Runs], Ends]:
         tag = node.element.tag
-        built_in = node.kind is BUILT_IN.get(tag)  # None is None: a subtree, or an element that nobody knows
+        built_in = tag in _TO or node.kind is BUILT_IN.get(
+            tag
+        )  # None is None: a subtree, or an element that nobody knows
         if built_in and node.children:
             if tag in _GOES_ON:
                 return self._in_turn

@@ -28,9 +28,11 @@ def migrate(
       regrasp migrate suites/*.scenario.yaml
 
     \b
-    What changes: under expect, outcome: stowed becomes success (end: stowed then goes without saying), and
+    What changes: under expect, outcome: stowed becomes success (end: stowed is then the default), and
     outcome: safe_stop becomes failure.
     """
+    import os
+
     from regrasp.app.files.resources import read_text
     from regrasp.app.files.whole_file import write_whole
     from regrasp.app.scenario.old_words import migrated
@@ -40,14 +42,22 @@ def migrate(
     for path in files:
         try:
             done[path] = migrated(read_text(path), shown(path))
+            if done[path][1] and not dry_run and not os.access(path, os.W_OK):
+                found.append(Finding(shown(path), 0, "is write-protected; nothing has been changed"))
         except Findings as error:
             found += error.items
     if found:
         raise Findings(found)
     for path, (text, lines) in done.items():
-        if lines and not dry_run:
-            write_whole(path, text)
+        try:
+            if lines and not dry_run:
+                write_whole(path, text)
+        except OSError as error:
+            found.append(Finding(shown(path), 0, f"cannot be written: {error.strerror}"))
+    for path, (text, lines) in done.items():
         for line in lines:
             typer.echo(f"{shown(path)}:{line}: {text.splitlines()[line - 1].strip()}")
         if not lines:
             typer.echo(f"{shown(path)}: nothing to change")
+    if found:
+        raise Findings(found)

@@ -161,7 +161,7 @@ def _result(path: Path, found: list[Finding]) -> Result | None:
         if schema > SCHEMA:
             raise ValueError(f"schema {schema} is newer than {SCHEMA}, which this program reads; take a newer Regrasp")
         if schema == 1:
-            value["outcome"] = OLD_OUTCOMES.get(str(value.get("outcome")), value.get("outcome"))
+            _translate(value)
         result = _adapter(Result).validate_python(value)
         for number, attempt in enumerate(result.attempts):
             if attempt.path.count("/") > MAX_TREE_DEPTH:
@@ -171,6 +171,16 @@ def _result(path: Path, found: list[Finding]) -> Result | None:
         at = re.search(r" at line (\d+) column", str(error))
         found.append(Finding(shown(path), int(at[1]) if at else 1, _sentence(error)))
         return None
+
+
+def _translate(value: dict[str, Any]) -> None:
+    """Put today's words in a result of schema 1."""
+    value["outcome"] = OLD_OUTCOMES.get(str(value.get("outcome")), value.get("outcome"))
+    expectations = value.get("expectations")
+    for item in expectations if isinstance(expectations, list) else ():
+        if isinstance(item, dict) and item.get("name") == "outcome":
+            for key in ("value", "limit"):
+                item[key] = OLD_OUTCOMES.get(str(item.get(key)), item.get(key))
 
 
 def _bytes(path: Path, most: int, found: list[Finding]) -> bytes | None:

@@ -1,11 +1,14 @@
 """The words of scenarios of schema 1: they are still read, with a warning, and `regrasp migrate` rewrites them."""
 
+import contextlib
 import warnings
 from collections.abc import Iterator
+from typing import Any
 
 import yaml
 
-from regrasp.app.files.findings import Finding
+from regrasp.app.files.findings import Finding, Findings
+from regrasp.app.files.overrides import was_typed
 from regrasp.app.files.schema_nodes import value_at
 from regrasp.app.files.yaml_lines import Document, parse
 from regrasp.app.records.result import OLD_OUTCOMES
@@ -21,21 +24,57 @@ def warn_of_old_words(document: Document) -> None:
     """Issue an `OldWordWarning`, with file and line, for a scenario of schema 1."""
     word = value_at(document.value, _OUTCOME)
     if isinstance(word, str) and word in OLD_OUTCOMES:
-        new = f"expect.outcome: {word} is an old word; write outcome: {OLD_OUTCOMES[word]}, as regrasp migrate does"
-        warnings.warn(str(Finding(*document.place(_OUTCOME), new)), OldWordWarning, stacklevel=2)
+        place = document.place(_OUTCOME)
+        new = f"expect.outcome: {word} is an old word; write outcome: {OLD_OUTCOMES[word]}"
+        hint = "" if was_typed(place) else ", as regrasp migrate does"
+        warnings.warn(str(Finding(*place, new + hint)), OldWordWarning, stacklevel=2)
 
 
 def migrated(text: str, source: str) -> tuple[str, list[int]]:
     """A scenario's text with the words of today, and the lines that changed; all else stays as it is.
 
-    Raises `Findings` if the text is not YAML.
+    Raises `Findings` if the text is not YAML, or where only a person can change it: a word that an alias shares.
     """
-    parse(text, source)
+    wanted = _translated(parse(text, source).value)
     root = yaml.compose(text, Loader=yaml.SafeLoader)
     old = {node.start_mark.index: node for node in _outcomes(root) if node.value in OLD_OUTCOMES}
+    new = text
     for begin, node in sorted(old.items(), reverse=True):
-        text = text[:begin] + OLD_OUTCOMES[node.value] + text[node.end_mark.index :]
-    return text, sorted({node.start_mark.line + 1 for node in old.values()})
+        word = new.rindex(node.value, begin, node.end_mark.index)  # an anchor and quotes stay
+        new = new[:word] + OLD_OUTCOMES[node.value] + new[word + len(node.value) :]
+    lines = sorted({node.start_mark.line + 1 for node in old.values()})
+    with contextlib.suppress(Findings):
+        if parse(new, source).value == wanted:
+            return new, lines
+    message = "an outcome has an old word that an alias or a merge shares; change it by hand"
+    raise Findings([Finding(source, lines[0] if lines else 0, message)])
+
+
+def _translated(value: Any) -> Any:
+    """A scenario's plain value with the words of today."""
+    if not isinstance(value, dict):
+        return value
+    made = dict(value)
+    if isinstance(value.get("expect"), dict):
+        made["expect"] = _with_new_outcome(value["expect"])
+    if isinstance(value.get("vary"), dict):
+        axes = dict(value["vary"])
+        if isinstance(axes.get("expect"), list):
+            axes["expect"] = [_with_new_outcome(item) for item in axes["expect"]]
+        if isinstance(axes.get(key := ".".join(_OUTCOME)), list):
+            axes[key] = [_new_word(item) for item in axes[key]]
+        made["vary"] = axes
+    return made
+
+
+def _with_new_outcome(expect: Any) -> Any:
+    if not isinstance(expect, dict) or "outcome" not in expect:
+        return expect
+    return {**expect, "outcome": _new_word(expect["outcome"])}
+
+
+def _new_word(word: Any) -> Any:
+    return OLD_OUTCOMES.get(word, word) if isinstance(word, str) else word
 
 
 def _outcomes(root: yaml.Node | None) -> Iterator[yaml.ScalarNode]:

@@ -23,7 +23,7 @@ FIELDS = [
     *("renderer", "versions", "belief", "attempts"),
 ]
 STATES = {"unplug", "monitor", "detect_slip", "carry", "insert", "check_cameras", "regrasp", "stow", "let_go"}
-EXPECTED = {"outcome", "slips", "unintended_force"}
+EXPECTED = {"outcome", "end", "slips", "unintended_force"}
 
 
 def lines(path: Path) -> list[dict[str, Any]]:
@@ -44,7 +44,7 @@ def check_result(folder: Path, scenario: str, expected: set[str]) -> None:
     """result.json has what a reader asks of it, and says that all came out."""
     read = json.loads((folder / "result.json").read_text())
     assert list(read) == FIELDS
-    assert (read["schema"], read["scenario"], read["seed"]) == (1, scenario, 0)
+    assert (read["schema"], read["scenario"], read["seed"]) == (2, scenario, 0)
     assert (read["outcome"], read["succeeded"], read["cause"]) == ("success", True, None)
     assert {e["name"] for e in read["expectations"]} == expected
     assert all(set(e) == {"name", "met", "value", "limit"} and e["met"] is True for e in read["expectations"])

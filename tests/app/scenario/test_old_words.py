@@ -1,3 +1,4 @@
+import os
 import shutil
 import warnings
 from pathlib import Path
@@ -23,7 +24,7 @@ vary:
   expect.outcome: [stowed, safe_stop, failure]
   expect: [{outcome: safe_stop}, {slips: 2}]
 """
-NEW = OLD.replace('outcome: "stowed"', "outcome: success").replace("[stowed, safe_stop", "[success, failure")
+NEW = OLD.replace('outcome: "stowed"', 'outcome: "success"').replace("[stowed, safe_stop", "[success, failure")
 NEW = NEW.replace("outcome: safe_stop", "outcome: failure")
 HEAD = "description: old\ncell: thesis\ntree: recovery\ngravity: zero\n"
 
@@ -86,6 +87,44 @@ def test_what_is_no_scenario_stays_as_it_is(text: str) -> None:
     assert migrated(text, "mine.yaml") == (text, [])
 
 
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("expect: {outcome: 'stowed'}\n", "expect: {outcome: 'success'}\n"),
+        ("expect:\n  outcome: |-\n    stowed\n  slips: 0\n", "expect:\n  outcome: |-\n    success\n  slips: 0\n"),
+        (
+            "vary: {expect.outcome: [&a safe_stop, *a]}\nexpect: {outcome: &stowed stowed}\n",
+            "vary: {expect.outcome: [&a failure, *a]}\nexpect: {outcome: &stowed success}\n",
+        ),
+    ],
+)
+def test_quotes_blocks_and_anchors_stay(old: str, new: str) -> None:
+    assert migrated(old, "mine.yaml")[0] == new
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "sigh: &o stowed\nexpect: {outcome: *o}\n",
+        "x: &d {outcome: stowed}\nexpect: {<<: *d}\n",
+    ],
+)
+def test_what_an_alias_shares_with_another_key_is_left_to_a_person(text: str) -> None:
+    with pytest.raises(Findings, match="shares; change it by hand"):
+        migrated(text, "mine.yaml")
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anything")
+def test_a_write_protected_file_stops_it_before_anything_is_changed(tmp_path: Path) -> None:
+    path, kept = tmp_path / "mine.yaml", tmp_path / "kept.yaml"
+    path.write_text(OLD)
+    kept.write_text(OLD)
+    kept.chmod(0o444)
+    done = CliRunner().invoke(app, ["migrate", str(path), str(kept)])
+    assert (done.exit_code, path.read_text()) == (2, OLD)
+    assert "kept.yaml: is write-protected" in done.stderr
+
+
 def test_what_is_not_yaml_is_a_finding() -> None:
     with pytest.raises(Findings, match=r"mine\.yaml:1: not YAML"):
         migrated("expect: [", "mine.yaml")
@@ -98,3 +137,4 @@ def test_a_record_of_schema_1_is_read(tmp_path: Path) -> None:
     record = read_record(tmp_path / "record")
     assert record.result is not None
     assert record.result.outcome == "failure"
+    assert [(e.value, e.limit) for e in record.result.expectations if e.name == "outcome"] == [("failure", "failure")]

@@ -62,6 +62,11 @@ def test_the_check_knows_that_a_limit_ends_what_runs_for_ever(tmp_path: Path) ->
     ):
         path.write_text(TREE.format(f'<Fallback name="f" memory="true">{body}<StartUp name="s"/></Fallback>'))
         assert (check_tree(path, LEAVES) == []) is right
+    never = '<Fallback name="f" memory="true">{}<StartUp name="s"/></Fallback>'
+    logged = '<TimeLimit name="limit" seconds="1.0"><Log name="log" message="x"/></TimeLimit>'
+    path.write_text(TREE.format(never.format(logged)))
+    [(_, message)] = check_tree(path, LEAVES)
+    assert "is never reached" in message  # a Log ends at once, and never fails
     path.write_text(TREE.format(LIMITED.format(limit=0, wait=1)))
     [(_, message)] = check_tree(path, LEAVES)
     assert "seconds" in message
