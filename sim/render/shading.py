@@ -109,7 +109,8 @@ def shade(
     height, width = seen.shape
     grain, facing = np.empty(width, np.float32), np.empty(width, np.float32)
     x, y, z = np.empty(width, np.float32), np.empty(width, np.float32), np.empty(width, np.float32)
-    depth, texel = np.empty(width, np.float32), np.empty(width, np.int32)
+    depth = np.empty(width, np.float32)
+    columns, rows = np.empty(width, np.int32), np.empty(width, np.int32)
     texels, size = shadows.ravel(), np.int32(len(shadows))
     nearer = strengths[2] / np.float32(size)
     for v in range(height):
@@ -118,8 +119,9 @@ def shade(
         _grain(depth, world_rays, v, grain)
         _follow(depth, light_rays, v, x, y, z)
         _face(seen[v], runs, planes, depth, v, strengths[2], nearer, facing, x, y, z)
-        _find_texels(x, y, size, texel)
-        _light(x, y, z, texels, size, texel)
+        _find_texels(x, size, columns)
+        _find_texels(y, size, rows)
+        _light(x, y, z, texels, size, columns, rows)
         _brighten(x, facing, strengths[0], strengths[1], grain)
         for channel in range(3):
             _paint(seen[v], runs, item_of, colors[:, channel], background[channel], grain, channels[channel, v])
@@ -212,27 +214,20 @@ def _add_product(
 
 
 @numba.njit(cache=True, error_model="numpy", fastmath={"contract"})
-def _find_texels(x: NDArray[np.float32], y: NDArray[np.float32], size: np.int32, texel: NDArray[np.int32]) -> None:
-    """Write the number of the upper left of the four texels about x, y, and leave in x, y how far beyond it they lie.
+def _find_texels(at: NDArray[np.float32], size: np.int32, texel: NDArray[np.int32]) -> None:
+    """Write the columns, or the rows, of the texels before `at`, and leave in `at` how far beyond them it lies.
 
     What lies outside the map, or is no number, goes to its border. Comparisons are written out here, since Python's
     min and max keep the compiler from working on several pixels at once.
     """
     last, corner = np.float32(size - 1), np.int32(size - 2)
-    for u in range(len(x)):
-        across = x[u] if x[u] > _ZERO else _ZERO
-        across = across if across < last else last
-        column = np.int32(across)
-        column = column if column < corner else corner
-        x[u] = across - np.float32(column)
-        texel[u] = column
-    for u in range(len(x)):
-        down = y[u] if y[u] > _ZERO else _ZERO
-        down = down if down < last else last
-        row = np.int32(down)
-        row = row if row < corner else corner
-        y[u] = down - np.float32(row)
-        texel[u] += np.int32(row * size)
+    for u in range(len(at)):
+        inside = at[u] if at[u] > _ZERO else _ZERO
+        inside = inside if inside < last else last
+        before = np.int32(inside)
+        before = before if before < corner else corner
+        at[u] = inside - np.float32(before)
+        texel[u] = before
 
 
 @numba.njit(cache=True, error_model="numpy", fastmath={"contract"})
@@ -242,11 +237,12 @@ def _light(
     z: NDArray[np.float32],
     texels: NDArray[np.float32],
     size: np.int32,
-    texel: NDArray[np.int32],
+    columns: NDArray[np.int32],
+    rows: NDArray[np.int32],
 ) -> None:
-    """Write to x the share of light: the four texels at `texel`, weighted by x and y, that are not nearer than z."""
+    """Write to x the share of light: of the four texels from column and row on, weighted by x, y, those behind z."""
     for u in range(len(x)):
-        at = np.uint32(texel[u])
+        at = np.uint32(rows[u] * size + columns[u])
         near = z[u] if z[u] > _ZERO else _ZERO
         a = np.float32(near >= texels[at])
         b = np.float32(near >= texels[at + np.uint32(1)])
