@@ -29,7 +29,7 @@ lint: setup
 	$(BIN)/lint-imports
 
 bench: setup
-	$(BIN)/python -m regrasp.app.bench
+	$(BIN)/python -m regrasp.app.tasks.cable.bench
 
 fuzz: setup
 	$(BIN)/python tests/support/fuzz_readers.py --cases 2000

@@ -12,7 +12,8 @@ import yaml
 from hypothesis import settings
 from scipy.spatial.transform import RigidTransform
 
-from regrasp.interfaces.cell import Box, Cell, KnownCell
+from regrasp.interfaces.cable.cell import CableCell, CableKnown
+from regrasp.interfaces.cell import Box
 from regrasp.motion.robots.kinematics import ArmKinematics
 from regrasp.motion.scene.collision import CollisionModel
 
@@ -53,23 +54,23 @@ def thesis() -> Any:
 
 
 @pytest.fixture(scope="session")
-def known() -> KnownCell:
+def known() -> CableKnown:
     """The cell as its robot knows it."""
-    return Cell.model_validate(thesis()).known
+    return CableCell.model_validate(thesis()).known
 
 
 @pytest.fixture(scope="session")
-def cell() -> Cell:
+def cell() -> CableCell:
     """The thesis's cell with small pictures and arms without joint offsets."""
     data = thesis()
     data["hidden"]["errors"]["arm_tool"] = 0.0
     for camera in data["known"]["cameras"]:
         camera |= {"width": 212, "height": 120}
-    return Cell.model_validate(data)
+    return CableCell.model_validate(data)
 
 
 @pytest.fixture
-def client(cell: Cell) -> Iterator[int]:
+def client(cell: CableCell) -> Iterator[int]:
     """An empty world without gravity at the cell's step."""
     client = p.connect(p.DIRECT)
     p.setTimeStep(1.0 / cell.hidden.step_rate, physicsClientId=client)
@@ -79,20 +80,20 @@ def client(cell: Cell) -> Iterator[int]:
 
 
 @pytest.fixture(scope="session")
-def boxes(known: KnownCell) -> list[Box]:
+def boxes(known: CableKnown) -> list[Box]:
     """Floor, panels, sockets and clip."""
-    sockets = [Box(name=s.name, center=s.center, size=s.size) for s in known.sockets]
-    return [*known.boxes, *sockets, *known.clip.bracket]
+    sockets = [Box(name=s.name, center=s.center, size=s.size) for s in known.cable.sockets]
+    return [*known.boxes, *sockets, *known.cable.clip.bracket]
 
 
 @pytest.fixture(scope="session")
-def left_arm(known: KnownCell) -> ArmKinematics:
+def left_arm(known: CableKnown) -> ArmKinematics:
     """The left arm where it stands."""
     return ArmKinematics(RigidTransform.from_translation(known.arm("left").base))
 
 
 @pytest.fixture(scope="session")
-def right_arm(known: KnownCell) -> ArmKinematics:
+def right_arm(known: CableKnown) -> ArmKinematics:
     """The right arm where it stands."""
     return ArmKinematics(RigidTransform.from_translation(known.arm("right").base))
 

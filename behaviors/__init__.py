@@ -1,50 +1,22 @@
 """Leaves of the behaviour trees (py_trees), and our own decorators. A tree file may name the `LEAVES`."""
 
-from regrasp.behaviors.cable.carry import Carry, Insert
-from regrasp.behaviors.cable.detect_slip import DetectSlip
-from regrasp.behaviors.cable.look_closer import LookCloser
-from regrasp.behaviors.cable.monitor import Monitor
-from regrasp.behaviors.cable.recover import MakeRoom, WaitUntilStill
-from regrasp.behaviors.cable.regrasp import Regrasp
-from regrasp.behaviors.cable.spiral_search import SpiralSearch
-from regrasp.behaviors.cable.stow import LetGo, LookAtStow
-from regrasp.behaviors.cable.unplug import Unplug
-from regrasp.behaviors.common.check_cameras import CheckCameras
-from regrasp.behaviors.common.holding import Holding
-from regrasp.behaviors.common.keys import CheckKey, SetKey
-from regrasp.behaviors.common.log import Log
-from regrasp.behaviors.common.safe_stop import SafeStop
-from regrasp.behaviors.common.start_up import StartUp
-from regrasp.behaviors.common.time import TimeLimit, Wait
-from regrasp.behaviors.common.use_technique import UseTechnique
-from regrasp.behaviors.leaf import Leaf, WithServices
+from typing import TYPE_CHECKING, Any
 
-LEAVES: dict[str, type[WithServices]] = {
-    leaf.__name__: leaf
-    for leaf in (
-        Carry,
-        CheckCameras,
-        CheckKey,
-        DetectSlip,
-        Holding,
-        Insert,
-        LetGo,
-        Log,
-        LookAtStow,
-        LookCloser,
-        MakeRoom,
-        Monitor,
-        Regrasp,
-        SafeStop,
-        SetKey,
-        SpiralSearch,
-        StartUp,
-        TimeLimit,
-        Unplug,
-        UseTechnique,
-        Wait,
-        WaitUntilStill,
-    )
-}
+if TYPE_CHECKING:
+    from regrasp.behaviors.leaf import Leaf as Leaf
+
+    LEAVES: dict[str, type[Any]]
 
 __all__ = ["LEAVES", "Leaf"]
+
+
+def __getattr__(name: str) -> Any:
+    if name == "LEAVES":
+        from regrasp.behaviors.registry import all_leaves  # late: it imports the leaves of every task
+
+        return all_leaves()
+    if name == "Leaf":
+        from regrasp.behaviors.leaf import Leaf
+
+        return Leaf
+    raise AttributeError(f"module 'regrasp.behaviors' has no attribute {name!r}")

@@ -18,7 +18,7 @@ LeafSteps = Generator[MotionTask | None, None, None]
 class LeafFailed(Exception):  # noqa: N818 - it names the leaf's outcome
     """Raised inside `steps`: the leaf ends in FAILURE with this cause."""
 
-    def __init__(self, code: CauseCode, message: str) -> None:
+    def __init__(self, code: str, message: str) -> None:
         super().__init__(message)
         self.code = code
 
@@ -50,7 +50,7 @@ class WithServices:
         """Where the node stands in its tree, such as root/carry/move."""
         return str(self.name.replace(".", "/"))
 
-    def fail(self, code: CauseCode, message: str) -> Status:
+    def fail(self, code: str, message: str) -> Status:
         """Record the cause and return FAILURE."""
         return self.fail_with(Cause(code, message, self.path))
 
@@ -59,7 +59,7 @@ class WithServices:
         self.services.belief.causes.append(cause)
         self.feedback_message = cause.message
         values = {} if cause.node == self.path else {"of": cause.node}
-        self.services.log.warning("failed", node=self.path, code=cause.code.value, message=cause.message, **values)
+        self.services.log.warning("failed", node=self.path, code=str(cause.code), message=cause.message, **values)
         return Status.FAILURE
 
     def say(self, event: str, **values: Any) -> None:

@@ -9,7 +9,7 @@ from regrasp.interfaces.devices import Clock
 if TYPE_CHECKING:
     from scipy.spatial.transform import RigidTransform
 
-    from regrasp.interfaces.cell import KnownCell
+    from regrasp.interfaces.cable.cell import CableKnown
     from regrasp.motion.service import Motion
     from regrasp.perception.service import Perception
 
@@ -39,7 +39,7 @@ class Belief:
 class Services:
     """The services of one run."""
 
-    known: "KnownCell"
+    known: "CableKnown"
     clock: Clock
     motion: "Motion"
     perception: "Perception"

@@ -1,11 +1,11 @@
-"""Causes of failure: one enumeration for all leaves, services and runs."""
+"""Causes of failure: those of every task. A task adds an enumeration of its own."""
 
 from dataclasses import dataclass
 from enum import StrEnum
 
 
 class CauseCode(StrEnum):
-    """Every cause that a leaf, a service or a run may give."""
+    """The causes that a leaf, a service or a run of any task may give."""
 
     OUT_OF_REACH = "out_of_reach"
     NO_COLLISION_FREE_GOAL = "no_collision_free_goal"
@@ -13,12 +13,7 @@ class CauseCode(StrEnum):
     MOTION_BLOCKED = "motion_blocked"
     GRASP_EMPTY = "grasp_empty"
     GRASP_FAILED = "grasp_failed"
-    SLIPPED = "slipped"
     NOTHING_HELD = "nothing_held"
-    CONNECTOR_NOT_FOUND = "connector_not_found"
-    SEARCH_EXHAUSTED = "search_exhausted"
-    NOT_STOWED = "not_stowed"
-    NOT_STILL = "not_still"
     CAMERA_FAILED = "camera_failed"
     ARM_FAILED = "arm_failed"
     GRIPPER_FAILED = "gripper_failed"
@@ -40,6 +35,6 @@ class ServiceError(Exception):
 class Cause:
     """A cause: its code, one sentence with the numbers, and the tree path of its node ('' without a tree)."""
 
-    code: CauseCode
+    code: str  # a `CauseCode`, or a task's own
     message: str
     node: str = ""

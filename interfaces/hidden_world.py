@@ -5,39 +5,14 @@ from typing import Annotated
 from pydantic import Field
 
 from regrasp.interfaces.fields import (
-    Color,
     Deviation,
     Direction,
     Force,
     Fraction,
     Friction,
-    Length,
-    Mass,
     Model,
     UnsignedDegrees,
-    Vector,
 )
-
-
-class Stiffness(Model):
-    """Bending stiffness EI in N m2 for each gravity. For tests on Earth the cable is stiffer, as in the thesis."""
-
-    zero: Annotated[float, Field(ge=1e-4, le=10)]
-    earth: Annotated[float, Field(ge=1e-4, le=10)]
-
-
-class Cable(Model):
-    """The flexible part of the cable. It is clamped at `anchor`; without load it lies straight along `anchor_axis`."""
-
-    length: Length
-    radius: Annotated[float, Field(ge=1e-4, le=0.03)]
-    mass_per_length: Mass
-    links: Annotated[int, Field(ge=4, le=30)]  # PyBullet reads at most 31 spherical joints
-    stiffness: Stiffness
-    damping_ratio: Annotated[float, Field(ge=0, le=10)]  # of the first bending mode
-    anchor: Vector
-    anchor_axis: Direction
-    color: Color
 
 
 class Errors(Model):
@@ -75,13 +50,10 @@ class GripperSpec(Model):
 
 
 class HiddenWorld(Model):
-    """What only the simulated world knows: masses, friction, errors, light."""
+    """What only the simulated world knows: physics, errors, light. A task adds its section under the task's name."""
 
     step_rate: Annotated[int, Field(ge=240, le=4800, multiple_of=240)]  # physics steps a second
     solver_iterations: Annotated[int, Field(ge=10, le=500)]
-    cable: Cable
-    connector_mass: Mass
-    connector_friction: Friction
     gripper: GripperSpec
     errors: Errors
     light: Light

@@ -6,7 +6,7 @@ from typing import Literal, get_args
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.cell import Box
-from regrasp.interfaces.fault import AnyFault
+from regrasp.interfaces.fault import Fault
 from regrasp.interfaces.fields import Color
 
 Gravity = Literal["zero", "earth"]
@@ -44,6 +44,6 @@ class SceneSetup:
     """
 
     obstacles: tuple[Obstacle, ...] = ()
-    faults: tuple[AnyFault, ...] = ()
+    faults: tuple[Fault, ...] = ()
     connector_at: RigidTransform | None = None
     props: tuple[Prop, ...] = ()

@@ -77,7 +77,7 @@ class Execution:
         self._arms[arm].stop()
         self._watches[arm].leave(None)
 
-    def give_up(self, arm: str, code: CauseCode, message: str) -> PlanningError:
+    def give_up(self, arm: str, code: str, message: str) -> PlanningError:
         """Put an arm or its jaw out of order with this cause; the error is for the caller to raise."""
         self._on_anomaly(f"{message}: out of order")
         self._out_of_order[arm] = PlanningError(code, message)

@@ -1,11 +1,9 @@
 """The error of motion planning and execution: no motion was found, or an arm cannot carry it out."""
 
-from regrasp.interfaces.cause import CauseCode
-
 
 class PlanningError(Exception):
     """No motion was found, or it could not be carried out; `code` is the cause, the message says why, with numbers."""
 
-    def __init__(self, code: CauseCode, message: str) -> None:
+    def __init__(self, code: str, message: str) -> None:
         super().__init__(message)
         self.code = code

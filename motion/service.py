@@ -12,13 +12,13 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import FloatArray
+from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.cause import CauseCode
-from regrasp.interfaces.cell import KnownCell
 from regrasp.interfaces.devices import Arm, Clock, Gripper
+from regrasp.motion.cable.carry_paths import CarryPathParameters, can_continue, carry_paths, first_free
 from regrasp.motion.execution import Execution, ExecutionParameters
 from regrasp.motion.failure import PlanningError
 from regrasp.motion.grasping.approach import PickParameters, find_approaches, pick_candidates, points_beyond
-from regrasp.motion.planning.carry_paths import CarryPathParameters, can_continue, carry_paths, first_free
 from regrasp.motion.planning.planner import PlannerParameters, plan
 from regrasp.motion.planning.straight import straight_line
 from regrasp.motion.robots.arm_offsets import JointOffsetParameters, joint_offsets
@@ -51,7 +51,7 @@ class Motion(PlanningScene):
 
     def __init__(
         self,
-        known: KnownCell,
+        known: CableKnown,
         arms: Mapping[str, Arm],
         grippers: Mapping[str, Gripper],
         clock: Clock,
@@ -71,7 +71,7 @@ class Motion(PlanningScene):
         The compiled functions of a pick are then loaded now, and no tick waits for it.
         """
         known = self.known
-        plugged = known.socket(known.plugged_into).world_from_plug(known.connector.length)
+        plugged = known.cable.socket(known.cable.plugged_into).world_from_plug(known.cable.connector.length)
         for arm in self.arms:
             with suppress(PlanningError):
                 self._approaches(arm, self.model(arm), plugged, 0.0)
@@ -186,7 +186,7 @@ class Motion(PlanningScene):
 
     def release(self, arm: str) -> MotionTask:
         """Open the jaw; done once it stands wider than a connector."""
-        gap = 2 * self.known.connector.radius + self.parameters.execution.jaw.slack
+        gap = 2 * self.known.cable.connector.radius + self.parameters.execution.jaw.slack
         return self.execution.task(arm, self.execution.open_jaw(arm, gap))
 
     def stop(self) -> None:
@@ -194,7 +194,7 @@ class Motion(PlanningScene):
         for arm in self.arms:
             self.execution.halt(arm)
 
-    def give_up(self, arm: str, code: CauseCode, message: str) -> PlanningError:
+    def give_up(self, arm: str, code: str, message: str) -> PlanningError:
         """Disable an arm or its jaw: every later request to it fails with this cause. Returns the error to raise."""
         return self.execution.give_up(arm, code, message)
 
@@ -227,7 +227,7 @@ class Motion(PlanningScene):
         """Joint paths (k, 6) rad from standoff to grasp; `model` counts away from the connector."""
         pick = self.parameters.pick
         near = self.model(arm, clip=False, opening=self.parameters.execution.jaw.open_gap)
-        candidates = pick_candidates(world_from_connector, self.known.connector, shallow, pick)
+        candidates = pick_candidates(world_from_connector, self.known.cable.connector, shallow, pick)
         return find_approaches(model, near, self.joints(arm), candidates, self.parameters.clearances, pick)
 
     def _plan(

@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import FloatArray
-from regrasp.interfaces.cell import KnownCell
+from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.devices import Camera, Clock
 from regrasp.interfaces.frame import RgbdFrame
 from regrasp.interfaces.wall_time import counts_as
@@ -49,7 +49,7 @@ class Perception:
 
     def __init__(
         self,
-        known: KnownCell,
+        known: CableKnown,
         cameras: Mapping[str, Camera],
         clock: Clock,
         pose_of: Callable[[RgbdFrame], RigidTransform],
@@ -65,7 +65,7 @@ class Perception:
         self.track = ConnectorTrack(parameters.track)
         self._axis: FloatArray | None = None  # see `expect_in_hand`
         region = np.array(parameters.region_lower), np.array(parameters.region_upper)
-        self.occupancy = Occupancy(*region, known.solids(), known.connector, parameters.occupancy)
+        self.occupancy = Occupancy(*region, known.solids(), known.cable.connector, parameters.occupancy)
 
     def frame(self, camera: str) -> RgbdFrame | None:
         """The newest frame; None before the first."""

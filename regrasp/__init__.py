@@ -22,14 +22,14 @@ if TYPE_CHECKING:  # at run time `__getattr__` brings these when they are asked 
     from regrasp.app.records.record import OnEvent, Progress
     from regrasp.app.records.result import Result as Result
     from regrasp.app.scenario.load import Scenario as Scenario
-    from regrasp.interfaces.cell import Cell as Cell
+    from regrasp.interfaces.cell import CableCell as CableCell
     from regrasp.interfaces.frame import Intrinsics as Intrinsics
     from regrasp.interfaces.frame import RgbdFrame as RgbdFrame
     from regrasp.perception.pose.estimate import Estimate as Estimate
     from regrasp.perception.pose.estimate import NoEstimate as NoEstimate
 
 _TYPES = {
-    "Cell": "regrasp.interfaces.cell",
+    "CableCell": "regrasp.interfaces.cell",
     "Estimate": "regrasp.perception.pose.estimate",
     "Finding": "regrasp.app.files.findings",
     "Findings": "regrasp.app.files.findings",
@@ -41,7 +41,7 @@ _TYPES = {
     "Scenario": "regrasp.app.scenario.load",
 }
 __all__ = [
-    "Cell",
+    "CableCell",
     "Estimate",
     "Finding",
     "Findings",
@@ -85,7 +85,7 @@ def load_scenario(scenario: str | Path, overrides: Sequence[str] = (), case: str
 
     Args:
         scenario: the name of a shipped scenario, or the path of a .yaml file.
-        overrides: assignments such as "gravity=earth" or "cell.known.cable_length=0.5", as `--set` takes them.
+        overrides: assignments such as "gravity=earth" or "cell.known.cable.length=0.5", as `--set` takes them.
         case: the name of the case, such as "gravity=earth"; by default the case of the first values of `vary`.
 
     Raises:
@@ -257,10 +257,10 @@ def read_record(folder: str | Path) -> RunRecord:
     return read_record(Path(folder))
 
 
-def load_cell(cell: str | Path = "thesis", overrides: Sequence[str] = ()) -> Cell:
+def load_cell(cell: str | Path = "thesis", overrides: Sequence[str] = ()) -> CableCell:
     """Read and check a cell: a shipped one by its name, or a .yaml file by its path.
 
-    `overrides` are assignments such as "known.connector.length=0.08".
+    `overrides` are assignments such as "known.cable.connector.length=0.08".
 
     Raises:
         Findings: something in the file or the overrides is wrong.
@@ -305,7 +305,7 @@ def estimate_pose(
     world_from_camera: RigidTransform | None = None,
     *,
     technique: Literal["rgbd", "fiducial", "detector", "fused"] = "fused",
-    cell: Cell | str | Path = "thesis",
+    cell: CableCell | str | Path = "thesis",
 ) -> Estimate | NoEstimate:
     """Find the connector in a frame.
 
@@ -313,7 +313,7 @@ def estimate_pose(
         frame: colour and aligned depth; see `load_frame`.
         world_from_camera: where the camera stands (x right, y down, z forward). Without it the pose is told in the
             camera's frame, and the cell's floor and panels are not used.
-        technique: how; app/studies/pose/POSE.md compares them.
+        technique: how; app/tasks/cable/studies/pose/POSE.md compares them.
         cell: says how long, how thick and of which colour the connector is; or what `load_cell` takes.
 
     Returns:
@@ -325,7 +325,7 @@ def estimate_pose(
     """
     from scipy.spatial.transform import RigidTransform
 
-    from regrasp.app.frames.perceive import without_boxes
+    from regrasp.app.tasks.cable.perceive import without_boxes
     from regrasp.perception.pose.technique import make_technique
 
     known = (load_cell(cell) if isinstance(cell, (str, Path)) else cell).known

@@ -8,7 +8,8 @@ import numpy as np
 import pybullet as p
 from scipy.spatial.transform import RigidTransform, Rotation, Slerp
 
-from regrasp.interfaces.cell import Box, KnownCell, Socket
+from regrasp.interfaces.cable.cell import CableKnown, Socket
+from regrasp.interfaces.cell import Box
 from regrasp.interfaces.hidden_world import HiddenWorld
 from regrasp.interfaces.scene import EARTH_GRAVITY, Gravity, Obstacle, Prop
 from regrasp.interfaces.wall_time import move_time
@@ -39,18 +40,18 @@ def configure(client: int, hidden: HiddenWorld, gravity: Gravity) -> None:
 
 
 def build_boxes(
-    client: int, known: KnownCell, obstacles: tuple[Obstacle, ...], friction: float = 0.5
+    client: int, known: CableKnown, obstacles: tuple[Obstacle, ...], friction: float = 0.5
 ) -> dict[str, int]:
     """Create all fixed bodies; returns their ids by name: floor, panels, clip bracket, sockets, `obstacle NAME`.
 
     `friction` is their coefficient.
     """
-    bodies = {box.name: _box(client, box, friction) for box in (*known.boxes, *known.clip.bracket)}
-    bodies |= {socket.name: _socket_block(client, socket, friction) for socket in known.sockets}
-    if known.clip.tag is not None:
-        world_from_tag = known.clip.world_from_seat * known.clip.tag.body_from_tag
+    bodies = {box.name: _box(client, box, friction) for box in (*known.boxes, *known.cable.clip.bracket)}
+    bodies |= {socket.name: _socket_block(client, socket, friction) for socket in known.cable.sockets}
+    if known.cable.clip.tag is not None:
+        world_from_tag = known.cable.clip.world_from_seat * known.cable.clip.tag.body_from_tag
         p.createMultiBody(
-            0, -1, compound_visual(client, tag_boxes(known.clip.tag), world_from_tag), physicsClientId=client
+            0, -1, compound_visual(client, tag_boxes(known.cable.clip.tag), world_from_tag), physicsClientId=client
         )
     for obstacle in obstacles:
         turn = Rotation.from_euler("z", obstacle.yaw)
@@ -67,7 +68,7 @@ def build_props(client: int, props: tuple[Prop, ...]) -> list[int]:
 
 def filter_collisions(
     client: int,
-    known: KnownCell,
+    known: CableKnown,
     boxes: Mapping[str, int],
     arms: Mapping[int, str],
     cable: CableBody,
@@ -79,10 +80,10 @@ def filter_collisions(
     the cable's fixed end with the socket and the panel through which they run. `arms` gives the names of the arms'
     bodies. Returns the names of the bodies that an arm must not touch: all but the cable, the sockets and the clip.
     """
-    holders = [s.name for s in known.sockets] + [b.name for b in known.clip.bracket]
+    holders = [s.name for s in known.cable.sockets] + [b.name for b in known.cable.clip.bracket]
     pairs = [(arm, -1, boxes["floor"]) for arm in arms if "floor" in boxes]
     pairs += [(cable.body, cable.connector_link, boxes[name]) for name in holders]
-    clamp = [boxes[name] for name in (known.sockets[-1].name, "right_panel") if name in boxes]
+    clamp = [boxes[name] for name in (known.cable.sockets[-1].name, "right_panel") if name in boxes]
     pairs += [(cable.body, link, box) for link in range(clamped_links) for box in clamp]
     for body, link, box in pairs:
         p.setCollisionFilterPair(body, box, link, -1, 0, physicsClientId=client)

@@ -49,7 +49,7 @@ class GroundTruth:
 
     def seat_error(self) -> tuple[float, float]:
         """Error of the connector to its seat in the clip: distance of the centres (m), angle of the axes (degrees)."""
-        error = self._world.cell.known.clip.world_from_seat.inv() * self._world.connector_pose()
+        error = self._world.cell.known.cable.clip.world_from_seat.inv() * self._world.connector_pose()
         cosine = error.rotation.as_matrix()[0, 0]
         return float(np.linalg.norm(error.translation)), float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
 

@@ -16,7 +16,8 @@ import pybullet as p
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from regrasp.interfaces.arrays import FloatArray
-from regrasp.interfaces.cell import PLUGGED_INTO, Cell, WristMount
+from regrasp.interfaces.cable.cell import PLUGGED_INTO, CableCell
+from regrasp.interfaces.cell import WristMount
 from regrasp.interfaces.scene import Gravity, SceneSetup
 from regrasp.interfaces.wall_time import counts_as, move_time
 from regrasp.sim.build import (
@@ -70,7 +71,7 @@ class World:
 
     def __init__(
         self,
-        cell: Cell,
+        cell: CableCell,
         gravity: Gravity,
         seed: int,
         setup: SceneSetup = NOTHING_ADDED,
@@ -109,8 +110,10 @@ class World:
             for fault, rng in zip(setup.faults, rngs, strict=True)
         ]
         self._triggers = TriggerState()
-        self._start = cell.known.socket(PLUGGED_INTO).world_from_plug(cell.known.connector.length).translation
-        self._way = cell.known.clip.world_from_seat.translation - self._start
+        self._start = (
+            cell.known.cable.socket(PLUGGED_INTO).world_from_plug(cell.known.cable.connector.length).translation
+        )
+        self._way = cell.known.cable.clip.world_from_seat.translation - self._start
         self._way_sq = float(self._way @ self._way)
         self._phase = PhaseWatch(self._start, parameters.phase)
         for arm in self.arms.values():
@@ -212,7 +215,7 @@ class World:
         speed = math.hypot(*self._connector.velocity)
         self._phase.step(self.now(), position, speed, pads, plugged, self.clip.holds)
         held = all(pads) and not plugged
-        self._triggers.carried = float((position - self._start) @ self._way) / self._way_sq if held else None
+        self._triggers.shares["carried"] = float((position - self._start) @ self._way) / self._way_sq if held else None
         self._triggers.phases = self._phase.began
 
     def _expose(self) -> None:
@@ -251,8 +254,8 @@ class World:
         cable = build_cable(
             self.client,
             hidden.cable,
-            self.cell.known.connector,
-            hidden.connector_mass,
+            self.cell.known.cable.connector,
+            hidden.cable.connector_mass,
             stiffness,
             self.step_seconds,
             self._parameters.cable,
@@ -260,7 +263,7 @@ class World:
         p.changeDynamics(
             cable.body,
             cable.connector_link,
-            lateralFriction=hidden.connector_friction,
+            lateralFriction=hidden.cable.connector_friction,
             spinningFriction=self._parameters.spinning_friction,
             physicsClientId=self.client,
         )
@@ -269,8 +272,8 @@ class World:
     def _plug(self, stand: RigidTransform | None) -> SocketHold:
         """Lay the straight cable into its socket or on the stand at that pose, before the run's time begins."""
         known = self.cell.known
-        socket = known.socket(known.plugged_into)
-        goal = socket.world_from_plug(known.connector.length) if stand is None else stand
+        socket = known.cable.socket(known.cable.plugged_into)
+        goal = socket.world_from_plug(known.cable.connector.length) if stand is None else stand
         hold = lay_cable(self.client, self.cable, goal, self.step_seconds, self._parameters.laying)
         if stand is None:
             return SocketHold(hold, np.asarray(socket.axis), socket.pull_out_force)
@@ -279,8 +282,8 @@ class World:
     def _build_clip(self) -> ClipHold:
         return ClipHold(
             BodyLink(self.client, self.cable.body, self.cable.connector_link),
-            self.cell.known.clip,
-            self.cell.hidden.connector_mass,
+            self.cell.known.cable.clip,
+            self.cell.hidden.cable.connector_mass,
             self.cable.connector_inertia,
             self.step_seconds,
             self._parameters.clip,

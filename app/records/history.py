@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from regrasp.app.records.reader import Event, RunRecord
 from regrasp.app.records.result import Attempt
-from regrasp.interfaces.cause import Cause, CauseCode
+from regrasp.interfaces.cause import Cause
 from regrasp.trees import NodeExecution, executions
 
 
@@ -100,6 +100,6 @@ def _executions(record: RunRecord) -> list[NodeExecution]:
 def _cause(event: Event) -> Cause | None:
     """The cause in a `failed` event; None for other events."""
     code, message = event.values.get("code"), event.values.get("message")
-    if event.event != "failed" or code not in list(CauseCode) or not isinstance(message, str):
+    if event.event != "failed" or not isinstance(code, str) or not isinstance(message, str):
         return None
-    return Cause(CauseCode(code), message, str(event.values.get("of", event.node)))
+    return Cause(code, message, str(event.values.get("of", event.node)))

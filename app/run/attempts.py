@@ -69,7 +69,7 @@ class Attempts(py_trees.visitors.VisitorBase):
         cause, passed_on = self._new_cause() if failed else (None, False)
         self._visit_leaf(behaviour, cause)
         if failed:
-            why = f"{cause.code.value}: {cause.message}" if cause else "failed, and names no cause"
+            why = f"{cause.code}: {cause.message}" if cause else "failed, and names no cause"
             self._failures[id(behaviour)] = _Failure(self._tick, self._link(behaviour, why), cause, passed_on, None)
 
     def finalise(self) -> None:
@@ -159,7 +159,7 @@ class Attempts(py_trees.visitors.VisitorBase):
         if child is not None:
             return _Failure(self._tick, self._link(node, _why(node, child)), None, False, self._failures[id(child)])
         cause, _ = self._new_cause()  # such as a time limit's
-        why = f"{cause.code.value}: {cause.message}" if cause else _why(node, child)
+        why = f"{cause.code}: {cause.message}" if cause else _why(node, child)
         return _Failure(self._tick, self._link(node, why), cause, False, None)
 
     def _deciding_child(self, node: Behaviour) -> Behaviour | None:

@@ -9,13 +9,13 @@ from regrasp.app.files.overrides import Assignment, apply_assignments, merge_int
 from regrasp.app.files.resources import read_text, resolve
 from regrasp.app.files.validation import validated
 from regrasp.app.files.yaml_lines import Document, Place, parse
-from regrasp.interfaces.cell import Cell
+from regrasp.interfaces.cable.cell import CableCell
 from regrasp.interfaces.quote import MAX_QUOTE, cut, nearest, quoted
 
 
 def load_cell(
     path: Path, assignments: Sequence[Assignment] = (), where: Place | None = None, *, laid_out: bool = True
-) -> Cell:
+) -> CableCell:
     """Read and check a cell file, with the assignments applied.
 
     A cell may name another as its `base` and give only what differs; the base itself has no base. Raises `Findings`;
@@ -27,7 +27,7 @@ def load_cell(
         document = _on_base(document, path.parent)
     fits = isinstance(document.value, dict)  # else only that is reported, not the assignments
     _, found = catch_findings(apply_assignments, document, assignments if fits else ())
-    cell, wrong = catch_findings(validated, document, Cell)
+    cell, wrong = catch_findings(validated, document, CableCell)
     found += wrong
     if cell:
         misnamed = [*_misnamed(document, cell)]
@@ -56,17 +56,17 @@ def _on_base(top: Document, folder: Path) -> Document:
     return document
 
 
-def _misnamed(document: Document, cell: Cell) -> Iterator[Finding]:
+def _misnamed(document: Document, cell: CableCell) -> Iterator[Finding]:
     """Names in a cell that are missing, taken twice, or refer to nothing."""
     known = cell.known
-    boxes = [*known.boxes, *known.clip.bracket]
+    boxes = [*known.boxes, *known.cable.clip.bracket]
     for name, count in Counter(box.name for box in boxes).items():
         if count > 1:
             yield Finding(*document.place(("known", "boxes")), f"{count} boxes are named {quoted(name)}; rename them")
-    sockets = [s.name for s in known.sockets]
-    if known.plugged_into not in sockets:
-        message = f"no socket {quoted(known.plugged_into)}; {nearest(known.plugged_into, sockets)}"
-        yield Finding(*document.place(("known", "plugged_into")), message)
+    sockets = [s.name for s in known.cable.sockets]
+    if known.cable.plugged_into not in sockets:
+        message = f"no socket {quoted(known.cable.plugged_into)}; {nearest(known.cable.plugged_into, sockets)}"
+        yield Finding(*document.place(("known", "cable", "plugged_into")), message)
     arms: list[str] = [a.name for a in known.arms]
     cameras: list[str] = [c.name for c in known.cameras]
     groups = {"sockets": (sockets, sockets), "arms": (arms, ["left", "right"]), "cameras": (cameras, ["rear", "wrist"])}

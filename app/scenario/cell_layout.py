@@ -24,7 +24,8 @@ from regrasp.app.scenario.placement import (
     socket_block,
 )
 from regrasp.interfaces.arrays import FloatArray
-from regrasp.interfaces.cell import PLUGGED_INTO, Cell, FixedMount, KnownCell
+from regrasp.interfaces.cable.cell import PLUGGED_INTO, CableCell, CableKnown
+from regrasp.interfaces.cell import FixedMount
 from regrasp.interfaces.fault import JOINT_NAMES
 from regrasp.interfaces.quote import cut, quoted
 from regrasp.interfaces.scene import GRAVITIES
@@ -48,7 +49,7 @@ class Part(NamedTuple):
 
 
 def layout_findings(
-    document: Document, cell: Cell, parameters: CellLayoutParameters = CellLayoutParameters()
+    document: Document, cell: CableCell, parameters: CellLayoutParameters = CellLayoutParameters()
 ) -> list[Finding]:
     """What is wrong with a cell although each of its values is right by itself."""
     known = cell.known
@@ -62,7 +63,7 @@ def layout_findings(
     return found or [*_in_the_way(document, cell, parameters), *_plug(document, known)]  # these take a moment
 
 
-def _joints(document: Document, known: KnownCell) -> Iterator[Finding]:
+def _joints(document: Document, known: CableKnown) -> Iterator[Finding]:
     from regrasp.motion.robots.kinematics import LOWER, UPPER  # late: it brings the compiler
 
     for i, arm in enumerate(known.arms):
@@ -73,7 +74,7 @@ def _joints(document: Document, known: KnownCell) -> Iterator[Finding]:
                 yield Finding(*document.place(("known", "arms", i, "sleep", j)), told + inside)
 
 
-def _overlaps(document: Document, known: KnownCell, most: float) -> Iterator[Finding]:
+def _overlaps(document: Document, known: CableKnown, most: float) -> Iterator[Finding]:
     """Arms, cameras, the plugged and the stowed connector in other parts of the cell."""
     parts = [*_parts(known)]
     bases = [Part(("known", "arms", i), *arm_base(arm)) for i, arm in enumerate(known.arms)]
@@ -93,7 +94,7 @@ def _overlaps(document: Document, known: KnownCell, most: float) -> Iterator[Fin
                 )
 
 
-def _between_the_arms(known: KnownCell) -> float:
+def _between_the_arms(known: CableKnown) -> float:
     """How deep (m) the arms asleep reach into each other, by the spheres that fill their moving links."""
     from regrasp.motion.robots.spheres import SPHERE_LINKS, SPHERES  # late: they bring the compiler
 
@@ -107,7 +108,7 @@ def _between_the_arms(known: KnownCell) -> float:
     return max(deepest, default=0.0)
 
 
-def _inside(known: KnownCell, part: Part, bases: list[Part]) -> Iterator[tuple[str, float]]:
+def _inside(known: CableKnown, part: Part, bases: list[Part]) -> Iterator[tuple[str, float]]:
     """What a part may stand in, with the depth (m) that it reaches into it."""
     for arm, base in zip(known.arms, bases, strict=True):
         if part.path == base.path:
@@ -116,16 +117,16 @@ def _inside(known: KnownCell, part: Part, bases: list[Part]) -> Iterator[tuple[s
             yield base.name, penetration_depth(np.vstack([part.halves, base.halves]), part.center - base.center)
         centers, halves = sleeping_arm_cubes(arm)
         yield f"the {arm.name} arm asleep", float(cube_depths(part.halves, part.center - centers, halves).max())
-    length, radius = known.connector.length, known.connector.radius
+    length, radius = known.cable.connector.length, known.cable.connector.radius
     size = (length, radius * np.sqrt(2), radius * np.sqrt(2))  # the box inside the cylinder
-    plugged = known.socket(PLUGGED_INTO)
+    plugged = known.cable.socket(PLUGGED_INTO)
     poses = {
         "the plugged connector": plugged.world_from_plug(length),
-        "the stowed connector": known.clip.world_from_seat,
+        "the stowed connector": known.cable.clip.world_from_seat,
     }
     own: dict[str, Path] = {
-        "the plugged connector": ("known", "sockets", known.sockets.index(plugged)),
-        "the stowed connector": ("known", "clip"),
+        "the plugged connector": ("known", "cable", "sockets", known.cable.sockets.index(plugged)),
+        "the stowed connector": ("known", "cable", "clip"),
     }
     for name, pose in poses.items():
         if part.path[: len(own[name])] != own[name]:
@@ -133,17 +134,19 @@ def _inside(known: KnownCell, part: Part, bases: list[Part]) -> Iterator[tuple[s
             yield name, penetration_depth(np.vstack([part.halves, halves]), part.center - pose.translation)
 
 
-def _parts(known: KnownCell) -> Iterator[Part]:
+def _parts(known: CableKnown) -> Iterator[Part]:
     """Boxes, sockets and the clip's bracket."""
     for i, box in enumerate(known.boxes):
         yield Part(("known", "boxes", i), box.name, np.array(box.center), half_edges(np.eye(3), box.size))
-    for i, box in enumerate(known.clip.bracket):
-        yield Part(("known", "clip", "bracket", i), box.name, np.array(box.center), half_edges(np.eye(3), box.size))
-    for i, socket in enumerate(known.sockets):
-        yield Part(("known", "sockets", i), *socket_block(socket))
+    for i, box in enumerate(known.cable.clip.bracket):
+        yield Part(
+            ("known", "cable", "clip", "bracket", i), box.name, np.array(box.center), half_edges(np.eye(3), box.size)
+        )
+    for i, socket in enumerate(known.cable.sockets):
+        yield Part(("known", "cable", "sockets", i), *socket_block(socket))
 
 
-def _in_the_way(document: Document, cell: Cell, parameters: CellLayoutParameters) -> Iterator[Finding]:
+def _in_the_way(document: Document, cell: CableCell, parameters: CellLayoutParameters) -> Iterator[Finding]:
     """Boxes through which the cable hangs at the start, in either gravity; its ends are left out."""
     ends = parameters.cable_ends
     for part in _parts(cell.known):
@@ -162,15 +165,15 @@ def _in_the_way(document: Document, cell: Cell, parameters: CellLayoutParameters
                 break
 
 
-def _sight(document: Document, known: KnownCell) -> Iterator[Finding]:
+def _sight(document: Document, known: CableKnown) -> Iterator[Finding]:
     """The rear camera watches the carrying: it must see where this begins or where it ends."""
     camera = known.camera("rear")
     if not isinstance(camera.mount, FixedMount):
         return
     pose, k = camera.mount.world_from_camera, camera.intrinsics
-    plug = known.socket(PLUGGED_INTO).world_from_plug(known.connector.length).translation
+    plug = known.cable.socket(PLUGGED_INTO).world_from_plug(known.cable.connector.length).translation
     boxes = [part for part in _parts(known) if part.path[1] == "boxes"]
-    for target in (plug, np.asarray(known.clip.seat)):
+    for target in (plug, np.asarray(known.cable.clip.seat)):
         x, y, z = pose.inv().apply(target)
         in_view = z > 0 and 0 <= k.fx * x / z + k.cx < k.width and 0 <= k.fy * y / z + k.cy < k.height
         ray = np.array([pose.translation, pose.translation + 0.9 * (target - pose.translation)])  # not into its socket
@@ -180,19 +183,19 @@ def _sight(document: Document, known: KnownCell) -> Iterator[Finding]:
     yield Finding(*where, "the rear camera sees neither the plugged connector nor the clip; turn or move it")
 
 
-def _cable(document: Document, cell: Cell) -> Iterator[Finding]:
+def _cable(document: Document, cell: CableCell) -> Iterator[Finding]:
     known, cable = cell.known, cell.hidden.cable
-    plugged = known.socket(PLUGGED_INTO)
-    if plugged is known.sockets[-1]:
+    plugged = known.cable.socket(PLUGGED_INTO)
+    if plugged is known.cable.sockets[-1]:
         message = (
             f"{quoted(plugged.name)}, the last socket, holds the cable's other end; name another, or put it elsewhere"
         )
-        yield Finding(*document.place(("known", "plugged_into")), message)
+        yield Finding(*document.place(("known", "cable", "plugged_into")), message)
         return
-    rear = [-0.5 * known.connector.length, 0.0, 0.0]
+    rear = [-0.5 * known.cable.connector.length, 0.0, 0.0]
     ends = {
-        f"socket {plugged.name}": plugged.world_from_plug(known.connector.length),
-        "the clip": known.clip.world_from_seat,
+        f"socket {plugged.name}": plugged.world_from_plug(known.cable.connector.length),
+        "the clip": known.cable.clip.world_from_seat,
     }
     for name, pose in ends.items():
         way = float(np.linalg.norm(pose.apply(rear) - cable.anchor))
@@ -202,36 +205,40 @@ def _cable(document: Document, cell: Cell) -> Iterator[Finding]:
             yield Finding(*place, f"{message}; make it longer, or move that nearer")
 
 
-def _clip(document: Document, known: KnownCell) -> Iterator[Finding]:
+def _clip(document: Document, known: CableKnown) -> Iterator[Finding]:
     from regrasp.behaviors.cable.hand import HANDLING_ARM
     from regrasp.motion.robots.kinematics import ORIGINS, TOOL_OFFSET  # late: it brings the compiler
 
     shoulder = np.asarray(known.arm(HANDLING_ARM).base) + ORIGINS[0] + ORIGINS[1]
     reach = float(np.linalg.norm(ORIGINS[2:], axis=1).sum() + np.linalg.norm(TOOL_OFFSET))
-    way = float(np.linalg.norm(np.asarray(known.clip.seat) - shoulder))
+    way = float(np.linalg.norm(np.asarray(known.cable.clip.seat) - shoulder))
     if way > reach:
         message = f"the clip is {way:.2f} m from the {HANDLING_ARM} arm's shoulder, which reaches {reach:.2f} m"
-        yield Finding(*document.place(("known", "clip", "seat")), f"{message}; move it nearer")
+        yield Finding(*document.place(("known", "cable", "clip", "seat")), f"{message}; move it nearer")
 
 
-def _plug(document: Document, known: KnownCell) -> Iterator[Finding]:
+def _plug(document: Document, known: CableKnown) -> Iterator[Finding]:
     from regrasp.motion.execution import JawParameters  # late: it brings the planner and the compiler
 
-    jaw, thick = JawParameters(), 2 * known.connector.radius
+    jaw, thick = JawParameters(), 2 * known.cable.connector.radius
     if thick + 2 * jaw.slack > jaw.open_gap:
         message = (
             f"a connector {1e3 * thick:.0f} mm thick does not fit the jaw, which opens {1e3 * jaw.open_gap:.0f} mm"
         )
         right = f"write a radius up to {0.5 * jaw.open_gap - jaw.slack:.3f}"
-        yield Finding(*document.place(("known", "connector", "radius")), f"{message} and needs some room; {right}")
+        yield Finding(
+            *document.place(("known", "cable", "connector", "radius")), f"{message} and needs some room; {right}"
+        )
         return
     if trouble := _no_grasp(known):
-        message = f"no way to take hold of a connector in socket {cut(known.plugged_into)}: {trouble}"
-        yield Finding(*document.place(("known", "plugged_into")), f"{message}; plug it in elsewhere, or make room")
+        message = f"no way to take hold of a connector in socket {cut(known.cable.plugged_into)}: {trouble}"
+        yield Finding(
+            *document.place(("known", "cable", "plugged_into")), f"{message}; plug it in elsewhere, or make room"
+        )
 
 
 @lru_cache(maxsize=64)
-def _no_grasp(known: KnownCell) -> str | None:
+def _no_grasp(known: CableKnown) -> str | None:
     """Why the hand cannot take hold of the plugged connector among the known boxes; None when it can."""
     from regrasp.behaviors.cable.hand import HANDLING_ARM  # late: the rest brings the planner and the compiler
     from regrasp.behaviors.cable.unplug import UnplugParameters
@@ -245,13 +252,13 @@ def _no_grasp(known: KnownCell) -> str | None:
     arms: dict[str, ArmKinematics] = {
         arm.name: ArmKinematics(RigidTransform.from_translation(arm.base)) for arm in known.arms
     }
-    boxes, connector = known.solids(), known.connector
+    boxes, connector = known.solids(), known.cable.connector
     others = [
         CollisionModel(arms[a.name], boxes).spheres(np.array(a.sleep)) for a in known.arms if a.name != HANDLING_ARM
     ]
     body = ArmBody(opening=JawParameters().open_gap)
     model = CollisionModel(arms[HANDLING_ARM], boxes, body, other_arm=np.vstack(others))
-    plug = known.socket(PLUGGED_INTO).world_from_plug(connector.length)
+    plug = known.cable.socket(PLUGGED_INTO).world_from_plug(connector.length)
     asleep_at = np.array(known.arm(HANDLING_ARM).sleep)
     clearances = Clearances()
     approach = ApproachParameters(margin=clearances.tight_margin, near_margin=clearances.near_margins[-1])

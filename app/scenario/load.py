@@ -21,7 +21,7 @@ from regrasp.app.scenario.placement import check_obstacles
 from regrasp.app.scenario.references import check_names, check_tree_inputs, tree_text
 from regrasp.app.scenario.schema import ScenarioFile
 from regrasp.app.scenario.tree_file import check_tree_file, names_of
-from regrasp.interfaces.cell import Cell
+from regrasp.interfaces.cable.cell import CableCell
 from regrasp.interfaces.quote import MAX_QUOTE, cut, nearest, quoted
 
 P = ParamSpec("P")
@@ -40,7 +40,7 @@ class Scenario:
     name: str
     path: Path
     file: ScenarioFile
-    cell: Cell
+    cell: CableCell
     tree: Path
     overrides: tuple[str, ...] = ()
     case: str = DEFAULT_CASE
@@ -51,7 +51,7 @@ class Scenario:
         return self.name if self.case == DEFAULT_CASE else f"{self.name} {self.case}"
 
     @property
-    def lit_cell(self) -> Cell:
+    def lit_cell(self) -> CableCell:
         """The cell with the scenario's light."""
         spec, hidden = self.file.light, self.cell.hidden
         given = spec.model_dump(include={"direction", "ambient", "diffuse"}, exclude_none=True)
@@ -194,7 +194,7 @@ class _Source:
 
     def _cell_and_tree(
         self, case: str, document: Document, of_cell: Sequence[Assignment]
-    ) -> tuple[Cell | None, Path | None]:
+    ) -> tuple[CableCell | None, Path | None]:
         """The cell with these assignments, and the tree's path; None for what is invalid."""
         folder = self.path.parent
         cell_at, tree_at = (document.place((key,)) for key in ("cell", "tree"))
@@ -244,7 +244,7 @@ def _named(document: Document, key: Literal["cell", "tree"], folder: Path) -> Pa
     return resolve(key, name, Path() if was_typed(place) else folder, place)
 
 
-def _cell(document: Document, folder: Path, assignments: Sequence[Assignment]) -> Cell | None:
+def _cell(document: Document, folder: Path, assignments: Sequence[Assignment]) -> CableCell | None:
     path = _named(document, "cell", folder)
     return load_cell(path, assignments, document.place(("cell",))) if path else None
 

@@ -14,11 +14,12 @@ from regrasp.app.files.findings import Finding, Findings
 from regrasp.app.files.schema_nodes import value_at
 from regrasp.app.files.validation import validated_part
 from regrasp.app.files.yaml_lines import Document, Path
-from regrasp.app.scenario.cable_rest import rest_shape
 from regrasp.app.scenario.sampling import StandParameters
 from regrasp.app.scenario.schema import Jitter, ObstacleSize, Yaw
+from regrasp.app.tasks.cable.cable_rest import rest_shape
 from regrasp.interfaces.arrays import FloatArray
-from regrasp.interfaces.cell import PLUGGED_INTO, ArmSpec, Cell, FixedMount, KnownCell, Socket, pose_along
+from regrasp.interfaces.cable.cell import PLUGGED_INTO, CableCell, CableKnown, Socket
+from regrasp.interfaces.cell import ArmSpec, FixedMount, pose_along
 from regrasp.interfaces.fields import Size, Vector
 from regrasp.interfaces.quote import cut, quoted
 from regrasp.interfaces.scene import GRAVITIES, Gravity
@@ -60,7 +61,7 @@ class JitteredBox:
 
 def check_obstacles(
     document: Document,
-    cell: Cell | None,
+    cell: CableCell | None,
     parameters: PlacementParameters = PlacementParameters(),
     stands: StandParameters = StandParameters(),  # noqa: B008 - it does not change
 ) -> None:
@@ -73,7 +74,7 @@ def check_obstacles(
 
 
 def _misplaced(
-    document: Document, cell: Cell | None, parameters: PlacementParameters, stands: StandParameters
+    document: Document, cell: CableCell | None, parameters: PlacementParameters, stands: StandParameters
 ) -> Iterator[Finding]:
     obstacles = validated_part(document, ("obstacles",), _LIST)
     seen = set()
@@ -120,7 +121,7 @@ def _with_stand(piece: JitteredBox, stands: StandParameters) -> dict[str, Jitter
 
 
 def _entered(
-    cell: Cell, gravity: Gravity | None, boxes: Mapping[str, JitteredBox], parameters: PlacementParameters
+    cell: CableCell, gravity: Gravity | None, boxes: Mapping[str, JitteredBox], parameters: PlacementParameters
 ) -> Iterator[tuple[str, str, float]]:
     """Which of the boxes (by name) reaches into which other body, and how deep (m); each body once."""
     told = set()
@@ -135,7 +136,7 @@ def _entered(
 
 
 def _in_the_cable(
-    cell: Cell, gravity: Gravity, box: JitteredBox, parameters: PlacementParameters
+    cell: CableCell, gravity: Gravity, box: JitteredBox, parameters: PlacementParameters
 ) -> list[tuple[str, float]]:
     """As `overlaps`, with the cable as it hangs at the start, and with the connector in its socket and in the clip."""
     found = []
@@ -147,7 +148,7 @@ def _in_the_cable(
     return found
 
 
-def cable_error(cell: Cell, gravity: Gravity, parameters: PlacementParameters = PlacementParameters()) -> float:
+def cable_error(cell: CableCell, gravity: Gravity, parameters: PlacementParameters = PlacementParameters()) -> float:
     """By how much (m) the cable may hang elsewhere than `cable_at_start` says."""
     points = cable_at_start(cell, gravity)
     way = float(np.linalg.norm(np.subtract(points[-1], points[0])))
@@ -164,32 +165,32 @@ def line_depth(generators: FloatArray, center: FloatArray, points: FloatArray, r
     return radius + max(penetration_depth(np.vstack([generators, half]), offset) for half, offset in links)
 
 
-def cable_and_connector_lines(cell: Cell, gravity: Gravity) -> list[tuple[str, float, FloatArray]]:
+def cable_and_connector_lines(cell: CableCell, gravity: Gravity) -> list[tuple[str, float, FloatArray]]:
     """Name, radius (m) and centre line (n, 3) m of the cable at the start, the plugged and the stowed connector."""
     known = cell.known
-    ends = [[-0.5 * known.connector.length, 0.0, 0.0], [0.5 * known.connector.length, 0.0, 0.0]]
-    plug = known.socket(PLUGGED_INTO).world_from_plug(known.connector.length)
+    ends = [[-0.5 * known.cable.connector.length, 0.0, 0.0], [0.5 * known.cable.connector.length, 0.0, 0.0]]
+    plug = known.cable.socket(PLUGGED_INTO).world_from_plug(known.cable.connector.length)
     return [
         (
             f"the cable at the start ({gravity} gravity)",
             cell.hidden.cable.radius,
             np.array(cable_at_start(cell, gravity)),
         ),
-        ("the plugged connector", known.connector.radius, plug.apply(ends)),
-        ("the stowed connector", known.connector.radius, known.clip.world_from_seat.apply(ends)),
+        ("the plugged connector", known.cable.connector.radius, plug.apply(ends)),
+        ("the stowed connector", known.cable.connector.radius, known.cable.clip.world_from_seat.apply(ends)),
     ]
 
 
 @lru_cache(maxsize=16)
-def cable_at_start(cell: Cell, gravity: Gravity) -> tuple[Vector, ...]:
+def cable_at_start(cell: CableCell, gravity: Gravity) -> tuple[Vector, ...]:
     """Points (m) of the cable's middle line as it hangs at the start, from its fixed end to the connector."""
-    length = cell.known.connector.length
-    plug = cell.known.socket(PLUGGED_INTO).world_from_plug(length)
+    length = cell.known.cable.connector.length
+    plug = cell.known.cable.socket(PLUGGED_INTO).world_from_plug(length)
     return tuple(map(tuple, rest_shape(cell.hidden.cable, plug, length, gravity).tolist()))
 
 
 def overlaps(
-    cell: KnownCell, box: JitteredBox, parameters: PlacementParameters = PlacementParameters()
+    cell: CableKnown, box: JitteredBox, parameters: PlacementParameters = PlacementParameters()
 ) -> list[tuple[str, float]]:
     """Name and depth (m) of each piece of the cell that the box overlaps, at the place where it does so most."""
     found: dict[str, float] = {}
@@ -240,7 +241,7 @@ def half_edges(turn: FloatArray, size: Size) -> FloatArray:
     return (turn * (0.5 * np.asarray(size))).T
 
 
-def _pieces(cell: KnownCell) -> list[tuple[str, FloatArray, FloatArray]]:
+def _pieces(cell: CableKnown) -> list[tuple[str, FloatArray, FloatArray]]:
     """Name, centre (3,) m and half edges (3, 3) m of all in the cell that rises above z = 0: not of the floor."""
     boxes = [b for b in (*cell.boxes, *cell.clip.bracket) if b.center[2] + 0.5 * b.size[2] > 0]
     pieces = [(b.name, np.array(b.center), half_edges(np.eye(3), b.size)) for b in boxes]
@@ -259,13 +260,13 @@ def arm_base(arm: ArmSpec) -> tuple[str, FloatArray, FloatArray]:
     return f"the {arm.name} arm's base", np.array(arm.base) + _BASE_CENTER, half_edges(np.eye(3), _BASE_SIZE)
 
 
-def fixed_cameras(cell: KnownCell) -> list[tuple[str, FloatArray]]:
+def fixed_cameras(cell: CableKnown) -> list[tuple[str, FloatArray]]:
     """Names and positions (3,) m of the fixed cameras."""
     mounts = [(c.name, c.mount) for c in cell.cameras if isinstance(c.mount, FixedMount)]
     return [(name, np.array(mount.position)) for name, mount in mounts]
 
 
-def _camera_points(cell: KnownCell) -> list[tuple[str, FloatArray, FloatArray]]:
+def _camera_points(cell: CableKnown) -> list[tuple[str, FloatArray, FloatArray]]:
     """As `_pieces`, for the fixed cameras: points."""
     return [(f"the {name} camera", place, np.zeros((3, 3))) for name, place in fixed_cameras(cell)]
 

@@ -12,7 +12,7 @@ from regrasp.app.files.validation import validated_part
 from regrasp.app.files.yaml_lines import Document
 from regrasp.app.scenario.schema import TreeInput
 from regrasp.app.scenario.tree_file import names_of
-from regrasp.interfaces.cell import Cell
+from regrasp.interfaces.cable.cell import CableCell
 from regrasp.interfaces.quote import cut, nearest, quoted
 from regrasp.trees import TreeSyntaxError, check_inputs, read_graph
 
@@ -24,7 +24,7 @@ def tree_text(value: TreeInput) -> str:
     return str(value).lower() if isinstance(value, bool) else str(value)
 
 
-def check_tree_inputs(document: Document, tree: Path | None, cell: Cell | None) -> None:
+def check_tree_inputs(document: Document, tree: Path | None, cell: CableCell | None) -> None:
     """Raises `Findings` for inputs that the tree does not have, and for values that it does not take."""
     written = value_at(document.value, ("inputs",))
     if tree is None or not isinstance(written, dict):

@@ -6,7 +6,7 @@ import numpy as np
 
 from regrasp.app.scenario.schema import ScenarioFile
 from regrasp.interfaces.cell import Box
-from regrasp.interfaces.fault import AnyFault
+from regrasp.interfaces.fault import Fault
 from regrasp.interfaces.fields import Color
 from regrasp.interfaces.scene import Obstacle
 
@@ -40,6 +40,6 @@ def draw_obstacles(
     return tuple(drawn)
 
 
-def draw_faults(file: ScenarioFile, rng: np.random.Generator) -> tuple[AnyFault, ...]:
+def draw_faults(file: ScenarioFile, rng: np.random.Generator) -> tuple[Fault, ...]:
     """The faults with their beginnings drawn, in the file's order."""
     return tuple(fault.model_copy(update={"when": fault.when.drawn(rng)}) for fault in file.faults)

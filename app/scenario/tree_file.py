@@ -12,7 +12,7 @@ from regrasp.trees import check_tree
 
 if TYPE_CHECKING:
     from regrasp.app.files.yaml_lines import Place
-    from regrasp.interfaces.cell import Cell
+    from regrasp.interfaces.cable.cell import CableCell
 
 
 def check_tree_file(
@@ -28,7 +28,7 @@ def check_tree_file(
         raise Findings(found)
 
 
-def names_of(cell: "Cell | None") -> dict[str, dict[str, str]]:
+def names_of(cell: "CableCell | None") -> dict[str, dict[str, str]]:
     """The names in the cell that a tree may refer to, by kind, for `trees.check_tree`.
 
     Each has the reason why it cannot be used in this cell, or "". Without a cell: the names that every cell has.
@@ -36,11 +36,11 @@ def names_of(cell: "Cell | None") -> dict[str, dict[str, str]]:
     techniques: dict[str, str] = dict.fromkeys(TECHNIQUES, "")
     if cell is None:
         return {"technique": techniques}
-    from regrasp.interfaces.cell import PLUGGED_INTO
+    from regrasp.interfaces.cable.cell import PLUGGED_INTO
 
-    if cell.known.connector.tag is None:
+    if cell.known.cable.connector.tag is None:
         techniques["fiducial"] = "needs a tag on the connector, and this cell's has none; take the cell thesis_tags"
-    plugged = cell.known.plugged_into
+    plugged = cell.known.cable.plugged_into
     empty = f"is empty at the start: the cell's plugged_into is {quoted(plugged)}; write {PLUGGED_INTO}"
-    sockets = {socket.name: "" if socket.name == plugged else empty for socket in cell.known.sockets}
+    sockets = {socket.name: "" if socket.name == plugged else empty for socket in cell.known.cable.sockets}
     return {"socket": {PLUGGED_INTO: ""} | sockets, "technique": techniques}

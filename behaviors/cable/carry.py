@@ -62,7 +62,7 @@ class Carry(HandLeaf):
 
         Raises LeafFailed OUT_OF_REACH when there is none.
         """
-        from regrasp.motion.grasping.seating import poses_before
+        from regrasp.motion.cable.seating import poses_before
 
         motion, values = self.services.motion, self.parameters
         distance, margin, step = values.insert_distance, values.margin, values.line_step
@@ -88,7 +88,7 @@ class Insert(HandLeaf):
 
     def _look(self) -> LeafSteps:
         """Correct the belief of how the connector lies in the hand by what the rear camera sees of it."""
-        from regrasp.motion.grasping.seating import connector_axis, pose_in_hand
+        from regrasp.motion.cable.seating import connector_axis, pose_in_hand
 
         belief, motion = self.services.belief, self.services.motion
         seen = yield from self._estimates()
@@ -99,7 +99,7 @@ class Insert(HandLeaf):
         best = fuse(long)
         # Where the fingers hide a part, the visible rest seems to end there. Unless the whole length shows it is not
         # known where on the connector that rest lies.
-        whole = best.extent > self.parameters.whole_share * self.services.known.connector.length
+        whole = best.extent > self.parameters.whole_share * self.services.known.cable.connector.length
         found = pose_in_hand(motion.tool(HANDLING_ARM).inv() * best.world_from_connector, belief.held, whole=whole)
         shift = float(np.linalg.norm(found.translation - belief.held.translation))
         cosine = connector_axis(found) @ connector_axis(belief.held)
@@ -123,7 +123,7 @@ class Insert(HandLeaf):
 
     def _seated(self, held: "RigidTransform") -> "RigidTransform":
         """world_from_tool that seats the held connector, with the roll that turns the hand least."""
-        from regrasp.motion.grasping.seating import seated_pose
+        from regrasp.motion.cable.seating import seated_pose
 
         tool = self.services.motion.tool(HANDLING_ARM)
-        return seated_pose(tool, self.services.known.clip, held, self.parameters.rolls)
+        return seated_pose(tool, self.services.known.cable.clip, held, self.parameters.rolls)

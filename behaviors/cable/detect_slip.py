@@ -7,7 +7,7 @@ from py_trees.common import Status
 from regrasp.behaviors.cable.hand import HANDLING_ARM
 from regrasp.behaviors.leaf import Leaf
 from regrasp.behaviors.services import LossNotice
-from regrasp.interfaces.cause import CauseCode
+from regrasp.interfaces.cable.cause import CableCause
 from regrasp.perception.tracking.slip import GapTest, SlipEvidence, distance_slip
 from regrasp.perception.tracking.track import TrackState
 
@@ -25,7 +25,7 @@ class DetectSlip(Leaf):
 
     def initialise(self) -> None:
         """Forget the readings of an earlier carry."""
-        self._gap = GapTest(2 * self.services.known.connector.radius)
+        self._gap = GapTest(2 * self.services.known.cable.connector.radius)
 
     def work(self) -> Status:
         """See the class."""
@@ -35,7 +35,7 @@ class DetectSlip(Leaf):
                 self.services.belief.held = None
                 self.services.belief.notices.append(LossNotice(self.services.clock.now(), evidence.by))
                 self.say("slip", by=evidence.by, value=round(evidence.value, 4), limit=evidence.limit)
-                return self.fail(CauseCode.SLIPPED, evidence.sentence)
+                return self.fail(CableCause.SLIPPED, evidence.sentence)
         return Status.RUNNING
 
     def _distance(self) -> SlipEvidence | None:

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regrasp.behaviors.leaf import LeafFailed, LeafSteps, StepsLeaf
+from regrasp.interfaces.cable.cause import CableCause
 from regrasp.interfaces.cause import CauseCode
 from regrasp.motion.failure import PlanningError
 from regrasp.perception.tracking.slip import GapTest
@@ -40,7 +41,7 @@ class HandLeaf(StepsLeaf):
         """tool_from_connector as believed. Raises `LeafFailed` when `DetectSlip` has just noticed a loss."""
         held = self.services.belief.held
         if held is None:
-            raise LeafFailed(CauseCode.SLIPPED, "the hand holds nothing any more")
+            raise LeafFailed(CableCause.SLIPPED, "the hand holds nothing any more")
         return held
 
     def rear_point_cloud(self, since: float) -> NDArray[np.float64] | None:
@@ -57,7 +58,7 @@ class HandLeaf(StepsLeaf):
         before = jaw.reading().gap
         for _ in range(hand.close_attempts):
             jaw.close(hand.grip_force)
-            test = GapTest(2 * services.known.connector.radius)
+            test = GapTest(2 * services.known.cable.connector.radius)
             end = services.clock.now() + hand.close_time
             while services.clock.now() < end - 1e-9:
                 test.feed(jaw.reading())

@@ -57,7 +57,7 @@ class LookLeaf(HandLeaf):
         world_from_connector. Raises PlanningError when there is none.
         """
         model = self.services.motion.model(CAMERA_ARM)
-        half = 0.5 * self.services.known.connector.length
+        half = 0.5 * self.services.known.cable.connector.length
         points = connector.apply([[-half, 0.0, 0.0], [0.0, 0.0, 0.0], [half, 0.0, 0.0]])
         for view in closer_views(connector, self.view.close_views):
             sight = view.rotation.apply([0.0, 0.0, 1.0])

@@ -6,6 +6,7 @@ from typing import Any, ClassVar
 
 from regrasp.behaviors.cable.hand import HANDLING_ARM, HandLeaf
 from regrasp.behaviors.leaf import LeafFailed, LeafPort, LeafSteps
+from regrasp.interfaces.cable.cause import CableCause
 from regrasp.interfaces.cause import CauseCode
 from regrasp.perception.tracking.stillness import Stillness, StillnessParameters
 
@@ -79,7 +80,7 @@ class WaitUntilStill(HandLeaf):
                     )
                 return
             yield from self.wait(self.parameters.frame_period)
-        raise LeafFailed(CauseCode.NOT_STILL, f"the scene still moved after {limit:.0f} s")
+        raise LeafFailed(CableCause.NOT_STILL, f"the scene still moved after {limit:.0f} s")
 
     def _wait_blind(self, trouble: str) -> LeafSteps:
         other = self.services.perception.trouble("wrist")

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from regrasp.behaviors.cable.hand import HANDLING_ARM, HandLeaf
 from regrasp.behaviors.leaf import LeafFailed, LeafSteps
-from regrasp.perception.pose.cable_shape import cable_course
+from regrasp.perception.cable.cable_shape import cable_course
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import RigidTransform
@@ -38,7 +38,7 @@ class Regrasp(HandLeaf):
         occupancy = self.services.perception.occupancy
         points = occupancy.occupied_points()
         seen = {tuple(p) for p in occupancy.occupied_points(guessed=False).tolist()}
-        half = 0.5 * self.services.known.connector.length
+        half = 0.5 * self.services.known.cable.connector.length
         # The connector was looked at, so a guess near it is no obstacle; a surface that was seen there is one.
         far = _distance_to_axis(points, connector, half) > self.parameters.clear_radius
         kept = far | np.array([tuple(p) in seen for p in points.tolist()], bool)

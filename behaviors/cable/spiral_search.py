@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from regrasp.behaviors.cable.hand import CAMERA_ARM
 from regrasp.behaviors.cable.look import LookLeaf
 from regrasp.behaviors.leaf import LeafFailed, LeafPort, LeafSteps
+from regrasp.interfaces.cable.cause import CableCause
 from regrasp.interfaces.cause import CauseCode
 from regrasp.motion.failure import PlanningError
 from regrasp.motion.planning.viewpoints import SpiralParameters, Viewpoint, spiral
@@ -82,7 +83,7 @@ class SpiralSearch(LookLeaf):
         seconds = clock.now() - begin
         self.say("not found", looked=looked, skipped=skipped)
         raise LeafFailed(
-            CauseCode.SEARCH_EXHAUSTED,
+            CableCause.SEARCH_EXHAUSTED,
             f"not seen from {looked} stops in {seconds:.0f} s; {len(skipped)} stops were out of reach or not free",
         )
 

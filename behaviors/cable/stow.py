@@ -9,9 +9,10 @@ from regrasp.behaviors.cable.hand import CAMERA_ARM, HANDLING_ARM, HandLeaf
 from regrasp.behaviors.cable.look import LookLeaf
 from regrasp.behaviors.leaf import LeafFailed, LeafSteps
 from regrasp.behaviors.services import LossNotice
+from regrasp.interfaces.cable.cause import CableCause
 from regrasp.interfaces.cause import CauseCode
 from regrasp.motion.failure import PlanningError
-from regrasp.perception.pose.cable_shape import cable_course
+from regrasp.perception.cable.cable_shape import cable_course
 from regrasp.perception.pose.estimate import Estimate
 from regrasp.perception.tracking.slip import seen_at
 
@@ -45,8 +46,8 @@ class LetGo(HandLeaf):
         self.services.belief.held = None
         yield from self.wait(self.parameters.open_time)
         known, motion = self.services.known, self.services.motion
-        seat = known.clip.world_from_seat
-        along = np.linspace(-0.5, 0.5, 10)[:, None] * known.connector.length
+        seat = known.cable.clip.world_from_seat
+        along = np.linspace(-0.5, 0.5, 10)[:, None] * known.cable.connector.length
         yield from self.draw_back()
         # The way to sleep must not sweep the stowed end out of its clip.
         motion.keep_clear(np.vstack([seat.apply(along * [1.0, 0.0, 0.0]), cable_course(known, seat)]))
@@ -78,7 +79,7 @@ class LookAtStow(LookLeaf):
         if not seen:
             self._lost("no camera sees the connector at the clip")
         else:
-            seat = np.array(self.services.known.clip.seat)
+            seat = np.array(self.services.known.cable.clip.seat)
             evidence = seen_at(seen[-1].position, seat, self.parameters.stowed_radius)
             self.say("looked at the clip", distance=round(evidence.value, 4), stowed=evidence.detected)
             if not evidence.detected:
@@ -90,7 +91,7 @@ class LookAtStow(LookLeaf):
         if (other := self.services.perception.trouble("wrist")) is not None:
             raise LeafFailed(CauseCode.CAMERA_FAILED, f"{trouble}; {other}")
         try:
-            _, goals = self.best_view(self.services.known.clip.world_from_seat)
+            _, goals = self.best_view(self.services.known.cable.clip.world_from_seat)
             yield from self.go_and_look(goals, self.parameters.look_time, seen)
         except PlanningError as error:
             raise LeafFailed(
@@ -103,4 +104,4 @@ class LookAtStow(LookLeaf):
 
     def _lost(self, message: str) -> None:
         self.services.belief.notices.append(LossNotice(self.services.clock.now(), "place"))
-        raise LeafFailed(CauseCode.NOT_STOWED, message)
+        raise LeafFailed(CableCause.NOT_STOWED, message)

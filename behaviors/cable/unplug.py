@@ -35,7 +35,7 @@ class Unplug(HandLeaf):
     def steps(self) -> LeafSteps:
         """See the class."""
         known, motion = self.services.known, self.services.motion
-        plug = known.socket(self.get_input("socket")).world_from_plug(known.connector.length)
+        plug = known.cable.socket(self.get_input("socket")).world_from_plug(known.cable.connector.length)
         yield motion.pick(HANDLING_ARM, plug, shallow=self.parameters.shallow, point_cloud=self.rear_point_cloud)
         yield from self.grip(plug)
         axis = plug.rotation.apply([1.0, 0.0, 0.0])

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import FloatArray
-from regrasp.interfaces.cell import Connector
+from regrasp.interfaces.cable.cell import Connector
 from regrasp.motion.grasping.grasps import (
     ApproachParameters,
     Grasp,

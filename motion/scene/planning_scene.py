@@ -7,7 +7,8 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import FloatArray
-from regrasp.interfaces.cell import Connector, KnownCell, WristMount
+from regrasp.interfaces.cable.cell import CableKnown, Connector
+from regrasp.interfaces.cell import WristMount
 from regrasp.interfaces.devices import Arm, Gripper
 from regrasp.interfaces.frame import RgbdFrame
 from regrasp.interfaces.wall_time import counts_as
@@ -39,7 +40,7 @@ class PlanningScene:
 
     def __init__(
         self,
-        known: KnownCell,
+        known: CableKnown,
         arms: Mapping[str, Arm],
         grippers: Mapping[str, Gripper],
         parameters: PlanningSceneParameters = PlanningSceneParameters(),
@@ -147,12 +148,12 @@ class PlanningScene:
         if others:
             name = next(n for n in self.arms if n != arm)
             other = self.model(name, others=False).spheres(self.joints(name))
-        boxes = self._boxes if clip else [b for b in self._boxes if b not in self.known.clip.bracket]
+        boxes = self._boxes if clip else [b for b in self._boxes if b not in self.known.cable.clip.bracket]
         camera = self._cameras.get(arm)
         padding = self._scene_parameters.connector_padding
         body = ArmBody(
             camera.offset if camera else None,
-            None if held is None else _connector_spheres(held, self.known.connector, padding),
+            None if held is None else _connector_spheres(held, self.known.cable.connector, padding),
             self.grippers[arm].reading().gap if opening is None else opening,
         )
         grid = self._grid if others else None

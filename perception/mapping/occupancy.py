@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import ColorImage, DepthImage, FloatArray, Mask
-from regrasp.interfaces.cell import Box, Connector
+from regrasp.interfaces.cable.cell import Connector
+from regrasp.interfaces.cell import Box
 from regrasp.interfaces.frame import Intrinsics, RgbdFrame
 from regrasp.perception.camera.model import pixel_rays, project, subsampled
 from regrasp.perception.pose.segmentation import SegmentationParameters, color_mask

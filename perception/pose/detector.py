@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import ColorImage, DepthImage, FloatArray
-from regrasp.interfaces.cell import KnownCell
+from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.frame import Intrinsics, RgbdFrame
 from regrasp.perception.camera.model import NEAREST_DEPTH, deproject, project
 from regrasp.perception.pose.estimate import DEFAULT_AXIS, Estimate, NoEstimate, pose_covariance
@@ -94,12 +94,12 @@ class Detector:
     """
 
     def __init__(
-        self, known: KnownCell, model: bytes | None = None, parameters: DetectorParameters = DetectorParameters()
+        self, known: CableKnown, model: bytes | None = None, parameters: DetectorParameters = DetectorParameters()
     ) -> None:
         """`model` holds an ONNX file; None takes the shipped one."""
         data = shipped_network() if model is None else model
         self._net = cv2.dnn.readNetFromONNX(np.frombuffer(data, np.uint8))
-        self._color = SegmentationParameters.for_color(known.connector.color)
+        self._color = SegmentationParameters.for_color(known.cable.connector.color)
         self._parameters = parameters
 
     def detect(self, frame: RgbdFrame, min_score: float | None = None) -> list[Detection]:

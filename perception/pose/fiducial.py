@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from regrasp.interfaces.arrays import FloatArray
-from regrasp.interfaces.cell import TAG_DICTIONARY, Clip, Connector, KnownCell, Tag, WristMount
+from regrasp.interfaces.cable.cell import TAG_DICTIONARY, CableKnown, Clip, Connector, Tag
+from regrasp.interfaces.cell import WristMount
 from regrasp.interfaces.frame import Intrinsics, RgbdFrame
 from regrasp.interfaces.geometry import skew
 from regrasp.perception.camera.model import pixel_rays, project
@@ -67,10 +68,12 @@ class Fiducial:
     Raises ValueError for a cell whose connector has no tag.
     """
 
-    def __init__(self, known: KnownCell, parameters: FiducialParameters = FiducialParameters()) -> None:
-        if known.connector.tag is None:
-            raise ValueError("the cell's connector has no tag; give known.connector.tag, as the cell thesis_tags does")
-        self._connector, self._clip = known.connector, known.clip
+    def __init__(self, known: CableKnown, parameters: FiducialParameters = FiducialParameters()) -> None:
+        if known.cable.connector.tag is None:
+            raise ValueError(
+                "the cell's connector has no tag; give known.cable.connector.tag, as the cell thesis_tags does"
+            )
+        self._connector, self._clip = known.cable.connector, known.cable.clip
         self._carried = {c.name for c in known.cameras if isinstance(c.mount, WristMount)}
         self._in_cell = bool(known.boxes)
         self._parameters = parameters

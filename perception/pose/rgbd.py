@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import FloatArray
-from regrasp.interfaces.cell import KnownCell
+from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.frame import RgbdFrame
 from regrasp.perception.camera.model import deproject
 from regrasp.perception.pose.estimate import DEFAULT_AXIS, Estimate, NoEstimate, pose_covariance
@@ -29,10 +29,10 @@ class RgbdParameters:
 class Rgbd:
     """A `Technique`. It knows the connector's colour; the largest blob of it is the connector."""
 
-    def __init__(self, known: KnownCell, parameters: RgbdParameters = RgbdParameters()) -> None:
+    def __init__(self, known: CableKnown, parameters: RgbdParameters = RgbdParameters()) -> None:
         self._parameters = parameters
-        self._color = SegmentationParameters.for_color(known.connector.color)
-        self._length = known.connector.length
+        self._color = SegmentationParameters.for_color(known.cable.connector.color)
+        self._length = known.cable.connector.length
 
     def estimate(
         self,

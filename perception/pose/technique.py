@@ -9,7 +9,7 @@ from regrasp.perception.pose.estimate import Estimate, NoEstimate
 if TYPE_CHECKING:
     from scipy.spatial.transform import RigidTransform
 
-    from regrasp.interfaces.cell import KnownCell
+    from regrasp.interfaces.cable.cell import CableKnown
 
 TechniqueName = Literal["rgbd", "fiducial", "detector", "fused"]
 TECHNIQUES: tuple[TechniqueName, ...] = get_args(TechniqueName)
@@ -35,7 +35,7 @@ class Technique(Protocol):
         ...
 
 
-def make_technique(name: TechniqueName, known: "KnownCell") -> Technique:
+def make_technique(name: TechniqueName, known: "CableKnown") -> Technique:
     """The technique of that name. Raises ValueError if the cell lacks what it needs."""
     match name:  # each imports what it needs: the compiler, or OpenCV alone
         case "rgbd":

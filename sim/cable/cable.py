@@ -26,9 +26,9 @@ import pybullet as p
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from regrasp.interfaces.arrays import FloatArray
-from regrasp.interfaces.cell import Connector, pose_along
+from regrasp.interfaces.cable.cell import Connector, HiddenCable
+from regrasp.interfaces.cell import pose_along
 from regrasp.interfaces.fields import Color
-from regrasp.interfaces.hidden_world import Cable
 from regrasp.sim.render.fiducials import compound_visual, tag_boxes
 
 _IDENTITY = [0.0, 0.0, 0.0, 1.0]
@@ -134,7 +134,7 @@ class CableBody:
 
 def build_cable(
     client: int,
-    cable: Cable,
+    cable: HiddenCable,
     connector: Connector,
     connector_mass: float,
     stiffness: float,
@@ -164,7 +164,7 @@ def build_cable(
     return CableBody(client, body, n, length, springs, springs * damping_time, across)
 
 
-def _create_chain(client: int, cable: Cable, connector: Connector, connector_mass: float) -> int:
+def _create_chain(client: int, cable: HiddenCable, connector: Connector, connector_mass: float) -> int:
     n, length = cable.links, cable.length / cable.links
     link = _shapes(client, p.GEOM_CAPSULE, cable.radius, length, length / 2, cable.color)
     end = _shapes(client, p.GEOM_CYLINDER, connector.radius, connector.length, 0.0, connector.color)

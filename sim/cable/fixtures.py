@@ -14,7 +14,7 @@ import pybullet as p
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import FloatArray
-from regrasp.interfaces.cell import Clip
+from regrasp.interfaces.cable.cell import Clip
 from regrasp.sim.cable.cable import BodyState
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from regrasp.interfaces.arrays import FloatArray
-from regrasp.interfaces.fault import Phase
+from regrasp.interfaces.cable.fault import Phase
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class PhaseWatch:
 
     def __init__(self, start: FloatArray, parameters: PhaseParameters = PhaseParameters()) -> None:
         self._start, self._parameters = start, parameters
-        self.began: dict[Phase, float] = {}
+        self.began: dict[str, float] = {}
         self._held = False
         self._untouched, self._still = ConditionTimer(), ConditionTimer()
 

@@ -10,6 +10,7 @@ from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces import fault as f
 from regrasp.interfaces.arrays import FloatArray
+from regrasp.interfaces.cable.fault import CableSnags, ConnectorKnocked
 from regrasp.sim.cable.cable import CableBody
 from regrasp.sim.cameras.camera import SimCamera
 from regrasp.sim.render.renderer import LightState
@@ -61,7 +62,7 @@ class Effect:
 
 
 def effect_of(
-    fault: f.AnyFault,
+    fault: f.Fault,
     world: FaultTarget,
     rng: np.random.Generator,
     parameters: FaultParameters = FaultParameters(),
@@ -87,9 +88,9 @@ def effect_of(
             return _joint(fault, world)
         case f.ObstacleMovesIn():
             return _obstacle(fault, world)
-        case f.ConnectorKnocked():
+        case ConnectorKnocked():
             return _knock(fault, world, parameters.knock_seconds)
-        case f.CableSnags():
+        case CableSnags():
             return _snag(fault, world)
     return Effect()
 
@@ -144,7 +145,7 @@ def _obstacle(fault: f.ObstacleMovesIn, world: FaultTarget) -> Effect:
     return Effect(end=lambda: place(seconds, moving=False), step=place, seconds=seconds)
 
 
-def _knock(fault: f.ConnectorKnocked, world: FaultTarget, seconds: float) -> Effect:
+def _knock(fault: ConnectorKnocked, world: FaultTarget, seconds: float) -> Effect:
     force = (np.array(fault.impulse) / seconds).tolist()
     cable = world.cable
 
@@ -155,7 +156,7 @@ def _knock(fault: f.ConnectorKnocked, world: FaultTarget, seconds: float) -> Eff
     return Effect(step=push, seconds=seconds)
 
 
-def _snag(fault: f.CableSnags, world: FaultTarget) -> Effect:
+def _snag(fault: CableSnags, world: FaultTarget) -> Effect:
     cable, client = world.cable, world.client
     link = round(fault.along * (cable.links - 1))
     caught: list[FloatArray] = []

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from regrasp.interfaces.fault import AnyFault, Lasting, Phase, When
+from regrasp.interfaces.fault import Fault, Lasting, When
 from regrasp.sim.faults.effects import Effect
 
 
@@ -11,17 +11,19 @@ class TriggerState:
     """The state of a run on which the beginning of faults depends."""
 
     now: float = 0.0  # simulated second
-    # Share of the straight line from socket to clip; None while the connector is plugged in or not held by both pads.
-    carried: float | None = None
-    phases: dict[Phase, float] = field(default_factory=dict)  # seconds at which phases began
+    # Shares of the task's progress by name; None while there is none.
+    shares: dict[str, float | None] = field(default_factory=dict)
+    phases: dict[str, float] = field(default_factory=dict)  # seconds at which phases began
     nodes: dict[str, float] = field(default_factory=dict)  # seconds at which nodes, by tree path, were first entered
 
     def triggers(self, when: When) -> bool:
         """Whether a fault with this `when`, its ranges drawn, is due."""
         if when.at is not None:
             return self.now >= when.at[0] - 1e-9
-        if when.carried is not None:
-            return self.carried is not None and self.carried >= when.carried[0]
+        for name in when.SHARES:
+            if (span := getattr(when, name)) is not None:
+                share = self.shares.get(name)
+                return share is not None and share >= span[0]
         if when.phase is not None:
             return when.phase in self.phases
         delay = when.after[0] if when.after else 0.0
@@ -37,7 +39,7 @@ def ends_with_node(path: str, node: str) -> bool:
 class ScheduledFault:
     """A fault of one run. `began_at` and `ended_at` are simulated seconds, None until then."""
 
-    def __init__(self, spec: AnyFault, effect: Effect) -> None:
+    def __init__(self, spec: Fault, effect: Effect) -> None:
         self.spec, self._effect = spec, effect
         self.began_at: float | None = None
         self.ended_at: float | None = None

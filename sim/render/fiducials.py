@@ -8,7 +8,8 @@ import pybullet as p
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import Mask
-from regrasp.interfaces.cell import TAG_DICTIONARY, Box, Tag
+from regrasp.interfaces.cable.cell import TAG_DICTIONARY, Tag
+from regrasp.interfaces.cell import Box
 from regrasp.interfaces.fields import Color
 
 WHITE, BLACK = (0.92, 0.92, 0.90), (0.04, 0.04, 0.04)  # choice: about the reflectance of paper and toner

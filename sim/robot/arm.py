@@ -15,7 +15,7 @@ import pybullet as p
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from regrasp.interfaces.arrays import FloatArray, Mask
-from regrasp.interfaces.cell import ArmName, ArmSpec, Cell, WristMount
+from regrasp.interfaces.cell import ArmSpec, Cell, WristMount
 from regrasp.interfaces.reading import JointReading
 from regrasp.interfaces.trajectory import Trajectory
 from regrasp.sim.robot.gripper import GripperParameters, SimGripper
@@ -61,7 +61,7 @@ class SimArm:
         self,
         client: int,
         cell: Cell,
-        name: ArmName,
+        name: str,
         rng: np.random.Generator,
         parameters: ArmParameters = ArmParameters(),
         gripper_parameters: GripperParameters | None = None,
@@ -279,7 +279,7 @@ def _servo_command(
     return late
 
 
-def _camera_offset(cell: Cell, arm: ArmName) -> tuple[float, float, float] | None:
+def _camera_offset(cell: Cell, arm: str) -> tuple[float, float, float] | None:
     """Offset (m, in the wrist link) of the camera on that arm; None if it carries none."""
     offsets = {c.mount.arm: c.mount.offset for c in cell.known.cameras if isinstance(c.mount, WristMount)}
     return offsets.get(arm)

@@ -9,15 +9,15 @@ from py_trees.common import Status
 
 from regrasp.behaviors.cable.hand import HandParameters
 from regrasp.behaviors.cable.recover import WaitUntilStill, WaitUntilStillParameters
+from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.cause import CauseCode, ServiceError
-from regrasp.interfaces.cell import KnownCell
 
 LEAF = '<{} name="leaf"/>'
 REAR, WRIST = "the rear camera is dark", "the wrist camera is frozen"
 
 
 @pytest.fixture
-def stage(known: KnownCell, tmp_path: Path) -> Stage:
+def stage(known: CableKnown, tmp_path: Path) -> Stage:
     return Stage(known, tmp_path)
 
 
@@ -79,7 +79,7 @@ def test_a_start_without_the_rear_camera_is_no_start(stage: Stage) -> None:
 
 def test_the_clip_is_looked_at_with_the_wrist_camera_when_the_rear_one_is_dark(stage: Stage) -> None:
     stage.perception.troubles["rear"] = REAR
-    seat = np.array(stage.known.clip.seat)
+    seat = np.array(stage.known.cable.clip.seat)
     stage.perception.shows = lambda camera, t: seen(t, seat, camera) if camera == "wrist" else None
     assert stage.run(stage.tree(LEAF.format("LookAtStow")), 5.0) is Status.SUCCESS
     assert [arm for arm, _ in stage.motion.moves] == ["left", "left"]  # there and back

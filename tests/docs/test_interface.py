@@ -169,7 +169,7 @@ def test_a_pose_is_asked_for_with_right_arguments() -> None:
 
 
 def test_wrong_values_of_a_cell_are_told() -> None:
-    with pytest.raises(regrasp.Findings, match=r"known.connector.length is 'long'"):
-        regrasp.load_cell("thesis", ["known.connector.length=long"])
+    with pytest.raises(regrasp.Findings, match=r"known.cable.connector.length is 'long'"):
+        regrasp.load_cell("thesis", ["known.cable.connector.length=long"])
     with pytest.raises(regrasp.Findings, match="did you mean"):
         regrasp.load_cell("thesiss")

@@ -9,7 +9,8 @@ from hypothesis import assume, example, given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from regrasp.interfaces.cell import Cell, FixedMount, Socket, Tag, WristMount, pose_along
+from regrasp.interfaces.cable.cell import CableCell, Socket, Tag
+from regrasp.interfaces.cell import FixedMount, WristMount, pose_along
 
 LENGTH = 1e-9  # metres
 coordinates = st.floats(-2.0, 2.0)
@@ -22,8 +23,8 @@ def data() -> Any:
 
 
 @pytest.fixture
-def thesis(data: Any) -> Cell:
-    return Cell.model_validate(data)
+def thesis(data: Any) -> CableCell:
+    return CableCell.model_validate(data)
 
 
 @given(position=vectors, axis=vectors)
@@ -40,10 +41,10 @@ def test_pose_along_points_x_and_keeps_z_up(
         assert abs(y[2]) < 1e-9
 
 
-def test_a_plug_sits_its_depth_in_the_mouth(thesis: Cell) -> None:
-    for socket in thesis.known.sockets:
-        plug = socket.world_from_plug(thesis.known.connector.length)
-        tip = plug.apply([thesis.known.connector.length / 2, 0.0, 0.0])
+def test_a_plug_sits_its_depth_in_the_mouth(thesis: CableCell) -> None:
+    for socket in thesis.known.cable.sockets:
+        plug = socket.world_from_plug(thesis.known.cable.connector.length)
+        tip = plug.apply([thesis.known.cable.connector.length / 2, 0.0, 0.0])
         axis = np.asarray(socket.axis) / np.linalg.norm(socket.axis)
         mouth = np.asarray(socket.center) - axis * socket.size[1] / 2
         np.testing.assert_allclose(tip, mouth + socket.depth * axis, atol=LENGTH)
@@ -91,21 +92,21 @@ def test_a_wrist_camera_looks_along_the_links_x() -> None:
     np.testing.assert_allclose(mount.apply([0.0, 0.0, 1.0]), [1.02, 0.0, 0.06], atol=1e-9)
 
 
-def test_the_thesis_cell_finds_its_parts(thesis: Cell) -> None:
+def test_the_thesis_cell_finds_its_parts(thesis: CableCell) -> None:
     known = thesis.known
-    assert known.socket(known.plugged_into).name == "back_4"
+    assert known.cable.socket(known.cable.plugged_into).name == "back_4"
     assert known.arm("left").base[1] == 0.1778
     assert known.camera("wrist").intrinsics.width == 848
     assert {"floor", "back_panel", "clip_rod", "right_1"} <= {box.name for box in known.solids()}
 
 
-def test_an_unknown_socket_lists_those_that_exist(thesis: Cell) -> None:
+def test_an_unknown_socket_lists_those_that_exist(thesis: CableCell) -> None:
     with pytest.raises(KeyError, match=r"no socket 'back_9'; there are back_1, back_2"):
-        thesis.known.socket("back_9")
+        thesis.known.cable.socket("back_9")
 
 
 def _misspell(data: Any) -> None:
-    data["known"]["connector"]["colour"] = [0, 0, 0]
+    data["known"]["cable"]["connector"]["colour"] = [0, 0, 0]
 
 
 def _no_direction(data: Any) -> None:
@@ -117,7 +118,7 @@ def _too_many_links(data: Any) -> None:
 
 
 def _not_finite(data: Any) -> None:
-    data["hidden"]["connector_mass"] = float("inf")
+    data["hidden"]["cable"]["connector_mass"] = float("inf")
 
 
 def _odd_rate(data: Any) -> None:
@@ -137,12 +138,12 @@ def _odd_rate(data: Any) -> None:
 def test_a_wrong_cell_is_refused(data: Any, spoil: Callable[[Any], None], message: str) -> None:
     spoil(data)
     with pytest.raises(ValidationError, match=message):
-        Cell.model_validate(data)
+        CableCell.model_validate(data)
 
 
-def test_values_do_not_change(thesis: Cell) -> None:
+def test_values_do_not_change(thesis: CableCell) -> None:
     with pytest.raises(ValidationError, match="frozen"):
-        thesis.known.plugged_into = "back_1"
+        thesis.known.cable.plugged_into = "back_1"
 
 
 def test_a_tag_faces_the_bodys_left_with_its_x_along_the_bodys() -> None:

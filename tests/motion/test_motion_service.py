@@ -8,8 +8,9 @@ from natural import natural_pose
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
+from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.cause import CauseCode
-from regrasp.interfaces.cell import KnownCell, pose_along
+from regrasp.interfaces.cell import pose_along
 from regrasp.interfaces.frame import Intrinsics, RgbdFrame
 from regrasp.motion.execution import ExecutionParameters, JawParameters
 from regrasp.motion.failure import PlanningError
@@ -26,7 +27,7 @@ HELD = RigidTransform.from_components([0.0, 0.0, 0.0], Rotation.from_euler("y", 
 
 
 @pytest.fixture
-def rig(known: KnownCell) -> Rig:
+def rig(known: CableKnown) -> Rig:
     return Rig(known)
 
 
@@ -232,7 +233,7 @@ def test_nothing_is_seen_through_a_panel(rig: Rig) -> None:
 
 @pytest.mark.parametrize("shallow", [0.0, 0.008])
 def test_a_pick_brings_the_open_jaw_round_the_connector(rig: Rig, shallow: float) -> None:
-    plug = rig.known.socket("back_4").world_from_plug(rig.known.connector.length)
+    plug = rig.known.cable.socket("back_4").world_from_plug(rig.known.cable.connector.length)
     rig.run(rig.motion.pick("right", plug, shallow=shallow))
     assert rig.grippers["right"].gap == OPEN_GAP
     opened_at = rig.grippers["right"].told[0][0]
@@ -246,7 +247,7 @@ def test_a_pick_brings_the_open_jaw_round_the_connector(rig: Rig, shallow: float
 
 
 def test_an_arm_seen_to_be_off_takes_hold_where_the_connector_is(rig: Rig) -> None:
-    plug = rig.known.socket("back_4").world_from_plug(rig.known.connector.length)
+    plug = rig.known.cable.socket("back_4").world_from_plug(rig.known.cable.connector.length)
     off = np.array([0.01, 0.02, -0.02, 0.04, 0.02, 0.03])
     kin = rig.motion.kinematics["right"]
     asked: list[float] = []
@@ -267,7 +268,7 @@ def test_an_arm_seen_to_be_off_takes_hold_where_the_connector_is(rig: Rig) -> No
 
 @pytest.mark.parametrize("points", [None, np.empty((0, 3))])
 def test_a_camera_that_shows_no_arm_changes_nothing(rig: Rig, points: Points | None) -> None:
-    plug = rig.known.socket("back_4").world_from_plug(rig.known.connector.length)
+    plug = rig.known.cable.socket("back_4").world_from_plug(rig.known.cable.connector.length)
     rig.run(rig.motion.pick("right", plug, point_cloud=lambda _since: points))
     blind = Rig(rig.known)
     blind.run(blind.motion.pick("right", plug))
@@ -310,9 +311,9 @@ def test_a_carry_takes_the_way_that_the_cable_goes_to_the_first_goal(rig: Rig) -
     assert end.translation == pytest.approx(goals[0].translation, abs=1e-3)
     assert (end.rotation.inv() * goals[0].rotation).magnitude() < 0.01
     carried = [rig.motion.kinematics["right"].tool(q) * held for q in flown(rig, "right")]
-    anchor, course = rig.known.cable_anchor
+    anchor, course = rig.known.cable.anchor
     for pose in carried:
-        place = pose.apply([-0.5 * rig.known.connector.length, 0.0, 0.0]) - anchor
+        place = pose.apply([-0.5 * rig.known.cable.connector.length, 0.0, 0.0]) - anchor
         natural = natural_pose(rig.known, place - (place @ course) * course)
         assert np.linalg.norm(pose.translation - natural.translation) < 0.005
     length = np.linalg.norm(np.diff([pose.translation for pose in carried], axis=0), axis=1).sum()

@@ -5,7 +5,7 @@ import pytest
 from raycast import BLACK, PURPLE, REAR_POSE, WOOD, Block, Cylinder, Sensor, render
 from scipy.spatial.transform import RigidTransform
 
-from regrasp.interfaces.cell import KnownCell
+from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.frame import Intrinsics, RgbdFrame
 from regrasp.perception.mapping.occupancy import Spheres
 from regrasp.perception.pose.estimate import Estimate, NoEstimate
@@ -49,18 +49,18 @@ def believed(_frame: RgbdFrame) -> RigidTransform:
     return REAR_POSE
 
 
-def perception(known: KnownCell, eye: Eye, arm: list[Spheres] | None = None) -> Perception:
+def perception(known: CableKnown, eye: Eye, arm: list[Spheres] | None = None) -> Perception:
     return Perception(known, {"rear": eye}, Clock(), believed, lambda: arm or [])
 
 
-def test_there_is_nothing_to_say_before_the_first_frame(known: KnownCell) -> None:
+def test_there_is_nothing_to_say_before_the_first_frame(known: CableKnown) -> None:
     eyes = perception(known, Eye())
     assert eyes.frame("rear") is None
     assert eyes.look("rear") is None
     assert eyes.map_obstacles("rear") == 0
 
 
-def test_a_frame_is_estimated_once_and_tells_the_track_once(known: KnownCell) -> None:
+def test_a_frame_is_estimated_once_and_tells_the_track_once(known: CableKnown) -> None:
     eye = Eye()
     eyes = perception(known, eye)
     fed = []
@@ -78,7 +78,7 @@ def test_a_frame_is_estimated_once_and_tells_the_track_once(known: KnownCell) ->
     assert eyes.track.last is second
 
 
-def test_a_look_finds_the_connector_in_the_world(known: KnownCell) -> None:
+def test_a_look_finds_the_connector_in_the_world(known: CableKnown) -> None:
     eye = Eye()
     eye.show(seen(END), number=1, stamp=0.0)
     found = perception(known, eye).look("rear")
@@ -86,7 +86,7 @@ def test_a_look_finds_the_connector_in_the_world(known: KnownCell) -> None:
     assert found.position == pytest.approx(PLACE, abs=0.006)
 
 
-def test_an_empty_scene_gives_a_reason_and_no_position(known: KnownCell) -> None:
+def test_an_empty_scene_gives_a_reason_and_no_position(known: CableKnown) -> None:
     eye = Eye()
     eyes = perception(known, eye)
     eye.show(seen(), number=1, stamp=0.0)
@@ -94,7 +94,7 @@ def test_an_empty_scene_gives_a_reason_and_no_position(known: KnownCell) -> None
     assert eyes.track.last is None
 
 
-def test_a_wrong_depth_scale_moves_no_obstacle(known: KnownCell) -> None:
+def test_a_wrong_depth_scale_moves_no_obstacle(known: CableKnown) -> None:
     eye = Eye()
     eye.show(seen(FOAM, scale=0.03), number=1, stamp=0.0)
     eyes = perception(known, eye)
@@ -103,7 +103,7 @@ def test_a_wrong_depth_scale_moves_no_obstacle(known: KnownCell) -> None:
     assert front == pytest.approx(FOAM.lower[0], abs=0.010)  # uncorrected 0.018 behind
 
 
-def test_a_surface_is_seen_where_it_is_in_the_next_picture(known: KnownCell) -> None:
+def test_a_surface_is_seen_where_it_is_in_the_next_picture(known: CableKnown) -> None:
     eye = Eye()
     eyes = perception(known, eye)
     assert eyes.surface("rear", 0.0) is None
@@ -116,7 +116,7 @@ def test_a_surface_is_seen_where_it_is_in_the_next_picture(known: KnownCell) -> 
     assert float(np.median(front[:, 0])) == pytest.approx(FOAM.lower[0], abs=0.004)  # uncorrected 0.018 behind
 
 
-def test_nothing_is_seen_by_a_camera_in_trouble(known: KnownCell) -> None:
+def test_nothing_is_seen_by_a_camera_in_trouble(known: CableKnown) -> None:
     eye = Eye()
     eyes = perception(known, eye)
     blank = replace(seen(FOAM), depth=np.zeros((480, 848), np.float32))
@@ -128,7 +128,7 @@ def test_nothing_is_seen_by_a_camera_in_trouble(known: KnownCell) -> None:
     assert points.shape == (0, 3)
 
 
-def test_an_obstacle_is_mapped_and_an_arm_is_not(known: KnownCell) -> None:
+def test_an_obstacle_is_mapped_and_an_arm_is_not(known: CableKnown) -> None:
     eye = Eye()
     eye.show(seen(FOAM), number=1, stamp=0.0)
     eyes = perception(known, eye)
@@ -142,7 +142,7 @@ def test_an_obstacle_is_mapped_and_an_arm_is_not(known: KnownCell) -> None:
     assert arm.map_obstacles("rear") < 0.05 * len(points)
 
 
-def test_a_second_look_changes_the_map_only_for_a_new_thing(known: KnownCell) -> None:
+def test_a_second_look_changes_the_map_only_for_a_new_thing(known: CableKnown) -> None:
     eye, sensor = Eye(), Sensor(scale=0.0)
     eyes = perception(known, eye)
     eye.show(seen(FOAM), number=1, stamp=0.0)

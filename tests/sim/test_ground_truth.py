@@ -4,14 +4,15 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from regrasp.interfaces.cell import Box, Cell, FixedMount
+from regrasp.interfaces.cable.cell import CableCell
+from regrasp.interfaces.cell import Box, FixedMount
 from regrasp.interfaces.scene import Obstacle, SceneSetup
 from regrasp.sim.ground_truth import GroundTruth
 from regrasp.sim.world import World
 
 
 @pytest.fixture(scope="module")
-def world(cell: Cell) -> Iterator[World]:
+def world(cell: CableCell) -> Iterator[World]:
     world = World(cell, "zero", seed=1, renderer="software")
     world.advance(0.2)
     yield world
@@ -37,14 +38,14 @@ def test_the_rear_camera_sees_the_red(world: World) -> None:
     assert pixels == pytest.approx(int(red.sum()), rel=0.1)
 
 
-def test_before_the_first_frame_no_pixels(cell: Cell) -> None:
+def test_before_the_first_frame_no_pixels(cell: CableCell) -> None:
     world = World(cell, "zero", seed=1, renderer="software")
     assert world.cameras["rear"].latest() is None
     assert GroundTruth(world).connector_pixels("rear") == 0
     world.close()
 
 
-def test_behind_an_obstacle_no_pixels(cell: Cell, world: World) -> None:
+def test_behind_an_obstacle_no_pixels(cell: CableCell, world: World) -> None:
     camera, connector = cell.known.camera("rear").mount, world.connector_pose().translation
     assert isinstance(camera, FixedMount)
     middle = connector + 0.3 * (np.asarray(camera.position) - connector)
@@ -63,8 +64,8 @@ def test_behind_an_obstacle_no_pixels(cell: Cell, world: World) -> None:
     hidden.close()
 
 
-def test_the_seat_s_error_is_a_way_and_an_angle(cell: Cell, world: World, monkeypatch: pytest.MonkeyPatch) -> None:
-    seat = cell.known.clip.world_from_seat
+def test_the_seat_s_error_is_a_way_and_an_angle(cell: CableCell, world: World, monkeypatch: pytest.MonkeyPatch) -> None:
+    seat = cell.known.cable.clip.world_from_seat
     turn = Rotation.from_euler("zx", [10.0, 77.0], degrees=True)  # about its own axis it may turn
     moved = RigidTransform.from_components([0.0, 0.003, 0.004], turn)
     monkeypatch.setattr(world, "connector_pose", lambda: seat * moved)
@@ -77,11 +78,11 @@ def test_contact_peaks_are_a_copy(world: World) -> None:
     assert "left arm - floor" not in truth.contact_peaks()
 
 
-def test_a_cell_needs_neither_floor_nor_panels(cell: Cell) -> None:
+def test_a_cell_needs_neither_floor_nor_panels(cell: CableCell) -> None:
     bare = cell.model_copy(update={"known": cell.known.model_copy(update={"boxes": ()})})
     world = World(bare, "zero", seed=1, renderer="software")
     world.advance(0.1)
-    socket = next(s for s in bare.known.sockets if s.name == bare.known.plugged_into)
-    place = socket.world_from_plug(bare.known.connector.length).translation
+    socket = next(s for s in bare.known.cable.sockets if s.name == bare.known.cable.plugged_into)
+    place = socket.world_from_plug(bare.known.cable.connector.length).translation
     assert np.linalg.norm(world.connector_pose().translation - place) < 0.02
     world.close()

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from regrasp.interfaces.arrays import FloatArray
-from regrasp.interfaces.cell import Box, Cell
+from regrasp.interfaces.cable.cell import CableCell
+from regrasp.interfaces.cell import Box
 from regrasp.interfaces.devices import Clock
 from regrasp.interfaces.scene import Obstacle, Prop, SceneSetup
 from regrasp.sim.ground_truth import GroundTruth
@@ -27,7 +28,7 @@ CREEP = 1e-3  # m in 2 s
 
 
 @pytest.fixture(scope="module")
-def plugged(cell: Cell) -> Iterator[World]:
+def plugged(cell: CableCell) -> Iterator[World]:
     """A world in which nothing has moved; tests leave the connector plugged."""
     world = World(cell, "zero", seed=1, renderer="software")
     yield world
@@ -54,7 +55,7 @@ def joined(world: World) -> list[tuple[int, int]]:
 
 
 @pytest.fixture(scope="module")
-def drawn(cell: Cell) -> Iterator[Pull]:
+def drawn(cell: CableCell) -> Iterator[Pull]:
     world = World(cell, "zero", seed=3, renderer="software")
     take_hold(world)
     held, joined_when_held = world.socket.holds, joined(world)
@@ -83,16 +84,16 @@ def middle_of_cable(world: World) -> FloatArray:
     return np.array([s[4] for s in states])
 
 
-def test_it_is_a_clock(cell: Cell, plugged: World) -> None:
+def test_it_is_a_clock(cell: CableCell, plugged: World) -> None:
     clock: Clock = plugged
     before = clock.now()
     plugged.advance(0.25)
     assert clock.now() - before == pytest.approx(0.25)
 
 
-def test_the_connector_starts_in_its_socket(cell: Cell, plugged: World) -> None:
+def test_the_connector_starts_in_its_socket(cell: CableCell, plugged: World) -> None:
     known = cell.known
-    goal = known.socket(known.plugged_into).world_from_plug(known.connector.length)
+    goal = known.cable.socket(known.cable.plugged_into).world_from_plug(known.cable.connector.length)
     off = goal.inv() * plugged.connector_pose()
     assert float(np.linalg.norm(off.translation)) < 1e-3
     assert float(off.rotation.magnitude()) < np.deg2rad(1.0)
@@ -106,13 +107,13 @@ def test_a_cable_held_at_both_ends_does_not_drift(plugged: World) -> None:
     assert float(np.abs(plugged.connector_pose().translation - end).max()) < DRIFT
 
 
-def test_it_starts_with_its_arms_at_rest_and_touching_nothing(cell: Cell, plugged: World) -> None:
+def test_it_starts_with_its_arms_at_rest_and_touching_nothing(cell: CableCell, plugged: World) -> None:
     for name, arm in plugged.arms.items():
         np.testing.assert_allclose(arm.reading().positions, cell.known.arm(name).sleep, atol=2e-3)
     assert plugged.contact_peaks == {}
 
 
-def test_the_socket_lets_go_above_its_force_only(cell: Cell) -> None:
+def test_the_socket_lets_go_above_its_force_only(cell: CableCell) -> None:
     world = World(cell, "zero", seed=2, renderer="software")
     truth = GroundTruth(world)
     axis = world.connector_pose().rotation.apply([1.0, 0.0, 0.0])
@@ -156,7 +157,7 @@ def test_an_opened_hand_loses_the_connector(drawn: Pull) -> None:
     assert float(np.linalg.norm(off)) > 0.03
 
 
-def test_an_arm_against_the_panel_is_counted_with_its_force(cell: Cell) -> None:
+def test_an_arm_against_the_panel_is_counted_with_its_force(cell: CableCell) -> None:
     world = World(cell, "zero", seed=1, renderer="software")
     robot, q = kinematics(world, "right"), np.zeros(6)
     ahead = RigidTransform.from_translation([0.44, -0.15, 0.30])
@@ -169,7 +170,7 @@ def test_an_arm_against_the_panel_is_counted_with_its_force(cell: Cell) -> None:
     world.close()
 
 
-def test_obstacles_stand_where_they_were_put(cell: Cell) -> None:
+def test_obstacles_stand_where_they_were_put(cell: CableCell) -> None:
     box = Box(name="tall", center=(0.3, 0.2, 0.18), size=(0.12, 0.08, 0.36))
     stand = Box(name="leg", center=(0.3, 0.2, 0.05), size=(0.02, 0.02, 0.1))
     world = World(cell, "zero", seed=1, setup=SceneSetup((Obstacle(box, np.pi / 2, stand),)), renderer="software")
@@ -180,7 +181,7 @@ def test_obstacles_stand_where_they_were_put(cell: Cell) -> None:
     world.close()
 
 
-def test_a_connector_may_start_on_a_stand(cell: Cell) -> None:
+def test_a_connector_may_start_on_a_stand(cell: CableCell) -> None:
     asked = RigidTransform.from_components([0.38, 0.06, 0.29], Rotation.from_euler("zy", [100.0, -20.0], degrees=True))
     world = World(cell, "zero", seed=1, setup=SceneSetup(connector_at=asked), renderer="software")
     off = asked.inv() * world.connector_pose()
@@ -192,7 +193,7 @@ def test_a_connector_may_start_on_a_stand(cell: Cell) -> None:
     world.close()
 
 
-def test_props_are_seen_where_they_are_placed_and_stop_nothing(cell: Cell) -> None:
+def test_props_are_seen_where_they_are_placed_and_stop_nothing(cell: CableCell) -> None:
     props = (Prop("ball", (0.03,), (0.0, 1.0, 0.0)), Prop("rod", (0.2, 0.02), (0.0, 1.0, 0.0)))
     world = World(cell, "zero", seed=1, setup=SceneSetup(props=props), renderer="software")
     rear = world.cameras["rear"]
@@ -215,7 +216,7 @@ def test_props_are_seen_where_they_are_placed_and_stop_nothing(cell: Cell) -> No
     world.close()
 
 
-def test_under_gravity_a_loose_end_hangs(cell: Cell) -> None:
+def test_under_gravity_a_loose_end_hangs(cell: CableCell) -> None:
     world = World(cell, "earth", seed=1, renderer="software")
     push(world, -15.0 * world.connector_pose().rotation.apply([1.0, 0.0, 0.0]), 0.05)
     world.advance(4.0)
@@ -236,7 +237,7 @@ def test_two_processes_agree_bit_for_bit_whoever_looks() -> None:
     assert digests == [digests[0]] * 3
 
 
-def test_a_world_that_nobody_closes_leaves_no_client_behind(cell: Cell) -> None:
+def test_a_world_that_nobody_closes_leaves_no_client_behind(cell: CableCell) -> None:
     world = World(cell, "zero", 0)
     client = world.client
     assert p.getConnectionInfo(client)["isConnected"]

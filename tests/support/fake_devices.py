@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from regrasp.interfaces.cell import KnownCell
+from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.reading import GripperReading, JointReading
 from regrasp.interfaces.trajectory import Trajectory
 from regrasp.motion.service import Motion
@@ -91,7 +91,7 @@ class FakeGripper:
 class Rig:
     """A cell with both arms asleep."""
 
-    known: KnownCell
+    known: CableKnown
     clock: Clock = field(default_factory=Clock)
 
     def __post_init__(self) -> None:

@@ -14,8 +14,7 @@ from scipy.spatial.transform import RigidTransform
 
 from regrasp.behaviors import LEAVES
 from regrasp.behaviors.services import Belief, Services
-from regrasp.interfaces.cause import CauseCode
-from regrasp.interfaces.cell import KnownCell
+from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.frame import RgbdFrame
 from regrasp.interfaces.reading import GripperReading
 from regrasp.motion.failure import PlanningError
@@ -107,7 +106,7 @@ class FakeMotion:
         self.grippers[arm].open(0.05)
         return MotionTask(self._steps(), lambda: self.cancelled.append(arm))
 
-    def give_up(self, arm: str, code: CauseCode, message: str) -> PlanningError:
+    def give_up(self, arm: str, code: str, message: str) -> PlanningError:
         return PlanningError(code, message)
 
     def tool(self, arm: str) -> RigidTransform:
@@ -178,7 +177,7 @@ class FakePerception:
 class Stage:
     """The fakes of one test, and the services made of them."""
 
-    known: KnownCell
+    known: CableKnown
     folder: Path
     clock: Clock = field(default_factory=Clock)
     log: Log = field(default_factory=Log)

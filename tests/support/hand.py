@@ -36,7 +36,7 @@ def nearest(solutions: FloatArray, q: FloatArray) -> FloatArray:
 def take_hold(world: World) -> None:
     """Bring the right hand round the connector by the preferred grasp and close it."""
     robot, arm = kinematics(world, "right"), world.arms["right"]
-    connector = world.cell.known.connector
+    connector = world.cell.known.cable.connector
     arm.gripper.open(0.06)
     for grasp in grasp_candidates(world.connector_pose(), connector.length, connector.radius, shallow=SHALLOW):
         back = grasp.world_from_tool * RigidTransform.from_translation([-STANDOFF, 0.0, 0.0])

@@ -5,16 +5,16 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.spatial.transform import RigidTransform
 
-from regrasp.interfaces.cell import KnownCell
-from regrasp.motion.planning.cable_path import natural_paths, natural_poses
+from regrasp.interfaces.cable.cell import CableKnown
+from regrasp.motion.cable.cable_path import natural_paths, natural_poses
 
 
-def natural_pose(known: KnownCell, deflection: np.ndarray) -> RigidTransform:
+def natural_pose(known: CableKnown, deflection: np.ndarray) -> RigidTransform:
     """world_from_connector of a cable bent by `deflection` (3,) m."""
     return RigidTransform.from_matrix(natural_poses(known, deflection[None])[0])
 
 
-def natural_ways(known: KnownCell, start: RigidTransform, goal: RigidTransform) -> Iterator[list[RigidTransform]]:
+def natural_ways(known: CableKnown, start: RigidTransform, goal: RigidTransform) -> Iterator[list[RigidTransform]]:
     """Paths from start to goal, as in `natural_paths`."""
     for path in natural_paths(known, start.as_matrix(), goal.as_matrix()):
         yield list(RigidTransform.from_matrix(path))

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
-from regrasp.interfaces.cell import Connector, FixedMount
+from regrasp.interfaces.cable.cell import Connector
+from regrasp.interfaces.cell import FixedMount
 from regrasp.interfaces.frame import Intrinsics, RgbdFrame
 
 Image = NDArray[np.float64]

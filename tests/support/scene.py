@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from raycast import BLACK, REAR_POSE, RED, Ball, Block, Cylinder, Sensor, render
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from regrasp.interfaces.cell import Box, KnownCell
+from regrasp.interfaces.cable.cell import CableKnown
+from regrasp.interfaces.cell import Box
 from regrasp.interfaces.frame import Intrinsics, RgbdFrame
 from regrasp.perception.camera.model import project, subsampled
 from regrasp.perception.camera.registration import CameraErrors, RegistrationParameters
@@ -66,6 +67,6 @@ def seen(
     return RgbdFrame("rear", seed, 0.0, rgb, depth, REAR)
 
 
-def without_boxes(known: KnownCell) -> KnownCell:
+def without_boxes(known: CableKnown) -> CableKnown:
     """The cell of which no panel is known: cameras are taken at their word."""
     return known.model_copy(update={"boxes": ()})

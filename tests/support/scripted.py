@@ -3,7 +3,8 @@
 import py_trees
 from py_trees.common import Status
 
-from regrasp.interfaces.cause import Cause, CauseCode
+from regrasp.interfaces.cable.cause import CableCause
+from regrasp.interfaces.cause import Cause
 
 R, S, F = Status.RUNNING, Status.SUCCESS, Status.FAILURE
 
@@ -18,5 +19,5 @@ class Script(py_trees.behaviour.Behaviour):  # type: ignore[misc]  # py_trees is
     def update(self) -> Status:
         status = self.statuses.pop(0) if len(self.statuses) > 1 else self.statuses[0]
         if status is F and self.causes is not None:
-            self.causes.append(Cause(CauseCode.SLIPPED, f"{self.name} {len(self.causes)} mm", self.name))
+            self.causes.append(Cause(CableCause.SLIPPED, f"{self.name} {len(self.causes)} mm", self.name))
         return status

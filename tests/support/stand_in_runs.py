@@ -7,7 +7,8 @@ from typing import Any
 
 from regrasp.app.records.record import Record
 from regrasp.app.records.result import Expectation, Result
-from regrasp.interfaces.cause import Cause, CauseCode
+from regrasp.interfaces.cable.cause import CableCause
+from regrasp.interfaces.cause import Cause
 
 
 def by_gravity(scenario: Any, folder: Path) -> Result:
@@ -22,7 +23,7 @@ def by_gravity(scenario: Any, folder: Path) -> Result:
         scenario.file.seed,
         "success" if stowed else "failure",
         succeeded=stowed,
-        cause=None if stowed else Cause(CauseCode.SEARCH_EXHAUSTED, "not seen from 18 stops"),
+        cause=None if stowed else Cause(CableCause.SEARCH_EXHAUSTED, "not seen from 18 stops"),
         expectations=(Expectation("outcome", stowed, "success" if stowed else "failure", "success"),),
     )
     with Record(folder, scenario.name, scenario.file.seed) as record:

@@ -9,7 +9,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from regrasp.app.files.resources import shipped
 from regrasp.app.scenario.cell_file import load_cell
-from regrasp.interfaces.cell import Tag
+from regrasp.interfaces.cable.cell import Tag
 from regrasp.interfaces.frame import RgbdFrame
 from regrasp.sim.cameras.depth_noise import DepthNoise
 from regrasp.sim.render.fiducials import compound_visual, tag_boxes
@@ -17,7 +17,7 @@ from regrasp.sim.render.renderer import LightState, RendererName, make_renderer
 from regrasp.sim.render.visuals import Visuals
 
 CELL = load_cell(shipped("cell")["thesis_tags"])
-KNOWN, CONNECTOR, CAMERA = CELL.known, CELL.known.connector, CELL.known.camera("rear")
+KNOWN, CONNECTOR, CAMERA = CELL.known, CELL.known.cable.connector, CELL.known.camera("rear")
 K = CAMERA.intrinsics
 assert CONNECTOR.tag is not None
 TAG = CONNECTOR.tag

@@ -7,18 +7,18 @@ from importlib.resources import files
 import numpy as np
 import yaml
 
-from regrasp.interfaces.cell import Cell
+from regrasp.interfaces.cable.cell import CableCell
 from regrasp.interfaces.trajectory import Trajectory
 from regrasp.sim.world import World
 
 LOOKS = range(4, 21, 4)  # tenths of a second at which the second reader looks
 
 
-def small_cell() -> Cell:
+def small_cell() -> CableCell:
     data = yaml.safe_load((files("regrasp.scenarios") / "cells/thesis.yaml").read_text(encoding="utf-8"))
     for camera in data["known"]["cameras"]:
         camera |= {"width": 212, "height": 120}
-    return Cell.model_validate(data)
+    return CableCell.model_validate(data)
 
 
 def main(second_reader: bool) -> None:

@@ -11,7 +11,8 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import FloatArray
-from regrasp.interfaces.cell import Box, KnownCell, pose_along
+from regrasp.interfaces.cable.cell import CableKnown
+from regrasp.interfaces.cell import Box, pose_along
 from regrasp.interfaces.frame import RgbdFrame
 from regrasp.perception.camera.registration import (
     CameraErrors,
@@ -84,15 +85,15 @@ class _Refused:
 class Fused:
     """A `Technique`. It knows the connector's colour and size, and the cell's floor and panels."""
 
-    def __init__(self, known: KnownCell, parameters: FusedParameters = FusedParameters()) -> None:
-        self._connector, self._boxes, self._parameters = known.connector, known.boxes, parameters
+    def __init__(self, known: CableKnown, parameters: FusedParameters = FusedParameters()) -> None:
+        self._connector, self._boxes, self._parameters = known.cable.connector, known.boxes, parameters
         registration = parameters.registration
         self._errors: dict[str, CameraErrors] = {
             c.name: expected_errors(known, c.name, registration) for c in known.cameras
         }
         noise = parameters.blob.disparity_noise
         self._stereo: dict[str, Stereo] = {c.name: Stereo.of(c, noise) for c in known.cameras}
-        self._color = SegmentationParameters.for_color(known.connector.color)
+        self._color = SegmentationParameters.for_color(known.cable.connector.color)
 
     def estimate(
         self,

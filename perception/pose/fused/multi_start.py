@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from regrasp.interfaces.arrays import FloatArray
-from regrasp.interfaces.cell import Connector
+from regrasp.interfaces.cable.cell import Connector
 from regrasp.perception.pose.fused.blob import Blob
 from regrasp.perception.pose.fused.cylinder_fit import (
     Cylinder,

@@ -19,7 +19,8 @@ from regrasp.app.records.folders import new_folder
 from regrasp.app.records.result import Expectation, Result, Slip
 from regrasp.app.run.batch import Settings
 from regrasp.app.run.observers import Observers
-from regrasp.interfaces.cause import Cause, CauseCode
+from regrasp.interfaces.cable.cause import CableCause
+from regrasp.interfaces.cause import Cause
 
 Episode = Callable[..., Result]
 
@@ -92,7 +93,7 @@ def test_quiet_shows_the_summary_alone(calls: list[SimpleNamespace]) -> None:
 
 
 def test_what_was_not_met_exits_1_with_the_cause(monkeypatch: pytest.MonkeyPatch) -> None:
-    cause = Cause(CauseCode.SEARCH_EXHAUSTED, "18 stops, nothing seen", "root/search")
+    cause = Cause(CableCause.SEARCH_EXHAUSTED, "18 stops, nothing seen", "root/search")
     unmet = result(
         outcome="failure", succeeded=False, cause=cause, expectations=(Expectation("slips", False, 0, 1),), slips=()
     )
@@ -252,7 +253,7 @@ def test_study_demo_hands_on_seeds_jobs_and_overrides(monkeypatch: pytest.Monkey
         asked.extend(args)
         return 130
 
-    monkeypatch.setattr("regrasp.app.studies.demo.run_demo", run_demo)
+    monkeypatch.setattr("regrasp.app.tasks.cable.studies.demo.run_demo", run_demo)
     ran = invoke("study", "demo", "--seeds", "2:5", "--jobs", "3", "--out", "study", "--set", "inputs.tries=1")
     assert ran.exit_code == 130
     assert asked == [range(2, 5), 3, Path("study"), ["inputs.tries=1"], Settings()]

@@ -16,7 +16,8 @@ from regrasp.app.run.batch import Row, Run, Settings, row_of
 from regrasp.app.run.junit import write_junit
 from regrasp.app.run.processes import Done
 from regrasp.app.scenario.load import Scenario, cases, load_scenario
-from regrasp.interfaces.cause import Cause, CauseCode
+from regrasp.interfaces.cable.cause import CableCause
+from regrasp.interfaces.cause import Cause
 
 
 @pytest.fixture(autouse=True)
@@ -40,7 +41,7 @@ def episode(scenario: Scenario, out: Path | None, *, seed: int, video: bool, ren
         case=scenario.case,
         cause=None
         if met
-        else Cause(CauseCode.SEARCH_EXHAUSTED, "nothing <seen> \x1b[31m" if seed == 3 else "18 stops"),
+        else Cause(CableCause.SEARCH_EXHAUSTED, "nothing <seen> \x1b[31m" if seed == 3 else "18 stops"),
         expectations=(Expectation("slips", met, int(met), 1),),
         sim_seconds=80.0,
         wall_seconds=12.5,

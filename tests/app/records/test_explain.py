@@ -11,6 +11,7 @@ from regrasp.app.records.history import NodeHistory
 from regrasp.app.records.reader import Event, read_record
 from regrasp.app.records.result import Attempt, Link
 from regrasp.app.records.timeline import timeline
+from regrasp.interfaces.cable.cause import CableCause
 from regrasp.interfaces.cause import Cause, CauseCode
 from regrasp.trees import executions
 
@@ -114,7 +115,7 @@ def test_a_run_that_was_killed_before_its_first_tick_has_a_page(tmp_path: Path) 
 
 @pytest.mark.parametrize("width", [80, 100, 120])
 def test_long_sentences_are_wrapped(tmp_path: Path, width: int) -> None:
-    cause = Cause(CauseCode.SLIPPED, "the connector slipped away " * 20, "root")
+    cause = Cause(CableCause.SLIPPED, "the connector slipped away " * 20, "root")
     told = page(write_record(tmp_path / "run", cause=cause), width)
     assert " ".join(told.split()).count("slipped away") == 20
     assert max(map(len, told.splitlines())) <= width
@@ -129,7 +130,7 @@ def test_a_wrapped_link_of_the_chain_names_its_node_once(tmp_path: Path) -> None
 
 
 def test_what_stands_in_a_record_does_not_steer_the_terminal(tmp_path: Path) -> None:
-    cause = Cause(CauseCode.SLIPPED, "\x1b[2J\x07gone", "root")
+    cause = Cause(CableCause.SLIPPED, "\x1b[2J\x07gone", "root")
     told = page(write_record(tmp_path / "run", cause=cause, traceback="a\n\x1b[31mb"))
     assert "\\x1b[2J\\x07gone" in told
     assert "\x1b" not in told

@@ -11,6 +11,7 @@ from py_trees.decorators import FailureIsSuccess, Inverter, Retry
 from scripted import F, R, S, Script
 
 from regrasp.app.run.attempts import Attempts
+from regrasp.interfaces.cable.cause import CableCause
 from regrasp.interfaces.cause import Cause, CauseCode
 
 
@@ -95,7 +96,7 @@ def test_the_chain_goes_through_retry_and_sequence_to_the_last_try() -> None:
         ("try", "Sequence", "child grasp failed (2 of 2)"),
         ("grasp", "Script", "slipped: grasp 1 mm"),
     ]
-    assert attempts.cause() == Cause(CauseCode.SLIPPED, "grasp 1 mm", "grasp")
+    assert attempts.cause() == Cause(CableCause.SLIPPED, "grasp 1 mm", "grasp")
     assert [link.at for link in attempts.failed_chain() or ()] == [3.0, 2.0, 2.0, 2.0, 2.0]
 
 
@@ -144,7 +145,7 @@ def test_the_chain_skips_a_stop_that_passes_on_the_cause_of_what_failed_before()
     attempts = bench.run(Selector("root", memory=True, children=[bench.fails("carry"), Stop("stop", F)]))
     assert told(attempts)[1] == ("stop", 0.0, 0.0, "FAILURE", "carry 0 mm", 1)
     assert chain(attempts)[1:] == [("carry", "Script", "slipped: carry 0 mm")]
-    assert attempts.cause() == Cause(CauseCode.SLIPPED, "carry 0 mm", "carry")
+    assert attempts.cause() == Cause(CableCause.SLIPPED, "carry 0 mm", "carry")
 
 
 def test_a_fallbacks_chain_skips_what_names_no_cause() -> None:

@@ -14,7 +14,7 @@ from regrasp.app.files.resources import shipped
 from regrasp.app.scenario.cell_file import load_cell
 from regrasp.app.scenario.load import load_scenario
 from regrasp.app.scenario.placement import cable_at_start
-from regrasp.interfaces.cell import Cell
+from regrasp.interfaces.cable.cell import CableCell
 from regrasp.interfaces.scene import GRAVITIES, Gravity
 from regrasp.sim.world import World
 
@@ -39,9 +39,9 @@ def findings(*overrides: str, scenario: str = "no_obstacle") -> list[str]:
         ("known.boxes.0.center.2=0.48", "floor reaches 0.015 m into the stowed connector; move one of them"),
         ("known.cameras.0.mount.position=[0.5145, 0, 0.3]", "the rear camera is inside back_panel; move one of them"),
         ("known.arms.1.base=[0, 0.1, 0]", "the right arm's base reaches 0.079 m into the left arm's base; move one"),
-        ("known.clip.seat=[0.2, 0.9, 0.4]", "the clip is 1.13 m from the right arm's shoulder, which reaches 0.80 m"),
+        ("known.cable.clip.seat=[0.2, 0.9, 0.4]", "the clip is 1.13 m from the right arm's shoulder, which reaches 0.80 m"),
         ("known.connector={length: 0.09, radius: 0.05, color: [1, 0, 0]}", "back_panel reaches 0.015 m into the plug"),
-        ("known.connector.radius=0.022", "a connector 44 mm thick does not fit the jaw, which opens"),
+        ("known.cable.connector.radius=0.022", "a connector 44 mm thick does not fit the jaw, which opens"),
         ("known.boxes.0.name=back_panel", "2 boxes are named 'back_panel'; rename them"),
         ("known.cameras.0.mount.position=[-0.3, 0, -0.5]", "the rear camera sees neither the plugged connector"),
         ("known.boxes.0={name: a, center: [0.42, -0.2, 0.15], size: [0.05, 0.05, 0.3]}", "a reaches 0.029 m into"),
@@ -95,7 +95,7 @@ def test_a_position_may_be_one_vector_or_one_for_each_gravity() -> None:
 
 
 @pytest.mark.parametrize("gravity", GRAVITIES)
-def test_the_cable_hangs_at_the_start_as_the_world_lays_it(cell: Cell, gravity: Gravity) -> None:
+def test_the_cable_hangs_at_the_start_as_the_world_lays_it(cell: CableCell, gravity: Gravity) -> None:
     points = cable_at_start(cell, gravity)
     world = World(cell, gravity, seed=0, renderer="software")
     states = p.getLinkStates(world.cable.body, range(cell.hidden.cable.links), 1, 1, physicsClientId=world.client)
@@ -126,11 +126,11 @@ def test_no_number_of_a_cell_may_be_huge() -> None:
 
 def test_who_only_looks_at_pictures_may_have_a_cell_that_cannot_work() -> None:
     path = shipped("cell")["thesis"]
-    high, wrong = parse_overrides(["known.clip.seat=[0.4,0.1,3.0]"])
+    high, wrong = parse_overrides(["known.cable.clip.seat=[0.4,0.1,3.0]"])
     assert not wrong
     with pytest.raises(Findings):
         load_cell(path, high)
-    assert load_cell(path, high, laid_out=False).known.clip.seat == (0.4, 0.1, 3.0)
+    assert load_cell(path, high, laid_out=False).known.cable.clip.seat == (0.4, 0.1, 3.0)
     misnamed, _ = parse_overrides(["known.plugged_into=nowhere"])
     with pytest.raises(Findings, match="nowhere"):
         load_cell(path, misnamed, laid_out=False)

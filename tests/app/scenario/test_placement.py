@@ -6,7 +6,7 @@ from scipy.optimize import linprog
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from regrasp.app.scenario.placement import JitteredBox, overlaps, penetration_depth
-from regrasp.interfaces.cell import KnownCell
+from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.motion.robots.kinematics import ArmKinematics
 from regrasp.motion.robots.spheres import SPHERE_LINKS, SPHERES
 
@@ -47,7 +47,7 @@ def test_penetration_is_the_shortest_way_out() -> None:
     np.testing.assert_allclose(penetration_depth(boxes, np.array([0.0, 0.0, 0.25])), -0.10, atol=1e-12)
 
 
-def test_a_block_in_a_sleeping_arm_or_around_the_camera_is_told(known: KnownCell) -> None:
+def test_a_block_in_a_sleeping_arm_or_around_the_camera_is_told(known: CableKnown) -> None:
     def named(center: tuple[float, float, float], edge: float = 0.03) -> list[str]:
         return [name for name, _ in overlaps(known, JitteredBox(np.array(center), (edge, edge, edge), 20.0))]
 
@@ -61,7 +61,7 @@ def test_a_block_in_a_sleeping_arm_or_around_the_camera_is_told(known: KnownCell
 
 @given(places, st.floats(0.02, 0.3), st.floats(-180, 180))
 def test_an_arm_asleep_is_told_where_one_of_its_spheres_is_in_the_block(
-    known: KnownCell, place: tuple[float, float, float], edge: float, yaw_deg: float
+    known: CableKnown, place: tuple[float, float, float], edge: float, yaw_deg: float
 ) -> None:
     found = dict(overlaps(known, JitteredBox(np.array(place), (edge, edge, edge), yaw_deg)))
     for arm in known.arms:

@@ -14,7 +14,7 @@ from regrasp.app.scenario.cell_file import load_cell
 from regrasp.app.scenario.load import load_scenario
 from regrasp.app.scenario.references import tree_text
 from regrasp.behaviors.cable.unplug import Unplug
-from regrasp.interfaces.cause import CauseCode
+from regrasp.interfaces.cable.cause import CableCause
 
 ARMS = 1 + shipped("cell")["thesis"].read_text().splitlines().index("  arms:")  # the line of that key
 METRES = "expected a number in metres, such as 0.3"
@@ -54,7 +54,7 @@ def test_a_scenario_brings_its_cell_and_tree(scenario: Path) -> None:
     assert (loaded.name, loaded.tree) == ("mine", Path("tree.xml"))
     assert loaded.file.obstacles[0].position_in("zero") == (0.30, 0.14, 0.16)
     assert loaded.file.faults[0].when.carried == (0.3, 0.8)
-    assert loaded.cell.known.plugged_into == "back_4"
+    assert loaded.cell.known.cable.plugged_into == "back_4"
 
 
 def test_what_is_left_out_has_its_default(scenario: Path) -> None:
@@ -74,16 +74,16 @@ def test_overrides_change_scenario_and_cell(scenario: Path) -> None:
             "inputs.tries=2",
             "expect={outcome: failure, cause: search_exhausted}",
             "cell.hidden.errors.arm_tool=0",
-            "cell.known.sockets.0.depth=0.02",
+            "cell.known.cable.sockets.0.depth=0.02",
         ],
     )
     assert loaded.file.gravity == "earth"
     assert loaded.file.obstacles[0].size == (0.1, 0.1, 0.1)
     assert loaded.inputs == {"tries": "2"}
-    assert loaded.file.expect.cause is CauseCode.SEARCH_EXHAUSTED
+    assert loaded.file.expect.cause is CableCause.SEARCH_EXHAUSTED
     assert loaded.cell.hidden.errors.arm_tool == 0
     # Socket 0 is the anchor that the others are aliases of: an override holds for the one item that it names.
-    assert [s.depth for s in loaded.cell.known.sockets] == [0.02, 0.015, 0.015, 0.015, 0.015]
+    assert [s.depth for s in loaded.cell.known.cable.sockets] == [0.02, 0.015, 0.015, 0.015, 0.015]
     assert scenario.read_text() == before
 
 
@@ -295,14 +295,14 @@ _values = st.recursive(
 
 
 _PATHS = """gravity obstacles obstacles.0 obstacles.0.size obstacles.0.position.zero.2 faults.0 expect expect.cause cell
-tree cell.known cell.known.clip cell.known.cameras.0.mount cell.known.sockets.0.axis cell.known.boxes.0"""
+tree cell.known cell.known.cable.clip cell.known.cameras.0.mount cell.known.cable.sockets.0.axis cell.known.boxes.0"""
 
 
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(path=st.sampled_from(_PATHS.split()), value=_values)
-@example(path="cell.known.sockets.0.axis", value=[1.0, 0, 0])
-@example(path="cell.known.sockets.0.axis", value=[0, 0, -1.0])
-@example(path="cell.known.clip.axis", value=[0, 0, 1.0])
+@example(path="cell.known.cable.sockets.0.axis", value=[1.0, 0, 0])
+@example(path="cell.known.cable.sockets.0.axis", value=[0, 0, -1.0])
+@example(path="cell.known.cable.clip.axis", value=[0, 0, 1.0])
 @example(path="cell.hidden.cable.anchor_axis", value=[0, 0, 1.0])
 def test_any_value_anywhere_gives_findings_or_loads(scenario: Path, path: str, value: object) -> None:
     for text in (json.dumps(value), yaml.safe_dump(value)):

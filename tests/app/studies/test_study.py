@@ -11,9 +11,10 @@ import pytest
 
 from regrasp.app.records.result import Expectation, Result, Slip
 from regrasp.app.scenario.load import Scenario
-from regrasp.app.studies.demo import run_demo
 from regrasp.app.studies.statistics import wilson_interval
-from regrasp.interfaces.cause import Cause, CauseCode
+from regrasp.app.tasks.cable.studies.demo import run_demo
+from regrasp.interfaces.cable.cause import CableCause
+from regrasp.interfaces.cause import Cause
 
 
 def episode(scenario: Scenario, out: Path | None, *, seed: int, video: bool, renderer: str) -> Result:
@@ -32,7 +33,7 @@ def episode(scenario: Scenario, out: Path | None, *, seed: int, video: bool, ren
         seed=seed,
         outcome="failure" if failed else "success",
         succeeded=not failed,
-        cause=Cause(CauseCode.SEARCH_EXHAUSTED, "18 stops") if failed else None,
+        cause=Cause(CableCause.SEARCH_EXHAUSTED, "18 stops") if failed else None,
         expectations=(
             Expectation("outcome", not failed, "success", "success"),
             Expectation("unintended_force", True, 1.0 + seed, 5.0),
@@ -106,7 +107,7 @@ def test_ctrl_c_keeps_what_was_done_and_stops_what_runs(tmp_path: Path) -> None:
     program = textwrap.dedent("""
         import sys
         from pathlib import Path
-        from regrasp.app.studies.demo import run_demo
+        from regrasp.app.tasks.cable.studies.demo import run_demo
         from test_study import slow_after_two
         if __name__ == "__main__":
             sys.exit(run_demo(range(3), 1, Path(sys.argv[1]), episode=slow_after_two))

@@ -6,15 +6,15 @@ from fake_services import Stage, seen, unseen
 from py_trees.common import Status
 from scipy.spatial.transform import RigidTransform
 
-from regrasp.interfaces.cause import CauseCode
-from regrasp.interfaces.cell import KnownCell
+from regrasp.interfaces.cable.cause import CableCause
+from regrasp.interfaces.cable.cell import CableKnown
 
 WATCH = """<Sequence name="watch" memory="false">
 <Monitor name="monitor" period="0.1"/><DetectSlip name="detect_slip"/></Sequence>"""
 
 
 @pytest.fixture
-def stage(known: KnownCell, tmp_path: Path) -> Stage:
+def stage(known: CableKnown, tmp_path: Path) -> Stage:
     stage = Stage(known, tmp_path)
     stage.belief.held = RigidTransform.identity()
     return stage
@@ -38,7 +38,7 @@ def test_the_finger_gap_tells_of_an_end_that_stays_near(stage: Stage) -> None:
     assert notice.by == "gap"
     assert notice.at == pytest.approx(lost_at + 0.10, abs=0.06)  # the median of five readings, one a tick
     [cause] = stage.belief.causes
-    assert cause.code is CauseCode.SLIPPED
+    assert cause.code is CableCause.SLIPPED
     assert cause.node.endswith("watch/detect_slip")
     assert "3.0 mm apart" in cause.message
     assert stage.belief.held is None

@@ -7,12 +7,13 @@ from fake_services import Stage, seen
 from py_trees.common import Status
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from regrasp.interfaces.cell import KnownCell, pose_along
+from regrasp.interfaces.cable.cell import CableKnown
+from regrasp.interfaces.cell import pose_along
 from regrasp.perception.pose.estimate import Estimate
 
 
 @pytest.fixture
-def stage(known: KnownCell, tmp_path: Path) -> Stage:
+def stage(known: CableKnown, tmp_path: Path) -> Stage:
     return Stage(known, tmp_path)
 
 

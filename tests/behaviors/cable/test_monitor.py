@@ -6,14 +6,14 @@ from fake_services import Stage, seen, unseen
 from py_trees.common import Status
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from regrasp.interfaces.cell import KnownCell
+from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.perception.tracking.track import TrackState
 
 MONITOR = '<Monitor name="monitor" period="0.2"/>'
 
 
 @pytest.fixture
-def stage(known: KnownCell, tmp_path: Path) -> Stage:
+def stage(known: CableKnown, tmp_path: Path) -> Stage:
     stage = Stage(known, tmp_path)
     stage.belief.held = RigidTransform.from_rotation(Rotation.from_euler("z", 90, degrees=True))
     stage.perception.shows = lambda _, t: seen(t, stage.motion.hand.translation)

@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 from py_trees.common import Status
 from scipy.spatial.transform import RigidTransform
 
+from regrasp.interfaces.cable.cause import CableCause
+from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.cause import CauseCode
-from regrasp.interfaces.cell import KnownCell
 from regrasp.interfaces.frame import Intrinsics, RgbdFrame
 from regrasp.motion.failure import PlanningError
 
@@ -19,7 +20,7 @@ K = Intrinsics(64, 48, 50.0, 50.0, 31.5, 23.5)
 
 
 @pytest.fixture
-def stage(known: KnownCell, tmp_path: Path) -> Stage:
+def stage(known: CableKnown, tmp_path: Path) -> Stage:
     return Stage(known, tmp_path)
 
 
@@ -46,7 +47,7 @@ def test_what_never_comes_to_rest_fails_at_the_time_limit(stage: Stage) -> None:
     stage.perception.frames = lambda t: frame(t, moving=True)
     assert stage.run(stage.tree(WAIT), 10.0) is Status.FAILURE
     assert stage.clock.t == pytest.approx(6.0, abs=0.25)
-    assert stage.belief.causes[-1].code is CauseCode.NOT_STILL
+    assert stage.belief.causes[-1].code is CableCause.NOT_STILL
 
 
 def test_a_frame_from_before_does_not_count(stage: Stage) -> None:

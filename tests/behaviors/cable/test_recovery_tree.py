@@ -20,8 +20,8 @@ from scipy.spatial.transform import RigidTransform
 from regrasp.app.files.resources import shipped
 from regrasp.app.run.attempts import Attempts
 from regrasp.behaviors import LEAVES, Leaf
+from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.cause import Cause, ServiceError
-from regrasp.interfaces.cell import KnownCell
 from regrasp.interfaces.frame import Intrinsics, RgbdFrame
 from regrasp.motion.task import MotionTask
 from regrasp.trees import in_tree_order, load_tree
@@ -86,14 +86,14 @@ class Play:
     Where it is `gone` nobody finds it, and the second try ends in the safe stop.
     """
 
-    def __init__(self, known: KnownCell, folder: Path, slip: int, gone: bool = False) -> None:
+    def __init__(self, known: CableKnown, folder: Path, slip: int, gone: bool = False) -> None:
         Blackboard.clear()
         stage = Stage(known, folder)
         self.clock, self.slip = stage.clock, slip
         self.motion = BusyMotion(stage.clock)
-        self.motion.hand = RigidTransform.from_translation(known.clip.seat)
+        self.motion.hand = RigidTransform.from_translation(known.cable.clip.seat)
         self.hand = self.motion.grippers["right"] = Hand(stage.clock)
-        self.eyes = Eyes(stage.clock, np.array(known.clip.seat), gone)
+        self.eyes = Eyes(stage.clock, np.array(known.cable.clip.seat), gone)
         services = replace(stage.services, motion=cast(Any, self.motion), perception=cast(Any, self.eyes))
         self.root = load_tree(shipped("tree")["recovery"], LEAVES, {"tries": "2"})
         self.leaves = {n.name.rsplit(".", 1)[1]: n for n in in_tree_order(self.root) if isinstance(n, Leaf)}
@@ -121,7 +121,7 @@ class Play:
 
 
 @pytest.fixture
-def play(known: KnownCell, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Make]:
+def play(known: CableKnown, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Make]:
     # Geometry that takes long and that no motion here looks at.
     monkeypatch.setattr("regrasp.behaviors.cable.carry.Carry._goals", lambda *_arguments: [])
     monkeypatch.setattr("regrasp.behaviors.cable.carry.Insert._seated", lambda *_arguments: None)

@@ -8,8 +8,10 @@ from fake_services import Stage, seen, unseen
 from py_trees.common import Status
 
 from regrasp.behaviors.cable.spiral_search import SpiralSearchParameters
+from regrasp.interfaces.cable.cause import CableCause
+from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.cause import CauseCode
-from regrasp.interfaces.cell import FixedMount, KnownCell
+from regrasp.interfaces.cell import FixedMount
 from regrasp.motion.failure import PlanningError
 from regrasp.motion.planning.viewpoints import spiral
 from regrasp.perception.pose.estimate import Estimate, NoEstimate
@@ -20,7 +22,7 @@ PLACE = np.array([0.40, 0.10, 0.25])
 
 
 @pytest.fixture
-def stage(known: KnownCell, tmp_path: Path) -> Stage:
+def stage(known: CableKnown, tmp_path: Path) -> Stage:
     stage = Stage(known, tmp_path)
     stage.perception.track.feed(seen(0.0, PLACE))
     stage.perception.shows = lambda _, t: unseen(t, "wrist")
@@ -61,7 +63,7 @@ def test_it_begins_where_the_end_was_last_seen_and_ends_with_the_find(stage: Sta
     assert (found["looked"], found["skipped"]) == (2, [])
 
 
-def test_an_end_never_seen_is_sought_from_the_panel_s_middle(known: KnownCell, tmp_path: Path) -> None:
+def test_an_end_never_seen_is_sought_from_the_panel_s_middle(known: CableKnown, tmp_path: Path) -> None:
     stage = Stage(known, tmp_path)
     stage.run(stage.tree(search(300)), 0.1)
     panel = next(box for box in known.boxes if box.name == "back_panel")
@@ -125,7 +127,7 @@ def test_it_ends_at_its_time_limit_with_the_arm_asleep(stage: Stage) -> None:
     assert arm == "left"
     assert goals == pytest.approx(np.array([stage.known.arm("left").sleep]))
     [cause] = stage.belief.causes
-    assert cause.code is CauseCode.SEARCH_EXHAUSTED
+    assert cause.code is CableCause.SEARCH_EXHAUSTED
     assert stage.belief.connector is None
 
 

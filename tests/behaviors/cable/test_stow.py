@@ -6,26 +6,26 @@ from fake_services import Seen, Stage, seen, unseen
 from py_trees.common import Status
 from scipy.spatial.transform import RigidTransform
 
-from regrasp.interfaces.cause import CauseCode
-from regrasp.interfaces.cell import KnownCell
+from regrasp.interfaces.cable.cause import CableCause
+from regrasp.interfaces.cable.cell import CableKnown
 
 LOOK = '<LookAtStow name="look_at_stow"/>'
 
 
 @pytest.fixture
-def stage(known: KnownCell, tmp_path: Path) -> Stage:
+def stage(known: CableKnown, tmp_path: Path) -> Stage:
     return Stage(known, tmp_path)
 
 
 def test_an_end_in_the_clip_is_stowed(stage: Stage) -> None:
-    seat = np.array(stage.known.clip.seat)
+    seat = np.array(stage.known.cable.clip.seat)
     stage.perception.shows = lambda _, t: seen(t, np.add(seat, [0.0, 0.02, 0.01]))
     assert stage.run(stage.tree(LOOK), 3.0) is Status.SUCCESS
     assert not stage.belief.notices
 
 
 def beside(stage: Stage, stamp: float) -> Seen:
-    return seen(stamp, np.add(stage.known.clip.seat, [0.0, 0.0, -0.10]))
+    return seen(stamp, np.add(stage.known.cable.clip.seat, [0.0, 0.0, -0.10]))
 
 
 def nowhere(_stage: Stage, stamp: float) -> Seen:
@@ -33,7 +33,7 @@ def nowhere(_stage: Stage, stamp: float) -> Seen:
 
 
 def stale(stage: Stage, _stamp: float) -> Seen:
-    return seen(0.0, np.array(stage.known.clip.seat))
+    return seen(0.0, np.array(stage.known.cable.clip.seat))
 
 
 @pytest.mark.parametrize("shows", [beside, nowhere, stale])
@@ -44,7 +44,7 @@ def test_an_end_that_is_not_there_is_noticed_once(stage: Stage, shows: object) -
     [notice] = stage.belief.notices
     assert notice.by == "place"
     assert notice.at == pytest.approx(stage.clock.t)
-    assert [cause.code for cause in stage.belief.causes] == [CauseCode.NOT_STOWED]
+    assert [cause.code for cause in stage.belief.causes] == [CableCause.NOT_STOWED]
 
 
 def test_letting_go_opens_the_jaw_and_believes_nothing_held(stage: Stage) -> None:

@@ -5,15 +5,15 @@ import pytest
 from fake_services import Seen, Stage, seen, unseen
 from py_trees.common import Status
 
-from regrasp.interfaces.cause import CauseCode
-from regrasp.interfaces.cell import KnownCell
+from regrasp.interfaces.cable.cause import CableCause
+from regrasp.interfaces.cable.cell import CableKnown
 
 CHECK = '<CheckCameras name="check_cameras" seconds="1.5"/>'
 PLACE = np.array([0.35, 0.1, 0.2])
 
 
 @pytest.fixture
-def stage(known: KnownCell, tmp_path: Path) -> Stage:
+def stage(known: CableKnown, tmp_path: Path) -> Stage:
     return Stage(known, tmp_path)
 
 
@@ -50,7 +50,7 @@ def test_an_end_that_is_not_there_not_fresh_or_not_live_must_be_searched(stage: 
     stage.clock.t = 2.0
     assert stage.run(stage.tree(CHECK), 5.0) is Status.FAILURE
     [cause] = stage.belief.causes
-    assert cause.code is CauseCode.CONNECTOR_NOT_FOUND
+    assert cause.code is CableCause.CONNECTOR_NOT_FOUND
     assert why in cause.message
     assert stage.belief.connector is None
     assert stage.belief.found_by is None

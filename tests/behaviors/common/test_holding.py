@@ -5,11 +5,11 @@ from py_trees.common import Status
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.behaviors.services import LossNotice
+from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.cause import Cause, CauseCode
-from regrasp.interfaces.cell import KnownCell
 
 
-def test_an_empty_hand_says_how_often_and_when_it_lost_what_it_held(known: KnownCell, tmp_path: Path) -> None:
+def test_an_empty_hand_says_how_often_and_when_it_lost_what_it_held(known: CableKnown, tmp_path: Path) -> None:
     stage = Stage(known, tmp_path)
     tree = stage.tree('<Holding name="holding"/>')
     assert stage.run(tree, 0.0) is Status.FAILURE

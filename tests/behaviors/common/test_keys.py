@@ -6,8 +6,8 @@ from fake_services import Stage
 from py_trees.common import Status
 
 from regrasp.behaviors import LEAVES
+from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.cause import CauseCode
-from regrasp.interfaces.cell import KnownCell
 from regrasp.trees.check import check_tree
 from regrasp.trees.load import load_tree
 
@@ -18,7 +18,7 @@ BOTH = (
 
 
 @pytest.mark.parametrize(("text", "status"), [("careful", Status.SUCCESS), ("quick", Status.FAILURE)])
-def test_a_key_is_what_was_set(known: KnownCell, tmp_path: Path, text: str, status: Status) -> None:
+def test_a_key_is_what_was_set(known: CableKnown, tmp_path: Path, text: str, status: Status) -> None:
     stage = Stage(known, tmp_path)
     assert stage.run(stage.tree(BOTH.replace("EQUALS", text)), 1.0) is status
     told = [(cause.code, cause.message, cause.node) for cause in stage.belief.causes]
@@ -28,7 +28,7 @@ def test_a_key_is_what_was_set(known: KnownCell, tmp_path: Path, text: str, stat
 
 @pytest.mark.parametrize(("given", "status"), [({}, Status.FAILURE), ({"mode": "quick"}, Status.SUCCESS)])
 def test_a_tree_goes_another_way_by_its_input(
-    known: KnownCell, tmp_path: Path, given: dict[str, str], status: Status
+    known: CableKnown, tmp_path: Path, given: dict[str, str], status: Status
 ) -> None:
     stage, path = Stage(known, tmp_path), tmp_path / "tree.xml"
     check = '<CheckKey name="check" key="{mode}" equals="quick"/>'

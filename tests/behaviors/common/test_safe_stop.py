@@ -4,16 +4,17 @@ import pytest
 from fake_services import Stage
 from py_trees.common import Status
 
+from regrasp.interfaces.cable.cause import CableCause
+from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.cause import Cause, CauseCode
-from regrasp.interfaces.cell import KnownCell
 
 STOP = '<SafeStop name="safe_stop"/>'
 
 
-def test_it_stops_the_arms_at_once_and_fails_with_the_last_cause(known: KnownCell, tmp_path: Path) -> None:
+def test_it_stops_the_arms_at_once_and_fails_with_the_last_cause(known: CableKnown, tmp_path: Path) -> None:
     stage = Stage(known, tmp_path)
     stage.belief.causes += [
-        Cause(CauseCode.SLIPPED, "an old slip", "root/a"),
+        Cause(CableCause.SLIPPED, "an old slip", "root/a"),
         Cause(CauseCode.OUT_OF_REACH, "connector 0.82 m from the right arm", "root/b"),
     ]
     tree = stage.tree(STOP)
@@ -36,7 +37,7 @@ def test_it_stops_the_arms_at_once_and_fails_with_the_last_cause(known: KnownCel
     assert not stage.motion.grippers["right"].told  # the jaw keeps its force
 
 
-def test_a_stop_without_a_cause_is_an_error_of_the_tree(known: KnownCell, tmp_path: Path) -> None:
+def test_a_stop_without_a_cause_is_an_error_of_the_tree(known: CableKnown, tmp_path: Path) -> None:
     stage = Stage(known, tmp_path)
     assert stage.run(stage.tree(STOP), 2.0) is Status.FAILURE
     assert stage.belief.causes[-1].code is CauseCode.INTERNAL_ERROR

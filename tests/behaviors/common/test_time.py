@@ -6,8 +6,8 @@ from py_trees.common import Status
 
 from regrasp.app.run.attempts import Attempts
 from regrasp.behaviors import LEAVES
+from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.cause import CauseCode
-from regrasp.interfaces.cell import KnownCell
 from regrasp.trees.check import check_tree
 from regrasp.trees.scripted import ScriptedTree
 
@@ -15,7 +15,7 @@ LIMITED = '<TimeLimit name="limit" seconds="{limit}"><Wait name="wait" seconds="
 TREE = '<root main_tree_to_execute="M"><BehaviorTree ID="M">{}</BehaviorTree></root>'
 
 
-def test_wait_succeeds_after_so_many_simulated_seconds(known: KnownCell, tmp_path: Path) -> None:
+def test_wait_succeeds_after_so_many_simulated_seconds(known: CableKnown, tmp_path: Path) -> None:
     stage = Stage(known, tmp_path)
     tree = stage.tree('<Wait name="wait" seconds="0.5"/>')
     assert stage.run(tree, 0.4) is Status.RUNNING
@@ -23,13 +23,13 @@ def test_wait_succeeds_after_so_many_simulated_seconds(known: KnownCell, tmp_pat
     assert stage.clock.t == pytest.approx(0.5)
 
 
-def test_a_child_within_its_limit_keeps_its_status(known: KnownCell, tmp_path: Path) -> None:
+def test_a_child_within_its_limit_keeps_its_status(known: CableKnown, tmp_path: Path) -> None:
     stage = Stage(known, tmp_path)
     assert stage.run(stage.tree(LIMITED.format(limit=0.5, wait=0.45)), 2.0) is Status.SUCCESS
     assert stage.belief.causes == []
 
 
-def test_a_child_past_its_limit_is_stopped_and_the_limit_is_the_cause(known: KnownCell, tmp_path: Path) -> None:
+def test_a_child_past_its_limit_is_stopped_and_the_limit_is_the_cause(known: CableKnown, tmp_path: Path) -> None:
     stage = Stage(known, tmp_path)
     tree = stage.tree(LIMITED.format(limit=0.5, wait=5.0))
     attempts = Attempts(tree.root, stage.belief.causes, stage.clock.now, {"limit": "TimeLimit"})
@@ -45,7 +45,7 @@ def test_a_child_past_its_limit_is_stopped_and_the_limit_is_the_cause(known: Kno
     assert link.why == f"timed_out: {cause.message}"
 
 
-def test_the_limit_counts_anew_when_it_is_entered_anew(known: KnownCell, tmp_path: Path) -> None:
+def test_the_limit_counts_anew_when_it_is_entered_anew(known: CableKnown, tmp_path: Path) -> None:
     stage = Stage(known, tmp_path)
     body = LIMITED.format(limit=0.5, wait=5.0)
     assert stage.run(stage.tree(f'<Retry name="again" num_failures="3">{body}</Retry>'), 9.0) is Status.FAILURE
@@ -82,7 +82,7 @@ def test_a_scripted_tree_keeps_the_limit_on_its_simulated_clock(tmp_path: Path) 
     assert tree.leaves["limit/wait"].stopped == 1
 
 
-def test_a_log_leaf_writes_its_message(known: KnownCell, tmp_path: Path) -> None:
+def test_a_log_leaf_writes_its_message(known: CableKnown, tmp_path: Path) -> None:
     stage = Stage(known, tmp_path)
     assert stage.run(stage.tree('<Log name="log" message="half way"/>'), 1.0) is Status.SUCCESS
     assert stage.log.of("remark") == [{"node": "log", "message": "half way"}]

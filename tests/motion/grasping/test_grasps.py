@@ -6,8 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import RigidTransform, Rotation
 
+from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.cause import CauseCode
-from regrasp.interfaces.cell import Box, KnownCell, pose_along
+from regrasp.interfaces.cell import Box, pose_along
 from regrasp.motion.failure import PlanningError
 from regrasp.motion.grasping.grasps import GraspParameters, choose_grasp, grasp_candidates
 from regrasp.motion.robots.kinematics import ArmKinematics
@@ -66,11 +67,11 @@ def tilted(position: tuple[float, float, float], degrees: float) -> RigidTransfo
 
 @pytest.mark.parametrize("place", ["plugged", "seat", "high", "low"])
 def test_the_right_arm_grasps_the_connector_of_the_thesis_cell(
-    place: str, known: KnownCell, boxes: Sequence[Box], right_arm: ArmKinematics
+    place: str, known: CableKnown, boxes: Sequence[Box], right_arm: ArmKinematics
 ) -> None:
     connector = {
-        "plugged": known.socket(known.plugged_into).world_from_plug(LENGTH),
-        "seat": known.clip.world_from_seat,
+        "plugged": known.cable.socket(known.cable.plugged_into).world_from_plug(LENGTH),
+        "seat": known.cable.clip.world_from_seat,
         "high": tilted((0.36, 0.14, 0.25), 0),
         "low": tilted((0.35, 0.12, 0.10), 25),
     }[place]

@@ -6,7 +6,8 @@ import pytest
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import FloatArray
-from regrasp.interfaces.cell import Box, KnownCell, WristMount
+from regrasp.interfaces.cable.cell import CableKnown
+from regrasp.interfaces.cell import Box, WristMount
 from regrasp.motion.planning.viewpoints import SpiralParameters, Viewpoint, spiral
 from regrasp.motion.robots.kinematics import ArmKinematics
 from regrasp.motion.scene.collision import ArmBody, CollisionModel
@@ -15,7 +16,7 @@ DISTANCE = SpiralParameters().distance
 START = np.array([0.36, 0.14, 0.25])
 
 
-def stops(known: KnownCell, start: FloatArray) -> list[Viewpoint]:
+def stops(known: CableKnown, start: FloatArray) -> list[Viewpoint]:
     rear = known.camera("rear")
     assert not isinstance(rear.mount, WristMount)
     return list(spiral(start, rear.mount.world_from_camera, rear.intrinsics))
@@ -27,7 +28,7 @@ def right_and_up(pose: RigidTransform) -> list[float]:
     return [round(-float(offset[1]), 6), round(float(offset[2]), 6)]
 
 
-def test_main_point_is_flat_and_subpoints_go_round_from_the_right_downwards(known: KnownCell) -> None:
+def test_main_point_is_flat_and_subpoints_go_round_from_the_right_downwards(known: CableKnown) -> None:
     first = stops(known, START)[:9]
     a = 0.125
     ring = [[a, 0], [a, -a], [0, -a], [-a, -a], [-a, 0], [-a, a], [0, a], [a, a]]
@@ -39,7 +40,7 @@ def test_main_point_is_flat_and_subpoints_go_round_from_the_right_downwards(know
         assert stop.world_from_camera.rotation.apply([0, -1, 0])[2] > 0.8  # upright
 
 
-def test_subpoints_turn_by_30_degrees_towards_their_main_point(known: KnownCell) -> None:
+def test_subpoints_turn_by_30_degrees_towards_their_main_point(known: CableKnown) -> None:
     for stop in stops(known, START)[1:9]:
         view = stop.world_from_camera.rotation.apply([0, 0, 1])
         towards = START - stop.world_from_camera.translation
@@ -48,7 +49,7 @@ def test_subpoints_turn_by_30_degrees_towards_their_main_point(known: KnownCell)
         assert view[1:] == pytest.approx(np.sin(np.pi / 6) * across)
 
 
-def test_main_points_spiral_outwards_in_view(known: KnownCell) -> None:
+def test_main_points_spiral_outwards_in_view(known: CableKnown) -> None:
     mains = [right_and_up(s.world_from_camera) for s in stops(known, START) if s.sub == 0]
     b = 0.25
     assert mains[:6] == [[0, 0], [b, 0], [b, -b], [0, -b], [-b, -b], [-b, 0]]
@@ -62,7 +63,7 @@ def test_main_points_spiral_outwards_in_view(known: KnownCell) -> None:
     assert len({tuple(m) for m in mains}) == len(mains)
 
 
-def test_points_out_of_view_are_skipped_without_a_gap_in_the_count(known: KnownCell) -> None:
+def test_points_out_of_view_are_skipped_without_a_gap_in_the_count(known: CableKnown) -> None:
     edge = stops(known, np.array([0.36, -0.40, 0.25]))
     assert [s.index for s in edge] == list(range(len(edge)))
     first, second = islice((s.world_from_camera.translation for s in edge if s.sub == 0), 2)
@@ -71,7 +72,7 @@ def test_points_out_of_view_are_skipped_without_a_gap_in_the_count(known: KnownC
 
 
 def test_the_left_arm_reaches_most_of_the_first_nine(
-    known: KnownCell, boxes: Sequence[Box], left_arm: ArmKinematics, right_arm: ArmKinematics
+    known: CableKnown, boxes: Sequence[Box], left_arm: ArmKinematics, right_arm: ArmKinematics
 ) -> None:
     mount = known.camera("wrist").mount
     assert isinstance(mount, WristMount)

@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import FloatArray
-from regrasp.interfaces.cell import Box, KnownCell
+from regrasp.interfaces.cable.cell import CableKnown
+from regrasp.interfaces.cell import Box
 from regrasp.motion.robots.kinematics import LOWER, UPPER, ArmKinematics
 from regrasp.motion.robots.spheres import SPHERE_LINKS, SPHERES
 from regrasp.motion.scene.collision import ArmBody, CollisionModel
@@ -68,7 +69,7 @@ def test_free_agrees_with_clearance(q: FloatArray, margin: float) -> None:
         assert model.free(q, margin) == (distance >= margin)
 
 
-def test_the_sleeping_arms_of_the_thesis_cell_touch_nothing(known: KnownCell, boxes: Sequence[Box]) -> None:
+def test_the_sleeping_arms_of_the_thesis_cell_touch_nothing(known: CableKnown, boxes: Sequence[Box]) -> None:
     arms = {str(a.name): ArmKinematics(RigidTransform.from_translation(a.base)) for a in known.arms}
     sleep = {str(a.name): np.array(a.sleep) for a in known.arms}
     for name, other in (("left", "right"), ("right", "left")):

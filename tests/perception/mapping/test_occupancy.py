@@ -7,7 +7,8 @@ from raycast import BLACK, CONNECTOR, PURPLE, REAR_POSE, RED, WOOD, Block, Cylin
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import RigidTransform
 
-from regrasp.interfaces.cell import OPTICAL, Box, Connector, pose_along
+from regrasp.interfaces.cable.cell import Connector
+from regrasp.interfaces.cell import OPTICAL, Box, pose_along
 from regrasp.interfaces.frame import Intrinsics
 from regrasp.perception.mapping.occupancy import Occupancy, OccupancyParameters, near_boxes
 

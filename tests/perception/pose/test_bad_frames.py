@@ -16,8 +16,8 @@ from scene import LEFTWARDS, PLACE, REAR, blocks, plug, seen
 
 from regrasp.app.files.resources import shipped
 from regrasp.app.scenario.cell_file import load_cell
-from regrasp.app.studies.pose.trial import CELL_OF_TECHNIQUE
-from regrasp.interfaces.cell import KnownCell
+from regrasp.app.tasks.cable.studies.pose.trial import CELL_OF_TECHNIQUE
+from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.frame import RgbdFrame
 from regrasp.perception.pose.detector import Detector
 from regrasp.perception.pose.estimate import Estimate, NoEstimate
@@ -68,7 +68,7 @@ MISLEADING = ("noise", "mirrored")
 
 
 @pytest.fixture(scope="session")
-def whole(known: KnownCell) -> RgbdFrame:
+def whole(known: CableKnown) -> RgbdFrame:
     """A good frame."""
     return seen([*blocks(known.boxes), *plug()])
 

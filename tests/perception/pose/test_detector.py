@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from raycast import PURPLE, WOOD, Block, Cylinder, Sensor, render
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from regrasp.interfaces.cell import KnownCell
+from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.frame import Intrinsics, RgbdFrame
 from regrasp.perception.camera.model import project
 from regrasp.perception.pose.detector import (
@@ -36,7 +36,7 @@ boxes = st.tuples(coordinates, coordinates, st.floats(0.1, 40), st.floats(0.1, 4
 
 
 @pytest.fixture(scope="module")
-def detector(known: KnownCell) -> Detector:
+def detector(known: CableKnown) -> Detector:
     return Detector(known)
 
 
@@ -109,8 +109,8 @@ def test_where_few_readings_are_the_axis_is_the_networks_own(detector: Detector)
     assert np.trace(own.covariance[3:, 3:]) > np.trace(borrowed.covariance[3:, 3:])
 
 
-def test_what_has_another_colour_than_the_cells_connector_is_not_it(known: KnownCell) -> None:
-    blue = known.model_copy(update={"connector": known.connector.model_copy(update={"color": (0.1, 0.1, 0.9)})})
+def test_what_has_another_colour_than_the_cells_connector_is_not_it(known: CableKnown) -> None:
+    blue = known.model_copy(update={"connector": known.cable.connector.model_copy(update={"color": (0.1, 0.1, 0.9)})})
     frame = view(Cylinder(MIDDLE, axis_at(30.0)))
     assert Detector(blue).detect(frame) == []
     result = Detector(blue).estimate(frame, EYE)

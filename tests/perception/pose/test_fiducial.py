@@ -13,7 +13,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from scipy.stats import chi2
 from tag_scene import CONNECTOR, EYE, KNOWN, TAG, K, TagScene, facing, random_pose
 
-from regrasp.interfaces.cell import KnownCell
+from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.frame import RgbdFrame
 from regrasp.perception.camera.calibration import undistorted
 from regrasp.perception.camera.model import project
@@ -110,7 +110,7 @@ def test_a_frontal_tag_leaves_its_tilt_open(scene: TagScene) -> None:
     assert wide > 3 * narrow
 
 
-def test_the_estimate_is_of_the_whole_connector_in_the_world(scene: TagScene, known: KnownCell) -> None:
+def test_the_estimate_is_of_the_whole_connector_in_the_world(scene: TagScene, known: CableKnown) -> None:
     world_from_camera = KNOWN.camera("rear").mount.world_from_camera  # type: ignore[union-attr]
     true = facing(MIDDLE, 0.5, 1.0, 0.2)
     technique = make_technique("fiducial", KNOWN)
@@ -131,7 +131,7 @@ def test_the_estimate_is_of_the_whole_connector_in_the_world(scene: TagScene, kn
 
 
 def test_the_clips_tag_gives_its_seat() -> None:
-    clip = KNOWN.clip
+    clip = KNOWN.cable.clip
     assert clip.tag is not None
     scene = TagScene(tags=[clip.tag])
     true = facing(MIDDLE, 0.4, 0.5, 0.2, clip.tag)

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from raycast import CONNECTOR, MIDDLE_THIRD, PURPLE, REAR_POSE, WOOD, Block, Cylinder, Sensor, render
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from regrasp.interfaces.cell import KnownCell
+from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.frame import Intrinsics, RgbdFrame
 from regrasp.perception.pose.estimate import Estimate, NoEstimate
 from regrasp.perception.pose.rgbd import Rgbd, RgbdParameters, min_max_axis, n_mean
@@ -16,7 +16,7 @@ from regrasp.perception.pose.segmentation import NotSeen
 Vector = NDArray[np.float64]
 EYE = RigidTransform.identity()  # the camera's optical frame is the world
 known = SimpleNamespace(connector=CONNECTOR)
-estimate = Rgbd(cast(KnownCell, known)).estimate
+estimate = Rgbd(cast(CableKnown, known)).estimate
 MIDDLE = np.array([0.0, 0.0, 0.75])
 
 

@@ -9,8 +9,7 @@ from scipy.integrate import solve_bvp
 from scipy.spatial.transform import Rotation
 
 from regrasp.interfaces.arrays import FloatArray
-from regrasp.interfaces.cell import Cell
-from regrasp.interfaces.hidden_world import Cable
+from regrasp.interfaces.cable.cell import CableCell, HiddenCable
 from regrasp.interfaces.scene import EARTH_GRAVITY
 from regrasp.sim.cable.cable import CableBody, build_cable, first_frequency, spring_torques
 
@@ -73,13 +72,15 @@ def elastica(stiffness: float, weight: float, length: float) -> float:
 
 
 @pytest.fixture
-def step(cell: Cell) -> float:
+def step(cell: CableCell) -> float:
     return 1.0 / cell.hidden.step_rate
 
 
 @pytest.mark.parametrize("stiffness", [0.05, 0.16])
-def test_a_cantilever_droops_like_the_heavy_elastica(cell: Cell, client: int, step: float, stiffness: float) -> None:
-    spec, connector = cell.hidden.cable, cell.known.connector
+def test_a_cantilever_droops_like_the_heavy_elastica(
+    cell: CableCell, client: int, step: float, stiffness: float
+) -> None:
+    spec, connector = cell.hidden.cable, cell.known.cable.connector
     p.setGravity(0, 0, -EARTH_GRAVITY, physicsClientId=client)
     cable = build_cable(client, spec, connector, TINY, stiffness, step)
     for _ in run(cable, step, SETTLE):
@@ -90,13 +91,13 @@ def test_a_cantilever_droops_like_the_heavy_elastica(cell: Cell, client: int, st
     assert droop == pytest.approx(expected, rel=DROOP)
 
 
-def _released(cell: Cell, client: int, step: float) -> CableBody:
+def _released(cell: CableCell, client: int, step: float) -> CableBody:
     """The thesis's cable after half a second of a sideways pull on its end."""
     cable = build_cable(
         client,
         cell.hidden.cable,
-        cell.known.connector,
-        cell.hidden.connector_mass,
+        cell.known.cable.connector,
+        cell.hidden.cable.connector_mass,
         cell.hidden.cable.stiffness.zero,
         step,
     )
@@ -108,7 +109,7 @@ def _released(cell: Cell, client: int, step: float) -> CableBody:
     return cable
 
 
-def test_a_released_cable_never_gains_energy_and_comes_to_rest(cell: Cell, client: int, step: float) -> None:
+def test_a_released_cable_never_gains_energy_and_comes_to_rest(cell: CableCell, client: int, step: float) -> None:
     cable = _released(cell, client, step)
     energies, speeds = [energy(cable)], []
     for _ in run(cable, step, SETTLE):
@@ -120,10 +121,10 @@ def test_a_released_cable_never_gains_energy_and_comes_to_rest(cell: Cell, clien
     assert max(speeds[-round(0.5 / step) :]) < STILL
 
 
-def test_it_swings_at_the_beams_first_frequency(cell: Cell, client: int, step: float) -> None:
+def test_it_swings_at_the_beams_first_frequency(cell: CableCell, client: int, step: float) -> None:
     spec = cell.hidden.cable.model_copy(update={"damping_ratio": 0.0})
-    mass, stiffness = cell.hidden.connector_mass, cell.hidden.cable.stiffness.zero
-    cable = build_cable(client, spec, cell.known.connector, mass, stiffness, step)
+    mass, stiffness = cell.hidden.cable.connector_mass, cell.hidden.cable.stiffness.zero
+    cable = build_cable(client, spec, cell.known.cable.connector, mass, stiffness, step)
     x = []
     for i in run(cable, step, 6.0):
         at = cable.connector_state().pose.translation
@@ -133,7 +134,7 @@ def test_it_swings_at_the_beams_first_frequency(cell: Cell, client: int, step: f
     crossings = np.flatnonzero(np.diff(np.sign(x[200:])))
     half_period = float(np.mean(np.diff(crossings))) * step
     # The end's mass swings at its own centre, half a connector past the flexible part.
-    reach = spec.length + cell.known.connector.length / 2
+    reach = spec.length + cell.known.cable.connector.length / 2
     low = first_frequency(stiffness, reach, spec.mass_per_length, mass)
     high = first_frequency(stiffness, spec.length, spec.mass_per_length, mass)
     assert low * (1 - FREQUENCY) < np.pi / half_period < high * (1 + FREQUENCY)
@@ -154,10 +155,10 @@ def test_springs_turn_back_by_angle_and_rate() -> None:
     np.testing.assert_allclose(torques[1], torques[0])  # q and -q are the same turn
 
 
-def test_it_starts_straight_and_at_rest(cell: Cell, client: int, step: float) -> None:
-    spec: Cable = cell.hidden.cable
-    connector = cell.known.connector
-    cable = build_cable(client, spec, connector, cell.hidden.connector_mass, 0.05, step)
+def test_it_starts_straight_and_at_rest(cell: CableCell, client: int, step: float) -> None:
+    spec: HiddenCable = cell.hidden.cable
+    connector = cell.known.cable.connector
+    cable = build_cable(client, spec, connector, cell.hidden.cable.connector_mass, 0.05, step)
     start = cable.connector_state()
     reach = spec.length + connector.length / 2
     np.testing.assert_allclose(start.position, np.asarray(spec.anchor) + reach * np.asarray(spec.anchor_axis))

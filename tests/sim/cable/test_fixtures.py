@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from regrasp.interfaces.arrays import FloatArray
-from regrasp.interfaces.cell import Cell
+from regrasp.interfaces.cable.cell import CableCell
 from regrasp.sim.cable.cable import BodyState
 from regrasp.sim.cable.fixtures import BodyLink, ClipHold, ClipParameters, Hold, SocketHold
 from regrasp.sim.world import WorldParameters
@@ -55,8 +55,12 @@ class Plug:
 
 
 @pytest.fixture
-def plug(cell: Cell, client: int) -> Plug:
-    radius, length, mass = cell.known.connector.radius, cell.known.connector.length, cell.hidden.connector_mass
+def plug(cell: CableCell, client: int) -> Plug:
+    radius, length, mass = (
+        cell.known.cable.connector.radius,
+        cell.known.cable.connector.length,
+        cell.hidden.cable.connector_mass,
+    )
     body = p.createMultiBody(mass, -1, -1, physicsClientId=client)
     inertia = [mass * radius**2 / 2] + [mass * (3 * radius**2 + length**2) / 12] * 2
     p.changeDynamics(body, -1, localInertiaDiagonal=inertia, linearDamping=0, angularDamping=0, physicsClientId=client)
@@ -64,22 +68,26 @@ def plug(cell: Cell, client: int) -> Plug:
 
 
 @pytest.fixture
-def clip(cell: Cell, plug: Plug) -> ClipHold:
-    mass, length, radius = cell.hidden.connector_mass, cell.known.connector.length, cell.known.connector.radius
+def clip(cell: CableCell, plug: Plug) -> ClipHold:
+    mass, length, radius = (
+        cell.hidden.cable.connector_mass,
+        cell.known.cable.connector.length,
+        cell.known.cable.connector.radius,
+    )
     across = mass * (3 * radius**2 + length**2) / 12
-    return ClipHold(plug.link, cell.known.clip, mass, across, plug.step)
+    return ClipHold(plug.link, cell.known.cable.clip, mass, across, plug.step)
 
 
-def near_seat(cell: Cell, distance: float, angle_deg: float) -> RigidTransform:
+def near_seat(cell: CableCell, distance: float, angle_deg: float) -> RigidTransform:
     """A pose so far from the clip's seat, in a slanted direction."""
-    seat = cell.known.clip.world_from_seat
+    seat = cell.known.cable.clip.world_from_seat
     offset = distance * np.array([2.0, -1.0, 2.0]) / 3.0
     tilt = Rotation.from_euler("y", angle_deg, degrees=True)
     return RigidTransform.from_components(seat.translation + offset, seat.rotation * tilt)
 
 
-def seated(cell: Cell, plug: Plug, clip: ClipHold) -> None:
-    plug.put(cell.known.clip.world_from_seat)
+def seated(cell: CableCell, plug: Plug, clip: ClipHold) -> None:
+    plug.put(cell.known.cable.clip.world_from_seat)
     plug.advance(0.5, clip)
     assert clip.holds
 
@@ -97,30 +105,30 @@ def seated(cell: Cell, plug: Plug, clip: ClipHold) -> None:
     ],
 )
 def test_it_takes_an_end_that_rests_in_its_mouth(
-    cell: Cell, plug: Plug, clip: ClipHold, distance: float, angle_deg: float, caught: bool
+    cell: CableCell, plug: Plug, clip: ClipHold, distance: float, angle_deg: float, caught: bool
 ) -> None:
     plug.put(near_seat(cell, distance, angle_deg))
     plug.advance(1.5, clip)
     assert clip.holds == caught
     if caught:
-        off = cell.known.clip.world_from_seat.inv() * plug.state().pose
+        off = cell.known.cable.clip.world_from_seat.inv() * plug.state().pose
         assert float(np.linalg.norm(off.translation)) < SEATED
         assert float(off.rotation.apply([1, 0, 0])[0]) > np.cos(np.deg2rad(1.0))
 
 
 @pytest.mark.parametrize("speed", [0.03, 0.5])
-def test_it_does_not_take_a_passing_end(cell: Cell, plug: Plug, clip: ClipHold, speed: float) -> None:
+def test_it_does_not_take_a_passing_end(cell: CableCell, plug: Plug, clip: ClipHold, speed: float) -> None:
     plug.put(near_seat(cell, 0.04, 0.0), -speed * np.array([2.0, -1.0, 2.0]) / 3.0)
     closest = np.inf
     for _ in range(round(0.1 / speed / 0.01)):
         plug.advance(0.01, clip)
-        off = plug.state().pose.translation - cell.known.clip.world_from_seat.translation
+        off = plug.state().pose.translation - cell.known.cable.clip.world_from_seat.translation
         closest = min(closest, float(np.linalg.norm(off)))
         assert not clip.holds
     assert closest < 0.01  # m: it did pass through the mouth
 
 
-def test_it_does_not_take_an_end_that_rests_for_too_short_a_time(cell: Cell, plug: Plug, clip: ClipHold) -> None:
+def test_it_does_not_take_an_end_that_rests_for_too_short_a_time(cell: CableCell, plug: Plug, clip: ClipHold) -> None:
     plug.put(near_seat(cell, 0.005, 0.0))
     plug.advance(0.15, clip)
     assert not clip.holds
@@ -130,29 +138,31 @@ DIRECTIONS = [(1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.6, -0.8)]
 
 
 @pytest.mark.parametrize("direction", DIRECTIONS)
-def test_it_holds_ten_newtons(cell: Cell, plug: Plug, clip: ClipHold, direction: tuple[float, float, float]) -> None:
+def test_it_holds_ten_newtons(
+    cell: CableCell, plug: Plug, clip: ClipHold, direction: tuple[float, float, float]
+) -> None:
     seated(cell, plug, clip)
     plug.advance(3.0, clip, 10.0 * np.asarray(direction))
-    off = plug.state().pose.translation - cell.known.clip.world_from_seat.translation
+    off = plug.state().pose.translation - cell.known.cable.clip.world_from_seat.translation
     assert clip.holds
     np.testing.assert_allclose(
-        off, 10.0 / cell.known.clip.hold_force * ClipParameters().lip_travel * np.asarray(direction), atol=2e-4
+        off, 10.0 / cell.known.cable.clip.hold_force * ClipParameters().lip_travel * np.asarray(direction), atol=2e-4
     )
 
 
 @pytest.mark.parametrize("direction", DIRECTIONS)
 def test_it_lets_go_above_its_force(
-    cell: Cell, plug: Plug, clip: ClipHold, direction: tuple[float, float, float]
+    cell: CableCell, plug: Plug, clip: ClipHold, direction: tuple[float, float, float]
 ) -> None:
     seated(cell, plug, clip)
     force = 10.0
     while clip.holds and force < 30.0:
         force += RAMP * 0.01
         plug.advance(0.01, clip, force * np.asarray(direction))
-    assert force == pytest.approx(cell.known.clip.hold_force, abs=LET_GO)
+    assert force == pytest.approx(cell.known.cable.clip.hold_force, abs=LET_GO)
 
 
-def test_what_was_pulled_out_is_taken_again_only_after_it_left(cell: Cell, plug: Plug, clip: ClipHold) -> None:
+def test_what_was_pulled_out_is_taken_again_only_after_it_left(cell: CableCell, plug: Plug, clip: ClipHold) -> None:
     seated(cell, plug, clip)
     plug.put(near_seat(cell, 0.021, 0.0))
     plug.advance(0.01, clip)

@@ -10,7 +10,8 @@ from hand import draw, drive, take_hold
 from numpy.typing import NDArray
 
 from regrasp.app.scenario.schema import FAULT_TYPES
-from regrasp.interfaces.cell import Box, Cell
+from regrasp.interfaces.cable.cell import CableCell
+from regrasp.interfaces.cell import Box
 from regrasp.interfaces.frame import RgbdFrame
 from regrasp.interfaces.scene import Obstacle, SceneSetup
 from regrasp.interfaces.trajectory import Trajectory
@@ -22,7 +23,7 @@ Make = Callable[..., World]
 
 
 @pytest.fixture
-def make(cell: Cell) -> Iterator[Make]:
+def make(cell: CableCell) -> Iterator[Make]:
     """Makes worlds with one fault from `ON` to `OFF`, and closes them."""
     made: list[World] = []
 

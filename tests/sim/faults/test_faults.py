@@ -5,8 +5,9 @@ import pytest
 from hand import draw, start_to_draw, take_hold
 
 from regrasp.interfaces.arrays import FloatArray
-from regrasp.interfaces.cell import Cell
-from regrasp.interfaces.fault import AnyFault, JawOpens, PlanningFindsNothing, When
+from regrasp.interfaces.cable.cell import CableCell
+from regrasp.interfaces.cable.fault import CableWhen
+from regrasp.interfaces.fault import Fault, JawOpens, PlanningFindsNothing, When
 from regrasp.interfaces.scene import SceneSetup
 from regrasp.sim.faults.effects import Effect
 from regrasp.sim.faults.faults import ScheduledFault, TriggerState
@@ -17,7 +18,7 @@ OPEN_FOR = 1.0  # s
 
 
 def opens(seconds: float | None = OPEN_FOR, **when: object) -> JawOpens:
-    return JawOpens(type="jaw_opens", when=When.model_validate(when), seconds=seconds)
+    return JawOpens(type="jaw_opens", when=CableWhen.model_validate(when), seconds=seconds)
 
 
 @pytest.mark.parametrize(
@@ -25,9 +26,9 @@ def opens(seconds: float | None = OPEN_FOR, **when: object) -> JawOpens:
     [
         ({"at": (2.0, 2.0)}, TriggerState(1.99), False),
         ({"at": (2.0, 2.0)}, TriggerState(2.0), True),
-        ({"carried": (0.5, 0.5)}, TriggerState(carried=0.49), False),
-        ({"carried": (0.5, 0.5)}, TriggerState(carried=0.51), True),
-        ({"carried": (0.0, 0.0)}, TriggerState(carried=None), False),
+        ({"carried": (0.5, 0.5)}, TriggerState(shares={"carried": 0.49}), False),
+        ({"carried": (0.5, 0.5)}, TriggerState(shares={"carried": 0.51}), True),
+        ({"carried": (0.0, 0.0)}, TriggerState(shares={"carried": None}), False),
         ({"phase": "lost"}, TriggerState(phases={"carried": 1.0}), False),
         ({"phase": "lost"}, TriggerState(phases={"carried": 1.0, "lost": 3.0}), True),
         ({"node": "carry"}, TriggerState(nodes={"root/bring/carry": 0.0}), True),
@@ -39,7 +40,7 @@ def opens(seconds: float | None = OPEN_FOR, **when: object) -> JawOpens:
     ],
 )
 def test_a_moment_comes(when: dict[str, object], moments: TriggerState, come: bool) -> None:
-    assert moments.triggers(When.model_validate(when)) == come
+    assert moments.triggers(CableWhen.model_validate(when)) == come
 
 
 @pytest.mark.parametrize(("seconds", "ended"), [(1.0, 3.0), (None, None)])
@@ -62,15 +63,15 @@ def share_of_way(world: World, start: FloatArray, way: FloatArray) -> float:
     return float((world.connector_pose().translation - start) @ way) / float(way @ way)
 
 
-def test_phases_begin_faults_and_the_connector_is_really_lost(cell: Cell) -> None:
+def test_phases_begin_faults_and_the_connector_is_really_lost(cell: CableCell) -> None:
     noted = [
         PlanningFindsNothing(type="planning_finds_nothing", when=When(phase=phase))
         for phase in ("unplugged", "carried", "lost", "settled")
     ]
-    faults: tuple[AnyFault, ...] = (opens(carried=(0.5, 0.5)), *noted)
+    faults: tuple[Fault, ...] = (opens(carried=(0.5, 0.5)), *noted)
     world = World(cell, "zero", seed=3, setup=SceneSetup(faults=faults), renderer="software")
     hand, start = world.arms["right"], world.connector_pose().translation
-    way = cell.known.clip.world_from_seat.translation - start
+    way = cell.known.cable.clip.world_from_seat.translation - start
     take_hold(world)
     draw(world, -0.06 * world.connector_pose().rotation.apply([1.0, 0.0, 0.0]), 1.5)
     draw(world, 0.25 * way, 1.5)
@@ -98,7 +99,7 @@ def test_phases_begin_faults_and_the_connector_is_really_lost(cell: Cell) -> Non
     world.close()
 
 
-def test_a_node_begins_a_fault_when_the_world_is_told_of_it(cell: Cell) -> None:
+def test_a_node_begins_a_fault_when_the_world_is_told_of_it(cell: CableCell) -> None:
     world = World(
         cell, "zero", seed=3, setup=SceneSetup(faults=(opens(node="grip", after=(0.1, 0.1)),)), renderer="software"
     )

@@ -6,7 +6,7 @@ import pytest
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import FloatArray
-from regrasp.interfaces.cell import Cell
+from regrasp.interfaces.cable.cell import CableCell
 from regrasp.interfaces.devices import Arm
 from regrasp.interfaces.hidden_world import Errors
 from regrasp.interfaces.scene import EARTH_GRAVITY
@@ -23,7 +23,7 @@ STOP_PLAY = 0.02  # rad past a joint's stop
 HOME = np.zeros(6)
 
 
-def make(cell: Cell, client: int, tool_error: float = 0.0, seed: int = 0) -> SimArm:
+def make(cell: CableCell, client: int, tool_error: float = 0.0, seed: int = 0) -> SimArm:
     errors: Errors = cell.hidden.errors.model_copy(update={"arm_tool": tool_error})
     without_camera = cell.known.model_copy(update={"cameras": ()})
     hidden = cell.hidden.model_copy(update={"errors": errors})
@@ -54,7 +54,7 @@ def run(arm: SimArm, seconds: float) -> list[FloatArray]:
 
 
 @pytest.fixture
-def arm(cell: Cell, client: int) -> SimArm:
+def arm(cell: CableCell, client: int) -> SimArm:
     return make(cell, client)
 
 
@@ -64,7 +64,7 @@ def test_it_is_an_arm(arm: SimArm) -> None:
     assert not device.is_moving()
 
 
-def test_it_sleeps_at_the_start_and_stays(cell: Cell, arm: SimArm) -> None:
+def test_it_sleeps_at_the_start_and_stays(cell: CableCell, arm: SimArm) -> None:
     sleep = np.array(cell.known.arm("right").sleep)
     np.testing.assert_allclose(arm.reading().positions, sleep, atol=ENCODER_STEP)
     run(arm, 0.5)
@@ -146,7 +146,7 @@ def test_encoders_have_4096_steps(arm: SimArm) -> None:
     np.testing.assert_allclose(arm.reading().positions, true_joints(arm), atol=ENCODER_STEP / 2 + 1e-9)
 
 
-def test_tool_and_wrist_are_where_the_kinematics_says(cell: Cell, arm: SimArm) -> None:
+def test_tool_and_wrist_are_where_the_kinematics_says(cell: CableCell, arm: SimArm) -> None:
     kinematics = ArmKinematics(RigidTransform.from_translation(cell.known.arm("right").base))
     arm.follow(ease(true_joints(arm), np.array([0.5, -0.2, 0.4, 0.3, -0.5, 0.8]), 1.0))
     run(arm, 1.2)
@@ -165,7 +165,7 @@ def _tool_error(arm: SimArm, kinematics: ArmKinematics, q: FloatArray) -> float:
     return float(np.linalg.norm(moved))
 
 
-def test_joint_offsets_move_the_tool_by_the_stated_error(cell: Cell, client: int) -> None:
+def test_joint_offsets_move_the_tool_by_the_stated_error(cell: CableCell, client: int) -> None:
     kinematics = ArmKinematics(RigidTransform.identity())
     poses = np.array(
         [[0.3, -0.6, 0.6, 0.0, 0.4, 0.0], [-0.3, 0.0, 0.2, 0.7, -0.4, 0.3], [0.9, -0.3, 0.0, 1.0, 0.9, 0.0]]
@@ -179,7 +179,7 @@ def test_joint_offsets_move_the_tool_by_the_stated_error(cell: Cell, client: int
     assert len({round(float(e), 7) for e in errors}) == 20
 
 
-def test_offsets_hide_from_the_encoders(cell: Cell, client: int) -> None:
+def test_offsets_hide_from_the_encoders(cell: CableCell, client: int) -> None:
     arm = make(cell, client, TOOL_ERROR, seed=4)
     goal = np.array([0.2, -0.4, 0.4, 0.0, 0.3, 0.0])
     arm.follow(ease(arm.reading().positions, goal, 1.0))

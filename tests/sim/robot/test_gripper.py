@@ -4,7 +4,7 @@ import numpy as np
 import pybullet as p
 import pytest
 
-from regrasp.interfaces.cell import Cell
+from regrasp.interfaces.cable.cell import CableCell
 from regrasp.interfaces.devices import Gripper
 from regrasp.sim.robot.arm import SimArm
 from regrasp.sim.robot.gripper import GripperParameters, SimGripper
@@ -13,13 +13,13 @@ GAP = 0.0005  # m
 COUPLING = 0.0005  # m between the fingers' ways
 
 
-def make(cell: Cell, client: int) -> SimArm:
+def make(cell: CableCell, client: int) -> SimArm:
     without_camera = cell.known.model_copy(update={"cameras": ()})
     return SimArm(client, cell.model_copy(update={"known": without_camera}), "right", np.random.default_rng(5))
 
 
 @pytest.fixture
-def arm(cell: Cell, client: int) -> SimArm:
+def arm(cell: CableCell, client: int) -> SimArm:
     return make(cell, client)
 
 
@@ -62,7 +62,7 @@ def test_an_empty_jaw_closes_to_its_stop(arm: SimArm) -> None:
     assert arm.gripper.true_gap() == pytest.approx(GripperParameters().closed_gap, abs=GAP)
 
 
-def test_it_moves_at_its_stated_speed(cell: Cell, arm: SimArm) -> None:
+def test_it_moves_at_its_stated_speed(cell: CableCell, arm: SimArm) -> None:
     arm.gripper.open(0.06)
     run(arm, 1.5)
     before = arm.gripper.true_gap()
@@ -106,7 +106,7 @@ def test_samples_fall_at_the_stated_rate_and_stay_between(arm: SimArm) -> None:
 
 
 @pytest.mark.parametrize("asked_at_every_step", [False, True])
-def test_who_asks_changes_nothing(cell: Cell, client: int, arm: SimArm, asked_at_every_step: bool) -> None:
+def test_who_asks_changes_nothing(cell: CableCell, client: int, arm: SimArm, asked_at_every_step: bool) -> None:
     twin_client = p.connect(p.DIRECT)
     p.setTimeStep(1 / cell.hidden.step_rate, physicsClientId=twin_client)
     p.setPhysicsEngineParameter(numSolverIterations=cell.hidden.solver_iterations, physicsClientId=twin_client)
@@ -123,7 +123,7 @@ def test_who_asks_changes_nothing(cell: Cell, client: int, arm: SimArm, asked_at
     p.disconnect(twin_client)
 
 
-def test_readings_are_noisy_and_quantised(cell: Cell, arm: SimArm) -> None:
+def test_readings_are_noisy_and_quantised(cell: CableCell, arm: SimArm) -> None:
     arm.gripper.open(0.03)
     run(arm, 1.0)
     gaps = np.array(sorted(dict(run(arm, 4.0)).items()))[:, 1]
@@ -134,7 +134,7 @@ def test_readings_are_noisy_and_quantised(cell: Cell, arm: SimArm) -> None:
     np.testing.assert_allclose(counts, np.round(counts), atol=1e-6)
 
 
-def test_backlash_lags_behind_the_direction(cell: Cell, arm: SimArm) -> None:
+def test_backlash_lags_behind_the_direction(cell: CableCell, arm: SimArm) -> None:
     means = []
     for start in (0.01, 0.05):
         arm.gripper.open(start)

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from raycast import BLACK, PURPLE, REAR_POSE, RED, Ball, Block, Cylinder, Sensor
 from scene import LEFTWARDS, PLACE, Thing, blocks, plug, really, seen
 
-from regrasp.interfaces.cell import KnownCell
+from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.frame import RgbdFrame
 from regrasp.perception.camera.registration import FIXED_CAMERA_ERRORS
 from regrasp.perception.pose.estimate import Estimate, NoEstimate
@@ -20,12 +20,12 @@ CHI2_95_OF_3 = 7.81
 
 
 @pytest.fixture(scope="session")
-def fused(known: KnownCell) -> Fused:
+def fused(known: CableKnown) -> Fused:
     return Fused(known)
 
 
 @pytest.fixture(scope="session")
-def panels(known: KnownCell) -> list[Thing]:
+def panels(known: CableKnown) -> list[Thing]:
     return blocks(known.boxes)
 
 
@@ -135,7 +135,7 @@ def test_a_bit_of_something_without_a_cable_is_refused(fused: Fused, panels: lis
         assert isinstance(result, NoEstimate)
 
 
-def test_a_flat_piece_on_a_panel_is_refused(fused: Fused, panels: list[Thing], known: KnownCell) -> None:
+def test_a_flat_piece_on_a_panel_is_refused(fused: Fused, panels: list[Thing], known: CableKnown) -> None:
     back = next(box for box in known.boxes if box.name == "back_panel")
     face = back.center[0] - back.size[0] / 2
     sticker = Block(np.array([face - 0.0005, 0.0, 0.3]), np.array([face, 0.08, 0.33]), RED)
@@ -146,7 +146,7 @@ def test_a_flat_piece_on_a_panel_is_refused(fused: Fused, panels: list[Thing], k
         assert isinstance(result, NoEstimate)
 
 
-def test_a_technique_takes_its_parameters(known: KnownCell, panels: list[Thing]) -> None:
+def test_a_technique_takes_its_parameters(known: CableKnown, panels: list[Thing]) -> None:
     strict = Fused(known, FusedParameters(min_readings=10_000))
     result = strict.estimate(seen([*panels, *plug()]), REAR_POSE)
     assert isinstance(result, NoEstimate)
@@ -171,10 +171,10 @@ def test_of_two_alike_the_one_near_to_the_last_place_is_taken(fused: Fused, pane
 @pytest.mark.parametrize("hue", [0.0, 0.11, 0.33, 0.7, 0.85])
 @pytest.mark.parametrize("cable", [BLACK, (0.9, 0.9, 0.9), (0.2, 0.5, 0.9)])
 def test_connectors_and_cables_of_other_colours(
-    known: KnownCell, panels: list[Thing], hue: float, cable: tuple[float, float, float]
+    known: CableKnown, panels: list[Thing], hue: float, cable: tuple[float, float, float]
 ) -> None:
     color = colorsys.hsv_to_rgb(hue, 0.9, 0.75)
-    dyed = Fused(known.model_copy(update={"connector": known.connector.model_copy(update={"color": color})}))
+    dyed = Fused(known.model_copy(update={"connector": known.cable.connector.model_copy(update={"color": color})}))
     result = dyed.estimate(seen([*panels, *plug(color=color, cable=cable)]), REAR_POSE, axis=-LEFTWARDS)
     position, angle = off(result)
     assert (position < 0.003, angle < 4.0) == (True, True), (position, angle)

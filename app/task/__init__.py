@@ -1,0 +1,1 @@
+"""A task: what is put in, and how it is found."""

@@ -1,0 +1,68 @@
+"""What a task bundles, and where its parts are.
+
+A task is a job that the engine does not know: unplugging a cable, pressing a button. It names its parts as
+"module:attribute", and each is imported when it is asked for: checking a scenario brings the models, and a run the
+simulation. Its leaves are a set of the group `regrasp.leaves` with the task's name (`regrasp.behaviors.registry`).
+"""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
+
+if TYPE_CHECKING:
+    from enum import StrEnum
+
+    from regrasp.app.files.findings import Finding
+    from regrasp.app.files.yaml_lines import Document
+    from regrasp.app.task.expect import Expect
+    from regrasp.app.task.judge import Judge
+    from regrasp.app.task.words import Words
+    from regrasp.behaviors.services import Services
+    from regrasp.interfaces.cell import Cell
+    from regrasp.interfaces.fault import Fault, When
+    from regrasp.sim.world import World
+
+T = TypeVar("T")
+NOTHING: tuple[Any, ...] = ()
+
+
+class Part(Generic[T]):
+    """A part of a task that is imported when it is asked for. `at` is "module:attribute"."""
+
+    def __init__(self, at: str) -> None:
+        self._module, _, self._attribute = at.partition(":")
+
+    def __call__(self) -> T:
+        """The part itself."""
+        part: T = getattr(import_module(self._module), self._attribute)
+        return part
+
+
+@dataclass(frozen=True)
+class Task:
+    """A task. What is left out is what every task has."""
+
+    name: str  # also that of its sections in a cell file, known.NAME and hidden.NAME
+    about: str  # a sentence for lists
+    # What it builds in the world of a cell.
+    objects: Part["Callable[[Any], Any]"]
+    # The model of a cell file with the task's sections.
+    cell: Part["type[Cell]"] = Part("regrasp.interfaces.cell:Cell")
+    # Findings in a cell each of whose values is right; only if the flag is set, how its parts lie to one another.
+    cell_findings: Part["Callable[[Document, Any, bool], Iterable[Finding]]"] | None = None
+    # Names in a cell (None: any) that a tree's ports may hold, by kind, each with why it cannot be used there, or "".
+    cell_names: Part["Callable[[Any | None], dict[str, dict[str, str]]]"] | None = None
+    # What an obstacle, a `JitteredBox` in a cell and a gravity (None: unknown), overlaps: a name and a depth in m.
+    obstacle_overlaps: Part["Callable[..., Iterable[tuple[str, float]]]"] | None = None
+    expect: Part["type[Expect]"] = Part("regrasp.app.task.expect:Expect")
+    causes: Part["Iterable[StrEnum]"] = Part("regrasp.app.task.task:NOTHING")  # of its leaves' failures
+    when: Part["type[When]"] = Part("regrasp.interfaces.fault:When")
+    faults: Part["tuple[type[Fault], ...]"] = Part("regrasp.app.task.task:NOTHING")
+    service_calls: tuple[str, ...] = ()  # that the fault service_raises may break, besides those of every task
+    services: Part["Callable[[World, int, Any], Services]"] = Part("regrasp.app.run.compose:build_services")
+    judge: Part["type[Judge[Any]]"] = Part("regrasp.app.task.judge:Judge")
+    belief: Part["Callable[[Any], dict[str, Any]]"] = Part("regrasp.app.task.belief:belief")  # for the record
+    words: Part["Words"] = Part("regrasp.app.task.words:PLAIN")
+    old_outcomes: Mapping[str, str] = field(default_factory=dict)  # of schema 1, and what is written today
+    commands: Part["Callable[[Any], None]"] | None = None  # adds the task's commands to the command line's Typer

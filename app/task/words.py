@@ -1,0 +1,53 @@
+"""The words that a task uses in summaries and explanations, and those of every task."""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+Lines = Callable[[Mapping[str, Any]], Iterator[str]]
+
+
+def name_and_value(values: Mapping[str, Any]) -> Iterator[str]:
+    """A line for each value."""
+    yield from (f"{name}: {value}" for name, value in values.items())
+
+
+def robot_lines(belief: Mapping[str, Any]) -> Iterator[str]:
+    """The obstacles that the robot has mapped, and where it reads its arms."""
+    yield f"obstacles mapped: {belief.get('occupied_voxels', 0)} voxels"
+    for name, arm in belief.get("arms", {}).items():
+        yield f"{name} arm: tool at {place(arm['tool'])}"
+        yield f"  joints {numbers(arm['joints'])} rad"
+
+
+def belief_lines(belief: Mapping[str, Any]) -> Iterator[str]:
+    """What the tree's keys held, then the robot."""
+    yield from name_and_value(
+        {name: value for name, value in belief.items() if name not in ("arms", "occupied_voxels")}
+    )
+    yield from robot_lines(belief)
+
+
+def place(pose: Mapping[str, Any]) -> str:
+    """The position of a pose."""
+    return f"{numbers(pose['position'])} m"
+
+
+def numbers(values: Any) -> str:
+    """Numbers to three decimals, in parentheses."""
+    return "(" + ", ".join(f"{round(value, 3) + 0.0:.3f}" for value in values) + ")"
+
+
+@dataclass(frozen=True)
+class Words:
+    """How a task tells of what it measured, and of what its robot knew. The defaults tell names and values."""
+
+    measured: str = "measured"  # stands before each line of `measured_lines` in a summary
+    measured_title: str = "What was measured, by ground truth"
+    measured_lines: Lines = name_and_value
+    belief_lines: Lines = belief_lines
+    # The words for what an expectation of this name wants; by default "at most" a number, and any other value itself.
+    limits: Mapping[str, str] = field(default_factory=dict)  # such as {"slips": "at least {}, all noticed"}
+
+
+PLAIN = Words()

@@ -1,0 +1,186 @@
+"""`regrasp train-detector` and `evaluate-detector`, for the network of the technique `detector`."""
+
+import json
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from regrasp.app.files.findings import Finding, Findings, shown
+from regrasp.app.files.resources import resolve
+from regrasp.app.files.whole_file import write_whole
+from regrasp.app.records import folders
+from regrasp.interfaces.seed import MAX_SEED
+
+if TYPE_CHECKING:
+    from regrasp.interfaces.cable.cell import CableCell
+
+TRAINING_SEED, HELD_OUT_SEED = 0, 1_000_000  # choice: far apart, so that nobody trains on held-out pictures
+_Cell = Annotated[str, typer.Option("--cell", help="A shipped cell's name, or a path to a .yaml file.")]
+_Seed = Annotated[int, typer.Option(min=0, max=MAX_SEED, help="Draws the pictures and all else.")]
+
+
+def add_to(app: typer.Typer) -> None:
+    """Add the commands to `app`."""
+    app.command()(train_detector)
+    app.command()(evaluate_detector)
+
+
+def train_detector(
+    out: Annotated[Path, typer.Option(help="The folder for detector.onnx and evaluation.json.")],
+    cell: _Cell = "thesis",
+    pictures: Annotated[int, typer.Option(min=24, help="Random pictures to train on.")] = 32000,
+    steps: Annotated[int, typer.Option(min=1, help="Training steps of 32 parts of pictures each.")] = 100000,
+    start: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="An ONNX file of ours to go on from, at a slower rate.")
+    ] = None,
+    held_out: Annotated[int, typer.Option(min=1, help="Pictures of each class to evaluate on at the end.")] = 60,
+    seed: _Seed = TRAINING_SEED,
+) -> None:
+    """Train the network of the technique `detector`.
+
+    On random pictures of a cell; then it is evaluated. Needs the extra `train` (torch, onnx), some 20 minutes to draw
+    the pictures and 80 to learn, and 15 GB of free memory (half with --pictures 16000). Ctrl-C keeps the best network
+    so far. To use it, put its detector.onnx in the place of perception/pose/detector.onnx.
+
+    \b
+    Examples:
+      regrasp train-detector --out results/detector
+      regrasp train-detector --out results/more \\
+        --start perception/pose/detector.onnx
+    """
+    wrong = folders.folder_findings(out)
+    if (out / "detector.onnx").exists():
+        wrong.append(Finding(shown(out), 0, "already holds detector.onnx; name another folder"))
+    try:
+        import onnx  # noqa: F401 - torch exports through it
+        import torch  # noqa: F401
+    except ImportError as error:
+        wrong.append(
+            Finding(
+                "train-detector", 0, f"{error.name} is not installed; pip install -e '.[train]' in the project's folder"
+            )
+        )
+    if start is not None and not start.is_file():
+        wrong.append(Finding(shown(start), 0, "is no file; name an ONNX file that `regrasp train-detector` made"))
+    if wrong:
+        raise Findings(wrong)
+    loaded = _load(cell)
+    from regrasp.app.tasks.cable.studies.detector.data import make_pictures
+    from regrasp.app.tasks.cable.studies.detector.train import read_weights, train
+
+    weights = None
+    if start is not None:
+        try:
+            weights = read_weights(start.read_bytes())
+        except ValueError as error:
+            raise Findings([Finding(shown(start), 0, f"{error}; name one that `train-detector` made")]) from None
+    out.mkdir(parents=True, exist_ok=True)
+    with _progress("drawing pictures", pictures) as tell:
+        drawn = make_pictures(loaded, seed, pictures, tell)
+    with _progress("training", steps) as tell:
+        train(drawn, seed, steps, lambda model, _score: write_whole(out / "detector.onnx", model), tell, weights)
+    evaluate_detector(out / "detector.onnx", cell, held_out, out=out / "evaluation.json")
+
+
+def evaluate_detector(
+    model: Annotated[Path | None, typer.Argument(help="An ONNX file; default the shipped network.")] = None,
+    cell: _Cell = "thesis",
+    held_out: Annotated[int, typer.Option(min=1, help="Pictures of each class of occlusion, and without any.")] = 60,
+    seed: _Seed = HELD_OUT_SEED,
+    out: Annotated[Path | None, typer.Option(metavar="FILE", help="Write the figures as JSON, too.")] = None,
+) -> None:
+    """Measure how well the network finds the connector.
+
+    In pictures unlike those of its training, a minute or two by default. They show another layout of the cell, other
+    light, things and look-alikes; the connector is hidden by up to 70 %, and absent in as many pictures as each
+    class of occlusion has.
+
+    \b
+    Example:
+      regrasp evaluate-detector my/detector.onnx --out evaluation.json
+    """
+    wrong = folders.file_findings(out, new=True) if out else []
+    if out is not None and out.suffix.lower() == ".onnx":
+        wrong.append(Finding(shown(out), 0, "is a network's name, and the figures are JSON; end it in .json"))
+    if model is not None and not model.is_file():
+        wrong.append(Finding(shown(model), 0, "is no file; name an ONNX file that `regrasp train-detector` made"))
+    if wrong:
+        raise Findings(wrong)
+    loaded = _load(cell)
+    from regrasp.app.tasks.cable.studies.detector.score import detector_figures, held_out_shots, score_picture
+
+    detector = _detector(loaded, model)
+    with _progress("drawing held-out pictures", 5 * held_out) as tell:
+        shots = held_out_shots(loaded, seed, held_out, report_progress=tell)
+    figures = detector_figures([score_picture(detector, shot, loaded, number) for number, shot in enumerate(shots)])
+    if out is not None:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        write_whole(out, json.dumps(figures, indent=2) + "\n")
+    _print(figures)
+
+
+def _load(cell: str) -> "CableCell":
+    from regrasp.app.scenario.cell_file import load_cell
+
+    return load_cell(resolve("cell", cell, Path()))
+
+
+def _detector(cell: "CableCell", model: Path | None) -> Any:
+    """The detector with this network, by default the shipped one. Raises `Findings` if the file holds none."""
+    import cv2
+    import numpy as np
+
+    from regrasp.interfaces.frame import Intrinsics, RgbdFrame
+    from regrasp.perception.pose.detector import NETWORK_HEIGHT, NETWORK_WIDTH, Detector
+
+    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)  # the finding below says what is wrong
+    try:
+        detector = Detector(cell.known, model.read_bytes() if model else None)
+        blank = np.zeros((NETWORK_HEIGHT, NETWORK_WIDTH), np.float32)
+        k = Intrinsics.from_fov(NETWORK_WIDTH, NETWORK_HEIGHT, 1.0)
+        detector.detect(RgbdFrame("blank", 0, 0.0, np.zeros((*blank.shape, 3), np.uint8), blank, k))
+        return detector
+    except (cv2.error, ValueError):
+        message = "holds no such network; name an ONNX file that `regrasp train-detector` made"
+        raise Findings([Finding(shown(model) if model else "detector.onnx", 0, message)]) from None
+
+
+def _print(figures: dict[str, Any]) -> None:
+    from regrasp.app.studies.statistics import wilson_interval
+    from regrasp.app.studies.table import print_table
+
+    lines = [
+        (name, f"{right}/{all_}", "{:.1f} to {:.1f} %".format(*(100 * x for x in wilson_interval(right, all_))))
+        for name, (right, all_) in (*figures["recall_by_occlusion"].items(), ("all", figures["recall"]))
+    ]
+    print_table(("hidden", f"found at {figures['min_score']}", "95 % interval"), lines)
+    false, empty = figures["empty_pictures_with_a_box"]
+    angle, place = figures["angle_error_deg"]["50%"], figures["position_error_m"]["50%"]
+    low, high = figures["ap50_interval"]
+    typer.echo(f"AP50 {figures['ap50']:.3f}, 95 % interval {low:.3f} to {high:.3f}")
+    typer.echo(f"a false box in {false} of {empty} pictures without the connector")
+    if angle is not None and place is not None:
+        typer.echo(f"median error: axis in the image {angle:.1f} degrees, position {1000 * place:.1f} mm")
+
+
+@contextmanager
+def _progress(what: str, total: int) -> Iterator[Callable[..., None]]:
+    """A callback (done, words) that shows progress on stderr: a bar on a terminal, else a line for every tenth."""
+    from rich.console import Console
+    from rich.progress import Progress
+
+    console = Console(stderr=True, highlight=False, markup=False, soft_wrap=True)
+    if console.is_terminal:
+        with Progress(console=console, transient=True) as progress:
+            task = progress.add_task(what, total=total)
+            yield lambda done, words="": progress.update(task, completed=done, description=f"{what} {words}")
+        return
+
+    def line(done: int, words: str = "") -> None:
+        if done * 10 // total > (done - 1) * 10 // total:
+            console.print(f"{what}: {done} of {total} {words}".rstrip())
+
+    yield line

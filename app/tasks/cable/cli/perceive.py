@@ -1,0 +1,215 @@
+"""`regrasp perceive` and `regrasp snapshot`."""
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, TypeVar
+
+import typer
+
+from regrasp.app.cli.options import Sets
+from regrasp.app.files.findings import Finding, Findings, real_path, shown
+from regrasp.app.files.resources import resolve
+from regrasp.app.interrupts import late_imports
+from regrasp.app.records import folders
+from regrasp.interfaces.quote import nearest, quoted
+from regrasp.interfaces.seed import MAX_SEED
+
+if TYPE_CHECKING:
+    from regrasp.interfaces.fields import Color
+
+T = TypeVar("T")
+
+DRAWING_SUFFIXES = (".png", ".jpg", ".jpeg")  # of a drawing
+# A snapshot writes some of these. A camera pose that an earlier one left would not belong to the new pictures.
+SNAPSHOT_FILES = ("rgb.png", "rgb_001.png", "depth.png", "depth_001.png", "intrinsics.yaml", "camera_pose.yaml")
+
+
+def add_to(app: typer.Typer) -> None:
+    """Add the commands to `app`."""
+    app.command("perceive")(perceive)
+    app.command("snapshot")(snapshot)
+
+
+def perceive(
+    rgb: Annotated[list[Path], typer.Option(metavar="FILE", help="A colour picture, PNG or JPEG; repeat.")],
+    intrinsics: Annotated[
+        list[Path], typer.Option(metavar="FILE", help="The camera's intrinsics, YAML or JSON; once, or one a picture.")
+    ],
+    depth: Annotated[
+        list[Path] | None,
+        typer.Option(metavar="FILE", help="Depth aligned to colour, 16-bit PNG or .npy; one a picture."),
+    ] = None,
+    technique: Annotated[str, typer.Option(help="One of rgbd, fiducial, detector, fused.")] = "fused",
+    draw: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the result on the first picture.")] = None,
+    depth_unit: Annotated[
+        float, typer.Option(min=1e-6, max=1.0, help="Metres that a whole number of depth counts.")
+    ] = 0.001,
+    cell: Annotated[str, typer.Option(help="Says what the connector is like: size, colour, tag.")] = "thesis",
+    color: Annotated[
+        str | None, typer.Option(metavar="R,G,B", help="Its colour, each 0 to 255; default the cell's.")
+    ] = None,
+    length: Annotated[
+        float | None, typer.Option(min=0.001, max=1.0, help="Its length in metres; default the cell's.")
+    ] = None,
+    radius: Annotated[
+        float | None, typer.Option(min=0.0005, max=0.5, help="Its radius in metres; default the cell's.")
+    ] = None,
+    camera: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME", help="The cell's camera that took the pictures; once, or one a picture."),
+    ] = None,
+    camera_pose: Annotated[
+        list[Path] | None,
+        typer.Option(metavar="FILE", help="Where the camera stood in the cell's world; once, or one a picture."),
+    ] = None,
+) -> None:
+    """Find the connector in your own pictures.
+
+    Prints its pose, or the reason why there is none, as JSON.
+
+    \b
+    Examples:
+      regrasp snapshot no_obstacle --out frames    # pictures to try it on
+      cd frames
+      regrasp perceive --rgb rgb.png --depth depth.png \\
+        --intrinsics intrinsics.yaml
+      regrasp perceive --technique fiducial --cell thesis_tags --rgb photo.jpg \\
+        --intrinsics my_camera.yaml --draw seen.png
+
+    Metres, radians; quaternions x, y, z, w. The connector's x axis leads from the cable to the tip; sign_seen says
+    that the picture tells which end is which; without it the axis may as well lead the other way. covariance is that
+    of position, then of a small turn; extent the length in sight; whole says that position is the whole connector's
+    middle, and not that of the part in sight. Several pictures of a connector that lies still give one pose together,
+    and each its own. Poses are in the camera's frame (x right, y down, z forward), unless --camera or --camera-pose
+    say where it stands in the cell's world: then `fused` also sets the camera right by the floor and panels that it
+    sees, which makes the distance ten times as sure; where it sees none, it believes the place. `rgbd` and `detector`
+    believe any depth.
+
+    An intrinsics file is what `regrasp calibrate` writes: width, height, fx, fy, cx, cy (pixels) and, if you like,
+    distortion: [k1, k2, p1, p2, k3]. A camera pose file holds position: [x, y, z] and quaternion: [x, y, z, w] of the
+    optical frame. Depth as whole numbers counts --depth-unit, as floats metres; 0 and NaN are no reading. A note in a
+    picture on how to turn it (EXIF) is not obeyed: the camera's axes are those of its imager.
+
+    \b
+    Exit code: 0 found, 1 not found, 2 bad input.
+    """
+    from regrasp.app.scenario.cell_file import load_cell
+
+    count, wrong = len(rgb), list[Finding]()
+    none = [None] * count
+    depths = _each("--depth", depth or none, count, wrong, once=False)
+    models = _each("--intrinsics", intrinsics, count, wrong)
+    cameras = _each("--camera", camera or none, count, wrong)
+    poses = _each("--camera-pose", camera_pose or none, count, wrong)
+    if draw is not None:
+        wrong += _bad_drawing(draw, [*rgb, *(depth or []), *intrinsics, *(camera_pose or [])])
+    tint = None if color is None else _color(color, wrong)
+    if wrong:
+        raise Findings(wrong)
+    known = load_cell(resolve("cell", cell, Path()), laid_out=False).known
+    given = {"color": tint, "length": length, "radius": radius}
+    told = {key: value for key, value in given.items() if value is not None}
+    connector = known.cable.connector.model_copy(update=told)
+    if 2 * connector.radius >= connector.length:
+        message = (
+            f"a connector {connector.length:g} m long and {2 * connector.radius:g} thick; one is longer than thick"
+        )
+        raise Findings([Finding("--radius", 0, message)])
+    known = known.model_copy(update={"connector": connector})
+    with late_imports():
+        from regrasp.app.tasks.cable import perceive as steps  # brings OpenCV and the compiler
+
+    files = [steps.FrameFiles(*each) for each in zip(rgb, depths, models, cameras, poses, strict=True)]
+    raise typer.Exit(0 if steps.run_perceive(technique, files, known, depth_unit, draw) else 1)
+
+
+def _each(option: str, given: Sequence[T], count: int, wrong: list[Finding], once: bool = True) -> list[T]:
+    """A value for each of `count` pictures; with `once` a single one may stand for all. Errors are added to `wrong`."""
+    if once and len(given) == 1:
+        return [given[0]] * count
+    if len(given) != count:
+        right = f"give {'one for all, or ' if once else ''}one for each"
+        wrong.append(Finding(option, 0, f"given {len(given)} times for {count} pictures; {right}"))
+    return list(given)
+
+
+def _bad_drawing(draw: Path, inputs: Sequence[Path]) -> list[Finding]:
+    """Why the drawing cannot be written there; [] if it can."""
+    if draw.suffix.lower() not in DRAWING_SUFFIXES:
+        return [
+            Finding(
+                "--draw", 0, f"{quoted(draw.name)} is no name of a picture; end it in {' or '.join(DRAWING_SUFFIXES)}"
+            )
+        ]
+    if any(
+        real_path(draw) == real_path(path) or (draw.exists() and path.exists() and draw.samefile(path))
+        for path in inputs
+    ):
+        return [
+            Finding(
+                "--draw", 0, f"{quoted(shown(draw))} is one of your own files, which it would overwrite; name another"
+            )
+        ]
+    return folders.file_findings(draw)
+
+
+def _color(text: str, wrong: list[Finding], min_saturation: float = 0.2) -> "Color | None":
+    """The colour of "R,G,B", each then 0 to 1. What is wrong is added to `wrong`.
+
+    Below `min_saturation` (of HSV; choice) a colour is refused as grey: every grey thing would look like the connector.
+    """
+    parts = text.split(",")
+    right = "write three numbers of 0 to 255, such as 191,13,15"
+    if len(parts) != 3 or not all(re.fullmatch(r"\s*\d{1,3}\s*", part) and int(part) <= 255 for part in parts):
+        wrong.append(Finding("--color", 0, f"{quoted(text)} is no colour; {right}"))
+        return None
+    red, green, blue = (int(part) / 255 for part in parts)
+    if max(red, green, blue) - min(red, green, blue) < min_saturation * max(red, green, blue, 1e-9):
+        wrong.append(
+            Finding(
+                "--color", 0, f"{quoted(text)} is grey, and nothing else tells it from its surroundings; name a hue"
+            )
+        )
+        return None
+    return red, green, blue
+
+
+def snapshot(
+    scenario: Annotated[str, typer.Argument(help="A shipped scenario's name, or a path to a .yaml file.")],
+    out: Annotated[Path, typer.Option(metavar="DIR", help="A folder for the files.")],
+    camera: Annotated[str, typer.Option(metavar="NAME", help="The cell's camera: rear or wrist.")] = "rear",
+    frames: Annotated[int, typer.Option(min=1, max=100, help="How many.")] = 1,
+    seed: Annotated[
+        int | None, typer.Option(min=0, max=MAX_SEED, help="Draws every error and noise; default the scenario's.")
+    ] = None,
+    sets: Sets = None,
+) -> None:
+    """Write a scenario's first camera frames as files.
+
+    rgb.png, depth.png (16 bit, millimetres) and intrinsics.yaml. Of a camera that stands still camera_pose.yaml, too:
+    where the robot believes it to be. Several frames are rgb_001.png, depth_001.png, and so on.
+
+    \b
+    Example:
+      regrasp snapshot no_obstacle --seed 3 --frames 4 --out four
+      regrasp snapshot no_obstacle --set cell=thesis_tags --out tags
+    """
+    from regrasp.app.scenario.load import load_scenario
+
+    wrong = folders.folder_findings(out)
+    if there := [name for name in SNAPSHOT_FILES if (out / name).exists()]:
+        wrong.append(Finding(shown(out), 0, f"already holds {', '.join(there)}; name another folder"))
+    loaded = load_scenario(scenario, [*(sets or []), *([] if seed is None else [f"seed={seed}"])], None)
+    names = [c.name for c in loaded.cell.known.cameras]
+    if camera not in names:
+        wrong.append(Finding("--camera", 0, f"no camera {quoted(camera)}; {nearest(camera, names)}"))
+    if wrong:
+        raise Findings(wrong)
+    with late_imports():
+        from regrasp.app.frames.snapshot import (
+            write_snapshot,
+        )  # brings the planner, the compiler and the physics: seconds
+
+    write_snapshot(loaded, camera, frames, out)
+    typer.echo(f"written to {shown(out)}")

@@ -1,0 +1,147 @@
+"""`regrasp study`: many episodes or scenes, counted."""
+
+import math
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from regrasp.app.cli.options import RendererOption, Sets, WallLimitSeconds, parse_seeds
+from regrasp.app.files.findings import Finding, Findings, shown
+from regrasp.app.interrupts import late_imports
+from regrasp.app.records import folders
+from regrasp.interfaces.quote import nearest, quoted
+
+app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Run many episodes or scenes, and count.")
+
+
+@app.command("demo")
+def demo(
+    seeds: Annotated[str, typer.Option(metavar="A:B", help="Seeds from A up to, not including, B.")],
+    jobs: Annotated[int, typer.Option(min=1, help="Episodes side by side.")] = os.cpu_count() or 1,
+    out: Annotated[Path | None, typer.Option(help="Folder of demo.json and the runs' records.")] = None,
+    sets: Sets = None,
+    renderer: RendererOption = "software",
+    wall_limit: WallLimitSeconds = None,
+) -> None:
+    """Run the whole demonstration over many seeds.
+
+    No, short and tall obstacle, each without and with gravity: six runs a seed, about a minute each.
+
+    \b
+    Example:
+      regrasp study demo --seeds 0:20 --jobs 2 --out results/demo
+    """
+    chosen = parse_seeds(seeds)
+    if wrong := _unfit(out, "demo.json"):
+        raise Findings(wrong)
+    with late_imports():
+        from regrasp.app.run.batch import Settings
+        from regrasp.app.tasks.cable.studies.demo import run_demo
+
+    settings = Settings(renderer=renderer, wall_limit=math.inf if wall_limit is None else wall_limit)
+    raise typer.Exit(run_demo(chosen, jobs, out, sets or [], settings))
+
+
+Techniques = Annotated[str | None, typer.Option(metavar="A,B", help="Techniques to try; default all.")]
+CellName = Annotated[
+    str | None,
+    typer.Option("--cell", help="A cell's name, or a .yaml file; for fiducial thesis_tags, else thesis."),
+]
+
+
+@app.command("pose")
+def pose(
+    seeds: Annotated[str, typer.Option(metavar="A:B", help="Trials: seeds from A up to, not including, B.")] = "0:3",
+    techniques: Techniques = None,
+    configurations: Annotated[
+        str | None, typer.Option(metavar="A,B", help="Configurations to try; default all.")
+    ] = None,
+    no_grasp: Annotated[bool, typer.Option("--no-grasp", help="Only look: less than half the time.")] = False,
+    both_cameras: Annotated[
+        bool, typer.Option("--both-cameras", help="A second row each: the wrist camera looks, too.")
+    ] = False,
+    cell: CellName = None,
+    renderer: RendererOption = "software",
+    jobs: Annotated[int, typer.Option(min=1, help="Scenes side by side.")] = os.cpu_count() or 1,
+    out: Annotated[Path | None, typer.Option(help="Folder of pose.json, pose.csv and the plots.")] = None,
+) -> None:
+    """Repeat the thesis's pose experiment.
+
+    The connector in nine configurations: found, measured against the truth, and grasped.
+
+    \b
+    Examples:
+      regrasp study pose --seeds 0:3 --out results/pose
+      regrasp study pose --techniques rgbd --configurations 3,6,7,8,9 --no-grasp
+
+    \b
+    The configurations, and how a trial goes: app/tasks/cable/studies/pose/POSE.md.
+    Exit code: 0 done, 1 a scene broke off, 2 bad input, 130 Ctrl-C.
+    """
+    chosen, wrong = parse_seeds(seeds), _unfit(out, "pose.json")
+    names = _techniques(techniques, wrong)
+    with late_imports():
+        from regrasp.app.tasks.cable.studies.pose.scenes import CONFIGURATIONS
+
+    shown_ones = _listed("--configurations", configurations, tuple(CONFIGURATIONS), wrong)
+    if wrong:
+        raise Findings(wrong)
+    with late_imports():
+        from regrasp.app.tasks.cable.studies.pose.study import run_pose
+        from regrasp.app.tasks.cable.studies.pose.trial import setups_of
+
+    setups = setups_of(names, cell, grasps=not no_grasp, renderer=renderer)
+    raise typer.Exit(run_pose(setups, chosen, jobs, out, shown_ones, both_cameras))
+
+
+@app.command("coverage")
+def coverage(
+    seeds: Annotated[str, typer.Option(metavar="A:B", help="Scenes: seeds from A up to, not including, B.")] = "0:200",
+    techniques: Techniques = None,
+    cell: CellName = None,
+    renderer: RendererOption = "software",
+    jobs: Annotated[int, typer.Option(min=1, help="Scenes side by side.")] = os.cpu_count() or 1,
+    out: Annotated[Path | None, typer.Option(help="Folder of coverage.json.")] = None,
+) -> None:
+    """Check that estimates are as sure as they say.
+
+    How often the truth lies in an estimate's 95 % region, by its covariance; ten frames a seed.
+
+    \b
+    Example:
+      regrasp study coverage --seeds 0:200 --techniques rgbd
+    """
+    chosen, wrong = parse_seeds(seeds), _unfit(out, "coverage.json")
+    names = _techniques(techniques, wrong)
+    if wrong:
+        raise Findings(wrong)
+    with late_imports():
+        from regrasp.app.tasks.cable.studies.pose.coverage import run_coverage
+        from regrasp.app.tasks.cable.studies.pose.trial import setups_of
+
+    raise typer.Exit(run_coverage(setups_of(names, cell, renderer=renderer), chosen, jobs, out))
+
+
+def _unfit(out: Path | None, file: str) -> list[Finding]:
+    """Why a study's `file` cannot be written to `out`."""
+    if out is None:
+        return []
+    taken = [Finding(shown(out), 0, "already holds a study; name another folder")] if (out / file).exists() else []
+    return folders.run_folder_findings(out) + taken
+
+
+def _techniques(text: str | None, wrong: list[Finding]) -> list[str]:
+    with late_imports():
+        from regrasp.perception.pose.technique import TECHNIQUES  # it brings the arithmetic
+
+    return _listed("--techniques", text, TECHNIQUES, wrong)
+
+
+def _listed(option: str, text: str | None, known: Sequence[str], wrong: list[Finding]) -> list[str]:
+    """The names in "A,B", each once; without a text all known ones. Findings of unknown names are added to `wrong`."""
+    names = list(known) if text is None else list(dict.fromkeys(name.strip() for name in text.split(",")))
+    wrong += [Finding(option, 0, f"no {quoted(name)}; {nearest(name, known)}") for name in names if name not in known]
+    return names

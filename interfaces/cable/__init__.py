@@ -1,0 +1,1 @@
+"""The cable task's part of a cell, and its faults."""

@@ -1,0 +1,13 @@
+"""Causes of failure of the cable task."""
+
+from enum import StrEnum
+
+
+class CableCause(StrEnum):
+    """The causes that only leaves of the cable task give."""
+
+    SLIPPED = "slipped"
+    CONNECTOR_NOT_FOUND = "connector_not_found"
+    SEARCH_EXHAUSTED = "search_exhausted"
+    NOT_STOWED = "not_stowed"
+    NOT_STILL = "not_still"

@@ -1,0 +1,1 @@
+"""Motions with the cable in the hand."""
