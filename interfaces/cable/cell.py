@@ -1,6 +1,6 @@
 """The cable task's sections of a cell file, `known.cable` and `hidden.cable`. Units are SI."""
 
-from typing import Annotated
+from typing import Annotated, Any, Self
 
 import numpy as np
 from pydantic import Field
@@ -159,6 +159,10 @@ class CableKnown(KnownCell):
         """Floor, panels, the clip's bracket, and the bounding boxes of the sockets' blocks."""
         cable = self.cable
         return [*self.boxes, *cable.clip.bracket, *(socket.upright_box() for socket in cable.sockets)]
+
+    def with_cable(self, **values: Any) -> Self:
+        """A copy with these values in its section `cable`."""
+        return self.model_copy(update={"cable": self.cable.model_copy(update=values)})
 
     @property
     def search_mount(self) -> WristMount:

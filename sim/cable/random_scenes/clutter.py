@@ -45,9 +45,8 @@ def repainted(known: CableKnown, rng: np.random.Generator, own_share: float = 0.
         b.model_copy(update={"color": random_color(rng, (0.2, 0.9)) if b.name == "floor" else wall})
         for b in known.boxes
     )
-    return known.model_copy(
-        update={"boxes": boxes, "sockets": tuple(s.model_copy(update={"color": socket}) for s in known.cable.sockets)}
-    )
+    sockets = tuple(s.model_copy(update={"color": socket}) for s in known.cable.sockets)
+    return known.model_copy(update={"boxes": boxes}).with_cable(sockets=sockets)
 
 
 def rearranged(known: CableKnown, rng: np.random.Generator) -> CableKnown:
@@ -65,7 +64,7 @@ def rearranged(known: CableKnown, rng: np.random.Generator) -> CableKnown:
         return socket.model_copy(update=update)
 
     boxes, sockets = tuple(map(moved, known.boxes)), tuple(map(placed, known.cable.sockets))
-    return known.model_copy(update={"boxes": boxes, "sockets": sockets})
+    return known.model_copy(update={"boxes": boxes}).with_cable(sockets=sockets)
 
 
 def visual_body(client: int, kind: int, color: Color, **size: object) -> int:

@@ -116,7 +116,7 @@ def perceive(
             f"a connector {connector.length:g} m long and {2 * connector.radius:g} thick; one is longer than thick"
         )
         raise Findings([Finding("--radius", 0, message)])
-    known = known.model_copy(update={"connector": connector})
+    known = known.with_cable(connector=connector)
     with late_imports():
         from regrasp.app.tasks.cable import perceive as steps  # brings OpenCV and the compiler
 

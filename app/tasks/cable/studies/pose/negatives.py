@@ -66,7 +66,7 @@ def negative_frames(
     rng = np.random.default_rng([seed, 6])
     black = cell.known.cable.connector.model_copy(update={"color": cell.hidden.cable.color, "tag": None})
     props = look_alikes(cell, rng)
-    without = cell.model_copy(update={"known": cell.known.model_copy(update={"connector": black})})
+    without = cell.model_copy(update={"known": cell.known.with_cable(connector=black)})
     world = World(without, "zero", seed, SceneSetup(props=props), renderer)
     try:
         panel = next(box for box in cell.known.boxes if box.name == "back_panel")
