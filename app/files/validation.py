@@ -32,7 +32,7 @@ _UNITS = dict.fromkeys(_LENGTHS.split(), _METRES) | {  # by the name of the key 
     "angle_deg": "degrees, such as 5.0",
     "detection_delay": "seconds, such as 0.5",
     "sleep": "radians, such as 0.8",
-    "carried": "shares of the way from socket to clip, such as 0.5",
+    "carried": "shares of the way, such as 0.5",
     "at": "seconds, such as 5.0",
     "after": "seconds, such as 1.0",
     "by": _METRES,

@@ -54,11 +54,20 @@ class Document:
 
     def rename(self, path: Path, name: str) -> None:
         """Rename the key at `path`, which must exist."""
+        self.move(path, (*path[:-1], name))
+
+    def move(self, path: Path, new: Path) -> None:
+        """Move the value at `path`, which must exist, to `new`; mappings on the way are added."""
         parent: Any = self.value
         for step in path[:-1]:
             parent = parent[step]
-        parent[name] = parent.pop(path[-1])
-        new = (*path[:-1], name)
+        value, parent = parent.pop(path[-1]), self.value
+        for length, step in enumerate(new[:-1], 1):
+            if not isinstance(parent.get(step), dict):
+                parent[step] = {}
+                self.places.setdefault(new[:length], self.place(path))
+            parent = parent[step]
+        parent[new[-1]] = value
         inside = len(path)
         for old in [p for p in self.places if p[:inside] == path]:
             self.places[new + old[inside:]] = self.places.pop(old)

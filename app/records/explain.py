@@ -4,9 +4,10 @@ from collections.abc import Iterator
 
 from regrasp.app.records.history import attempts, node_history
 from regrasp.app.records.reader import RunRecord
-from regrasp.app.records.result import DEFAULT_CASE, BeliefState, Link, Pose, Result
-from regrasp.app.records.summary import expectation_lines, headline, slip_lines, what_ran
+from regrasp.app.records.result import DEFAULT_CASE, Link, Result
+from regrasp.app.records.summary import expectation_lines, headline, measured_lines, what_ran
 from regrasp.app.records.timeline import event_text, timeline, wrapped
+from regrasp.app.task.find import words_of
 from regrasp.interfaces.quote import printable
 
 REPORT_WIDTH = 100  # columns of a page in a test report
@@ -26,9 +27,9 @@ def _finished(record: RunRecord, result: Result, width: int) -> Iterator[str]:
     yield from _what_was_run(record, result.versions)
     yield from _section("Why it ended so", _why(result, width))
     yield from _tried(record, width)
-    yield from _section("Losses of the connector, by ground truth", slip_lines(result))
+    yield from _section(words_of(result.task).measured_title, [*measured_lines(result)])
     if result.belief:
-        yield from _section("What the robot knew at the end", _belief(result.belief))
+        yield from _section("What the robot knew at the end", [*_belief(result)])
     yield from _section("What was expected", expectation_lines(result))
     yield from _section("Traceback", (result.traceback or "").splitlines())
 
@@ -107,27 +108,9 @@ def _relative(chain: tuple[Link, ...]) -> Iterator[str]:
         above = link.path + "/"
 
 
-def _belief(belief: BeliefState) -> Iterator[str]:
-    yield f"the right hand holds {'the connector' if belief.held else 'nothing'}"
-    if belief.connector:
-        sure = "all of it seen" if belief.sure else "a part of it seen"
-        yield f"connector found by the {belief.found_by or 'unknown'} camera at {_place(belief.connector)}, {sure}"
-    else:
-        yield "connector not found since it was lost, or never lost"
-    if seen := belief.last_seen:
-        yield f"connector seen last at {seen.at:.2f} s by the {seen.camera} camera at {_numbers(seen.position)} m"
-    yield f"searches in vain since then: {belief.vain_searches}"
-    yield f"obstacles mapped: {belief.occupied_voxels} voxels"
-    for name, arm in belief.arms.items():
-        yield f"{name} arm: tool at {_place(arm.tool)}"
-        yield f"  joints {_numbers(arm.joints)} rad"
-    for at, by in belief.notices:
-        yield f"noticed a loss at {at:.2f} s by {by}"
-
-
-def _place(pose: Pose) -> str:
-    return f"{_numbers(pose.position)} m"
-
-
-def _numbers(values: tuple[float, ...]) -> str:
-    return "(" + ", ".join(f"{round(value, 3) + 0.0:.3f}" for value in values) + ")"
+def _belief(result: Result) -> Iterator[str]:
+    """What the robot knew, in the task's words."""
+    try:
+        yield from words_of(result.task).belief_lines(result.belief or {})
+    except (KeyError, TypeError, ValueError):
+        yield f"not in the form that the task {result.task} writes"

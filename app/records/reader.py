@@ -14,7 +14,8 @@ from pydantic_core import from_json
 from regrasp.app.files.findings import Finding, Findings, shown
 from regrasp.app.records import folders
 from regrasp.app.records.record import leaf_at_work
-from regrasp.app.records.result import OLD_OUTCOMES, SCHEMA, NodeStatus, Result
+from regrasp.app.records.result import SCHEMA, NodeStatus, Result
+from regrasp.app.task import find
 from regrasp.trees.wiring import MAX_TREE_DEPTH
 
 MAX_RESULT_BYTES, MAX_LINES_BYTES = 16 << 20, 64 << 20  # bytes of result.json, of each of the others: hours of a run
@@ -160,7 +161,7 @@ def _result(path: Path, found: list[Finding]) -> Result | None:
             raise ValueError(f"no 'schema' with a number; a result.json that this program reads has {SCHEMA}")
         if schema > SCHEMA:
             raise ValueError(f"schema {schema} is newer than {SCHEMA}, which this program reads; take a newer Regrasp")
-        if schema == 1:
+        if schema < SCHEMA:
             _translate(value)
         result = _adapter(Result).validate_python(value)
         for number, attempt in enumerate(result.attempts):
@@ -174,13 +175,16 @@ def _result(path: Path, found: list[Finding]) -> Result | None:
 
 
 def _translate(value: dict[str, Any]) -> None:
-    """Put today's words in a result of schema 1."""
-    value["outcome"] = OLD_OUTCOMES.get(str(value.get("outcome")), value.get("outcome"))
+    """Put today's words in a result of schema 1 or 2, from before there were several tasks."""
+    old = find.old_outcomes()
+    value["task"] = find.of_old_records()
+    value["measured"] = {"slips": value.pop("slips", [])}
+    value["outcome"] = old.get(str(value.get("outcome")), value.get("outcome"))
     expectations = value.get("expectations")
     for item in expectations if isinstance(expectations, list) else ():
         if isinstance(item, dict) and item.get("name") == "outcome":
             for key in ("value", "limit"):
-                item[key] = OLD_OUTCOMES.get(str(item.get(key)), item.get(key))
+                item[key] = old.get(str(item.get(key)), item.get(key))
 
 
 def _bytes(path: Path, most: int, found: list[Finding]) -> bytes | None:

@@ -7,13 +7,13 @@ import platform
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any, Literal
 
+from regrasp.app.task.expectation import Expectation
 from regrasp.interfaces.cause import Cause
 
 Outcome = Literal["success", "failure", "time_limit", "wall_limit", "interrupted", "internal_error"]
 NodeStatus = Literal["RUNNING", "SUCCESS", "FAILURE", "INVALID"]
 DEFAULT_CASE = "default"  # name of the only case of a scenario that varies nothing
-SCHEMA = 2  # version of result.json; fields may be added without a new version, but none changes its meaning
-OLD_OUTCOMES = {"stowed": "success", "safe_stop": "failure"}  # the words of schema 1, and of scenarios of its time
+SCHEMA = 3  # version of result.json; fields may be added without a new version, but none changes its meaning
 
 _PACKAGES = (
     "regrasp",
@@ -43,25 +43,6 @@ def versions() -> dict[str, str]:
 
 
 @dataclasses.dataclass(frozen=True)
-class Expectation:
-    """One expectation of the scenario: what came out (`value`) and what was expected (`limit`)."""
-
-    name: str
-    met: bool
-    value: Any
-    limit: Any
-
-
-@dataclasses.dataclass(frozen=True)
-class Slip:
-    """One loss of the connector, in simulated seconds; None: it was not noticed."""
-
-    released_at: float
-    detected_at: float | None
-    detected_by: str | None
-
-
-@dataclasses.dataclass(frozen=True)
 class Attempt:
     """An execution of a leaf, in simulated seconds; INVALID: it was stopped.
 
@@ -87,46 +68,6 @@ class Link:
 
 
 @dataclasses.dataclass(frozen=True)
-class Pose:
-    """A position in metres and a quaternion x, y, z, w."""
-
-    position: tuple[float, float, float]
-    quaternion: tuple[float, float, float, float]
-
-
-@dataclasses.dataclass(frozen=True)
-class Sighting:
-    """Where (m, world) and when (simulated s) a camera saw the connector."""
-
-    at: float
-    camera: str
-    position: tuple[float, float, float]
-
-
-@dataclasses.dataclass(frozen=True)
-class ArmState:
-    """Joints (rad) as read, and world_from_tool by them."""
-
-    joints: tuple[float, ...]
-    tool: Pose
-
-
-@dataclasses.dataclass(frozen=True)
-class BeliefState:
-    """The world as the robot knew it at the end; no ground truth."""
-
-    held: Pose | None  # tool_from_connector of the right hand
-    connector: Pose | None  # world_from_connector as last found for a grasp
-    sure: bool  # whether the whole connector was seen there
-    found_by: str | None
-    last_seen: Sighting | None
-    arms: dict[str, ArmState]
-    occupied_voxels: int  # of the obstacles that it has mapped
-    vain_searches: int  # since the connector was found last
-    notices: tuple[tuple[float, str], ...]  # noticed losses: when (simulated s), by which test
-
-
-@dataclasses.dataclass(frozen=True)
 class Result:
     """The result of a run: the fields of result.json in their order."""
 
@@ -135,12 +76,13 @@ class Result:
     seed: int
     outcome: Outcome
     succeeded: bool
+    task: str = ""
     case: str = DEFAULT_CASE  # which of the scenario's cases, if its values vary
     cause: Cause | None = None
     chain: tuple[Link, ...] | None = None  # None if the run ended in success, or in no node
     traceback: str | None = None  # of an internal_error
     expectations: tuple[Expectation, ...] = ()
-    slips: tuple[Slip, ...] = ()
+    measured: dict[str, Any] = dataclasses.field(default_factory=dict)  # by the task's judge
     sim_seconds: float = 0.0
     wall_seconds: float = 0.0
     real_time_factor: float = 0.0
@@ -148,7 +90,7 @@ class Result:
     longest_tick: float = 0.0  # s of wall time from one tick of the tree to the next
     renderer: str = ""
     versions: dict[str, str] = dataclasses.field(default_factory=versions)
-    belief: BeliefState | None = None
+    belief: dict[str, Any] | None = None  # what the robot knew at the end, no ground truth; the task says what
     attempts: tuple[Attempt, ...] = ()
 
     def to_json(self) -> str:

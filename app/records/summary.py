@@ -6,9 +6,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from regrasp.app.records.result import DEFAULT_CASE
+from regrasp.app.task.find import words_of
 
 if TYPE_CHECKING:
-    from regrasp.app.records.result import Expectation, Result
+    from regrasp.app.records.result import Result
+    from regrasp.app.task.expectation import Expectation
 
 
 def run_summary(result: "Result", folder: Path) -> str:
@@ -18,7 +20,7 @@ def run_summary(result: "Result", folder: Path) -> str:
         at = f" ({result.cause.node})" if result.cause.node else ""
         lines.append(f"  cause   {result.cause.code}: {result.cause.message}{at}")
     lines += [f"  {line}" for line in expectation_lines(result)]
-    lines += [f"  slip    {line}" for line in slip_lines(result)]
+    lines += [f"  {words_of(result.task).measured:<7} {line}" for line in measured_lines(result)]
     lines.append(f"  record  {folder}")
     lines.append(
         f"  time    {result.sim_seconds:.1f} s simulated in {result.wall_seconds:.1f} s, "
@@ -52,26 +54,24 @@ def expectation_lines(result: "Result") -> Iterator[str]:
     """Each expectation with a mark: met or not, what came out, what was expected."""
     yes, no = marks()
     for e in result.expectations:
-        yield f"{yes if e.met else no} {e.name}: {_plain(e.value)} (expected: {limit_words(e)})"
+        yield f"{yes if e.met else no} {e.name}: {_plain(e.value)} (expected: {limit_words(e, result.task)})"
 
 
-def limit_words(expectation: "Expectation") -> str:
-    """What the scenario expects, and whether it is the least, the most or the very value."""
-    limit = _plain(expectation.limit)
-    if expectation.name == "slips":
-        return f"at least {limit}, all noticed"
-    return limit if expectation.name in ("outcome", "end", "cause", "hidden") else f"at most {limit}"
+def limit_words(expectation: "Expectation", task: str) -> str:
+    """What the scenario expects, in words: the very value, or a number as the most that may come out."""
+    name, limit = expectation.name, _plain(expectation.limit)
+    if (words := words_of(task).limits.get(name)) is not None:
+        return words.format(limit)
+    is_number = isinstance(expectation.limit, (int, float)) and not isinstance(expectation.limit, bool)
+    return f"at most {limit}" if is_number else limit
 
 
-def slip_lines(result: "Result") -> Iterator[str]:
-    """Each loss of the connector, and how it was noticed."""
-    for slip in result.slips:
-        seen = (
-            f"noticed at {slip.detected_at:.2f} s by {slip.detected_by}"
-            if slip.detected_at is not None
-            else "not noticed"
-        )
-        yield f"lost at {slip.released_at:.2f} s, {seen}"
+def measured_lines(result: "Result") -> Iterator[str]:
+    """What the task's judge measured."""
+    try:
+        yield from words_of(result.task).measured_lines(result.measured)
+    except (KeyError, TypeError, ValueError):
+        yield f"not in the form that the task {result.task} writes"
 
 
 def event_words(event: str, values: Mapping[str, Any]) -> str:

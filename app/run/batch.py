@@ -57,9 +57,7 @@ class Row:
     succeeded: bool
     cause: dict[str, Any] | None
     peak_memory_mb: float
-    slips: int = 0
-    detection_delays: list[float] = field(default_factory=list)
-    detected_by: list[str] = field(default_factory=list)
+    measured: dict[str, Any] = field(default_factory=dict)  # by the task's judge
     unintended_force: float | None = None
     unmet: list[str] = field(default_factory=list)
     why: str = ""  # the cause and the unmet expectations in words; '' if the run came out as expected
@@ -128,7 +126,15 @@ def result_of(run: Run, done: Done[Result]) -> Result:
     code = CauseCode.WALL_LIMIT if done.timed_out else CauseCode.INTERNAL_ERROR
     outcome: Outcome = "wall_limit" if done.timed_out else "internal_error"
     cause = Cause(code, done.error)
-    result = Result(run.scenario.name, run.seed, outcome, succeeded=False, case=run.scenario.case, cause=cause)
+    result = Result(
+        run.scenario.name,
+        run.seed,
+        outcome,
+        succeeded=False,
+        task=run.scenario.file.TASK,
+        case=run.scenario.case,
+        cause=cause,
+    )
     return finish_killed(run.folder, result) if run.folder else result
 
 
@@ -142,9 +148,7 @@ def row_of(run: Run, done: Done[Result]) -> Row:
         outcome=result.outcome,
         succeeded=result.succeeded,
         cause=asdict(result.cause) if result.cause else None,
-        slips=len(result.slips),
-        detection_delays=[s.detected_at - s.released_at for s in result.slips if s.detected_at is not None],
-        detected_by=[s.detected_by for s in result.slips if s.detected_by],
+        measured=result.measured,
         unintended_force=values.get("unintended_force"),
         unmet=[e.name for e in result.expectations if not e.met],
         why="" if result.succeeded else failure_words(result),
@@ -161,5 +165,12 @@ def failure_words(result: Result) -> str:
     """Why a run did not come out as expected, in words: its cause and each unmet expectation."""
     cause = [f"{result.cause.code}: {result.cause.message}"] if result.cause else []
     return "; ".join(
-        [*cause, *(f"{e.name} is {e.value}, expected {limit_words(e)}" for e in result.expectations if not e.met)]
+        [
+            *cause,
+            *(
+                f"{e.name} is {e.value}, expected {limit_words(e, result.task)}"
+                for e in result.expectations
+                if not e.met
+            ),
+        ]
     )

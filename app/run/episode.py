@@ -21,7 +21,6 @@ from regrasp.app.run.observers import Observers
 from regrasp.app.run.tick_log import TickLog, active_leaf, note_leaf_at_work, running_leaf
 from regrasp.app.scenario.copies import copies
 from regrasp.app.scenario.load import Scenario
-from regrasp.app.tasks.cable.belief import belief_state
 from regrasp.interfaces.cause import Cause, CauseCode
 from regrasp.interfaces.devices import TICK
 from regrasp.interfaces.wall_time import WallTime, measured
@@ -135,7 +134,7 @@ def _loop(episode: Episode, scenario: Scenario, film: Film, on_tick: Progress, w
     wall.lap(counts=False)
     while world.now() < limit:
         episode.tree.tick()
-        episode.judge.observe(world.now(), belief)
+        episode.judge.observe(world.now())
         leaf = active_leaf(root)
         film.show(leaf)
         on_tick(world.now(), leaf)
@@ -217,25 +216,26 @@ def _raising(error: BaseException, root: py_trees.behaviour.Behaviour) -> py_tre
 def _result(episode: Episode, scenario: Scenario, seed: int, ending: Ending, wall: WallTime) -> Result:
     wall.switch("record")
     seconds = sum(wall.seconds.values())
-    judge, belief = episode.judge, episode.services.belief
-    expectations = judge.expectations(ending.outcome, ending.cause.code if ending.cause else None, belief)
+    judge = episode.judge
+    expectations = judge.expectations(ending.outcome, ending.cause.code if ending.cause else None)
     return Result(
         scenario.name,
         seed,
         ending.outcome,
         succeeded=all(e.met for e in expectations),
+        task=episode.task.name,
         case=scenario.case,
         cause=ending.cause,
         chain=ending.chain,
         traceback=ending.traceback,
         expectations=expectations,
-        slips=judge.slips(belief),
+        measured=judge.measured(),
         sim_seconds=episode.world.now(),
         wall_seconds=seconds,
         real_time_factor=episode.world.now() / seconds,
         longest_tick=round(wall.longest_lap, 3),
         wall_by_part={part: round(spent, 3) for part, spent in wall.seconds.items()},
         renderer=episode.world.renderer.name,
-        belief=belief_state(episode.services),
+        belief=episode.task.belief()(episode.services),
         attempts=tuple(episode.attempts.made),
     )

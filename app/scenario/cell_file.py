@@ -1,44 +1,90 @@
-"""Reads and checks cell files."""
+"""Reads and checks cell files, each for the task that is to be done in the cell."""
 
+import warnings
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from regrasp.app.files.findings import Finding, Findings, catch_findings, shown
-from regrasp.app.files.overrides import Assignment, apply_assignments, merge_into
-from regrasp.app.files.resources import read_text, resolve
+from regrasp.app.files.overrides import Assignment, apply_assignments, merge_into, was_typed
+from regrasp.app.files.resources import read_text, resolve, shipped
+from regrasp.app.files.schema_nodes import value_at
 from regrasp.app.files.validation import validated
 from regrasp.app.files.yaml_lines import Document, Place, parse
-from regrasp.interfaces.cable.cell import CableCell
+from regrasp.app.files.yaml_lines import Path as KeyPath
+from regrasp.app.scenario.old_words import OldWordWarning
+from regrasp.app.task import find
+from regrasp.interfaces.cell import Cell, WristMount
 from regrasp.interfaces.quote import MAX_QUOTE, cut, nearest, quoted
+
+if TYPE_CHECKING:
+    from regrasp.app.task.task import Task
+
+_HALVES = ("known", "hidden")  # of a cell file; a task may have a section in each
 
 
 def load_cell(
-    path: Path, assignments: Sequence[Assignment] = (), where: Place | None = None, *, laid_out: bool = True
-) -> CableCell:
+    path: Path,
+    assignments: Sequence[Assignment] = (),
+    where: Place | None = None,
+    *,
+    task: "Task | None" = None,
+    laid_out: bool = True,
+) -> Cell:
     """Read and check a cell file, with the assignments applied.
 
-    A cell may name another as its `base` and give only what differs; the base itself has no base. Raises `Findings`;
-    if there is no such file, the finding stands at `where`, the place that names the cell. Without `laid_out` it is not
-    checked whether the parts leave one another room and the robot can reach them, for those who only look at pictures.
+    The cell is read for this task; without one for the task whose section it holds. Sections of other tasks are left
+    out. A cell may name another as its `base` and give only what differs; the base itself has no base. Raises
+    `Findings`; if there is no such file, the finding stands at `where`, the place that names the cell. Without
+    `laid_out` it is not checked whether the parts leave one another room and the robot can reach them, for those who
+    only look at pictures.
     """
-    document = parse(read_text(path, where), shown(path))
-    if isinstance(document.value, dict) and "base" in document.value:
-        document = _on_base(document, path.parent)
+    document = _read(path, where)
+    assignments = [_with_new_key(assignment) for assignment in assignments]
     fits = isinstance(document.value, dict)  # else only that is reported, not the assignments
     _, found = catch_findings(apply_assignments, document, assignments if fits else ())
-    cell, wrong = catch_findings(validated, document, CableCell)
-    found += wrong
+    if task is None:
+        task = find.task_named(_only_task(document, shown(path)))
+    model = task.cell()
+    found += [*_left_out(document, model, task)]
+    cell, wrong = catch_findings(validated, document, model)
+    found += wrong if not found else [finding for finding in wrong if not _is_missing_section(finding, task)]
     if cell:
         misnamed = [*_misnamed(document, cell)]
         found += misnamed
-        if laid_out and not misnamed:
-            from regrasp.app.scenario.cell_layout import layout_findings  # late: it brings the optimiser
-
-            found += layout_findings(document, cell)
+        if not misnamed:
+            found += _task_findings(document, cell, task, laid_out)
     if found or not cell:
         raise Findings(found)
     return cell
+
+
+def tasks_of(path: Path, assignments: Sequence[Assignment] = (), where: Place | None = None) -> list[str]:
+    """The tasks whose sections a cell file holds. Raises `Findings` if it cannot be read."""
+    document = _read(path, where)
+    if isinstance(document.value, dict):
+        catch_findings(apply_assignments, document, [_with_new_key(assignment) for assignment in assignments])
+    return _sections(document)
+
+
+def _task_findings(document: Document, cell: Cell, task: "Task", laid_out: bool) -> list[Finding]:
+    found = [] if task.cell_findings is None else [*task.cell_findings()(document, cell, False)]
+    if found or not laid_out:
+        return found
+    from regrasp.app.scenario.cell_layout import layout_findings  # late: it brings the optimiser
+
+    found = [*layout_findings(document, cell.known)]
+    return found if task.cell_findings is None else [*found, *task.cell_findings()(document, cell, True)]
+
+
+def _read(path: Path, where: Place | None) -> Document:
+    document = parse(read_text(path, where), shown(path))
+    _take_old_keys(document)
+    if isinstance(document.value, dict) and "base" in document.value:
+        document = _on_base(document, path.parent)
+    return document
 
 
 def _on_base(top: Document, folder: Path) -> Document:
@@ -48,6 +94,7 @@ def _on_base(top: Document, folder: Path) -> Document:
         raise Findings([Finding(*place, f"base is {quoted(name)}; expected the name of a cell or a path to its file")])
     path = resolve("cell", name, folder, place)
     document = parse(read_text(path, place), shown(path))
+    _take_old_keys(document)
     if isinstance(document.value, dict) and "base" in document.value:
         raise Findings(
             [Finding(*place, f"{quoted(shown(path))} has a base itself; name that one, and give here what it adds")]
@@ -56,21 +103,93 @@ def _on_base(top: Document, folder: Path) -> Document:
     return document
 
 
-def _misnamed(document: Document, cell: CableCell) -> Iterator[Finding]:
-    """Names in a cell that are missing, taken twice, or refer to nothing."""
+def _take_old_keys(document: Document) -> None:
+    """Move what stood elsewhere before cells had sections, with a warning."""
+    for old, new in find.old_cell_keys().items():
+        path = tuple(old.split("."))
+        if value_at(document.value, path[:-1]) is not None and path in document.places:
+            _warn(document.place(path), old, new)
+            document.move(path, tuple(new.split(".")))
+
+
+def _with_new_key(assignment: Assignment) -> Assignment:
+    for old, new in find.old_cell_keys().items():
+        if f"{assignment.key}.".startswith(f"{old}."):
+            if not was_typed(assignment.place):
+                _warn(assignment.place, f"cell.{old}", f"cell.{new}")
+            return replace(assignment, key=new + assignment.key[len(old) :])
+    return assignment
+
+
+def _warn(place: Place, old: str, new: str) -> None:
+    warnings.warn(str(Finding(*place, f"{old} is an old key; write {new}")), OldWordWarning, stacklevel=2)
+
+
+def _sections(document: Document) -> list[str]:
+    """The tasks that have a section in the file."""
+    value: Any = document.value
+    halves = [value[half] for half in _HALVES if isinstance(value, dict) and isinstance(value.get(half), dict)]
+    return [name for name in find.names() if any(name in half for half in halves)]
+
+
+def _only_task(document: Document, file: str) -> str:
+    """The task whose section the file holds. Raises `Findings` if there is none, or more than one."""
+    sections = _sections(document)
+    if len(sections) == 1:
+        return sections[0]
+    many = f"has sections of the tasks {' and '.join(sections)}" if sections else "has no task's section"
+    message = f"{many}; name the task"
+    raise Findings([Finding(file, 0, message)])
+
+
+def _left_out(document: Document, model: type[Cell], task: "Task") -> Iterator[Finding]:
+    """Take sections of other tasks out of the document; findings of the task's own that are missing."""
+    value: Any = document.value
+    for half in _HALVES:
+        held = value.get(half) if isinstance(value, dict) else None
+        if not isinstance(held, dict):
+            continue
+        kind: Any = model.model_fields[half].annotation
+        for name in find.names():
+            if name != task.name and name in held:
+                held.pop(name)
+        if task.name in kind.model_fields and task.name not in held:
+            cells = " or ".join(quoted(cell) for cell in _cells_with(task.name))
+            right = f"take the cell {cells}, or add it" if cells else "add it"
+            message = f"the task {task.name} needs a section {half}.{task.name}, and this cell has none; {right}"
+            yield Finding(*document.place((half,)), message)
+
+
+def _is_missing_section(finding: Finding, task: "Task") -> bool:
+    return finding.message.startswith(f"key {task.name!r} is missing in ")
+
+
+def _cells_with(task: str) -> list[str]:
+    """The shipped cells that have a section of the task, and no base."""
+    found = []
+    for name, path in shipped("cell").items():
+        value: Any = parse(read_text(path), shown(path)).value
+        if isinstance(value, dict) and "base" not in value and task in value.get("known", {}):
+            found.append(name)
+    return found
+
+
+def _misnamed(document: Document, cell: Cell) -> Iterator[Finding]:
+    """Names in a cell that are taken twice, or refer to nothing."""
     known = cell.known
-    boxes = [*known.boxes, *known.cable.clip.bracket]
-    for name, count in Counter(box.name for box in boxes).items():
-        if count > 1:
-            yield Finding(*document.place(("known", "boxes")), f"{count} boxes are named {quoted(name)}; rename them")
-    sockets = [s.name for s in known.cable.sockets]
-    if known.cable.plugged_into not in sockets:
-        message = f"no socket {quoted(known.cable.plugged_into)}; {nearest(known.cable.plugged_into, sockets)}"
-        yield Finding(*document.place(("known", "cable", "plugged_into")), message)
-    arms: list[str] = [a.name for a in known.arms]
-    cameras: list[str] = [c.name for c in known.cameras]
-    groups = {"sockets": (sockets, sockets), "arms": (arms, ["left", "right"]), "cameras": (cameras, ["rear", "wrist"])}
-    for key, (names, needed) in groups.items():
-        if sorted(names) != sorted(set(needed)):
-            given, right = (cut(", ".join(group), 3 * MAX_QUOTE) for group in (names, sorted(set(needed))))
-            yield Finding(*document.place(("known", key)), f"{key} are {given}; give one each of {right}")
+    groups: dict[str, list[str]] = {
+        "boxes": [box.name for box in known.solids()],
+        "arms": [arm.name for arm in known.arms],
+        "cameras": [camera.name for camera in known.cameras],
+    }
+    for key, names in groups.items():
+        for name, count in Counter(names).items():
+            if count > 1:
+                message = f"{count} {key} are named {quoted(name)}; rename them"
+                yield Finding(*document.place(("known", key)), message)
+    for i, camera in enumerate(known.cameras):
+        if isinstance(camera.mount, WristMount) and camera.mount.arm not in groups["arms"]:
+            path: KeyPath = ("known", "cameras", i, "mount", "arm")
+            arms = groups["arms"]
+            right = nearest(camera.mount.arm, arms) if arms else "this cell has none"
+            yield Finding(*document.place(path), f"no arm {quoted(cut(camera.mount.arm, MAX_QUOTE))}; {right}")

@@ -4,7 +4,7 @@ from collections.abc import Callable, Collection, Hashable, Iterable, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, ParamSpec, TypeVar
 
 from regrasp.app.files.findings import Finding, Findings, catch_findings, shown
 from regrasp.app.files.overrides import Assignment, apply_assignments, parse_overrides, path_of, was_typed
@@ -15,14 +15,18 @@ from regrasp.app.files.yaml_lines import Document, parse
 from regrasp.app.files.yaml_lines import Path as KeyPath
 from regrasp.app.records.result import DEFAULT_CASE
 from regrasp.app.scenario import vary
-from regrasp.app.scenario.cell_file import load_cell
+from regrasp.app.scenario.cell_file import load_cell, tasks_of
 from regrasp.app.scenario.old_words import warn_of_old_words
 from regrasp.app.scenario.placement import check_obstacles
 from regrasp.app.scenario.references import check_names, check_tree_inputs, tree_text
-from regrasp.app.scenario.schema import ScenarioFile
+from regrasp.app.scenario.schema import ScenarioFile, scenario_model
 from regrasp.app.scenario.tree_file import check_tree_file, names_of
-from regrasp.interfaces.cable.cell import CableCell
+from regrasp.app.task import find
+from regrasp.interfaces.cell import Cell
 from regrasp.interfaces.quote import MAX_QUOTE, cut, nearest, quoted
+
+if TYPE_CHECKING:
+    from regrasp.app.task.task import Task
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -40,10 +44,15 @@ class Scenario:
     name: str
     path: Path
     file: ScenarioFile
-    cell: CableCell
+    cell: Cell
     tree: Path
     overrides: tuple[str, ...] = ()
     case: str = DEFAULT_CASE
+
+    @property
+    def task(self) -> "Task":
+        """The job."""
+        return find.task_named(self.file.TASK)
 
     @property
     def title(self) -> str:
@@ -51,7 +60,7 @@ class Scenario:
         return self.name if self.case == DEFAULT_CASE else f"{self.name} {self.case}"
 
     @property
-    def lit_cell(self) -> CableCell:
+    def lit_cell(self) -> Cell:
         """The cell with the scenario's light."""
         spec, hidden = self.file.light, self.cell.hidden
         given = spec.model_dump(include={"direction", "ambient", "diffuse"}, exclude_none=True)
@@ -119,7 +128,7 @@ class _Source:
         except Findings as error:
             raise Findings([*wrong, *error.items]) from None
         self.note(self._document.findings)
-        _, errors = read_as(self._document, ScenarioFile)  # gives misspelt keys their right names
+        _, errors = read_as(self._document, self._model(None))  # gives misspelt keys their right names
         self.note(error.finding for error in errors if error.is_misspelt)
         of_vary = [a for a in assignments if f"{a.key}.".startswith("vary.")]
         self._fixed = [a for a in assignments if a not in of_vary]
@@ -166,26 +175,45 @@ class _Source:
             case,
         )
         warn_of_old_words(document)
-        file = self._read(case, document, {a.path[0] for a in assignments})
-        cell, tree = self._cell_and_tree(case, document, of_cell)
+        task = self._task(case, document, of_cell)
+        file = self._read(case, document, {a.path[0] for a in assignments}, self._model(task))
+        cell, tree = self._cell_and_tree(case, document, of_cell, task)
         inputs, obstacles, faults = (
             repr(value_at(document.value, (key,))) for key in ("inputs", "obstacles", "faults")
         )
-        self._once(case, check_tree_inputs, (tree, inputs, id(cell)), document, tree, cell)
-        self._once(case, check_names, (tree, obstacles, faults), document, tree)
+        self._once(case, check_tree_inputs, (tree, inputs, id(cell)), document, tree, cell, task)
+        self._once(case, check_names, (tree, obstacles, faults, id(cell)), document, tree, cell)
         gravity = repr(value_at(document.value, ("gravity",)))
-        self._once(case, check_obstacles, (obstacles, gravity, id(cell)), document, cell)
+        self._once(case, check_obstacles, (obstacles, gravity, id(cell)), document, cell, task)
         if not (file and cell and tree):
             return None
         name = self.path.name.removesuffix(".yaml").removesuffix(".scenario")
         return Scenario(name, self.path, file, cell, tree, self.overrides, case)
 
-    def _read(self, case: str, document: Document, changed: Collection[str | int]) -> ScenarioFile | None:
+    def _task(self, case: str, document: Document, of_cell: Sequence[Assignment]) -> "Task | None":
+        """The task that the scenario names, or the only one whose section its cell holds; None if that is wrong."""
+        place = document.place(("task",))
+        name = value_at(document.value, ("task",))
+        if isinstance(name, str):
+            return self._once(case, find.task_named, (name, place), name, place)
+        cell, laid = repr(value_at(document.value, ("cell",))), repr([(a.key, a.new.value) for a in of_cell])
+        args = (document, self.path.parent, of_cell)
+        return self._once(case, _task_of_cell, (cell, document.place(("cell",)), laid), *args)
+
+    def _model(self, task: "Task | None") -> type[ScenarioFile]:
+        """The model of the task's files; while that is not known and there are several, that of every task."""
+        if task is None and len(found := [*find.tasks()]) == 1:
+            task = found[0]
+        return ScenarioFile if task is None else scenario_model(task)
+
+    def _read(
+        self, case: str, document: Document, changed: Collection[str | int], model: type[ScenarioFile]
+    ) -> ScenarioFile | None:
         """Validate the file by itself. If it is wrong without its cases, they check only the keys that they change."""
         if self._wrong and isinstance(document.value, dict):
             value = _REQUIRED | {key: value for key, value in document.value.items() if key in changed}
             document = replace(document, value=value)
-        file, errors = read_as(document, ScenarioFile)
+        file, errors = read_as(document, model)
         errors = [error for error in errors if not self._is_for_cases(case, error)]
         self.note((self._told(error) for error in errors), case)
         if not case:
@@ -193,19 +221,20 @@ class _Source:
         return None if self._wrong else file
 
     def _cell_and_tree(
-        self, case: str, document: Document, of_cell: Sequence[Assignment]
-    ) -> tuple[CableCell | None, Path | None]:
+        self, case: str, document: Document, of_cell: Sequence[Assignment], task: "Task | None"
+    ) -> tuple[Cell | None, Path | None]:
         """The cell with these assignments, and the tree's path; None for what is invalid."""
         folder = self.path.parent
         cell_at, tree_at = (document.place((key,)) for key in ("cell", "tree"))
         laid = repr([(a.key, a.new.value, a.place) for a in of_cell])
-        cell = self._once(
-            case, _cell, (repr(value_at(document.value, ("cell",))), cell_at, laid), document, folder, of_cell
-        )
+        cell = None
+        if task is not None:
+            named = repr(value_at(document.value, ("cell",)))
+            cell = self._once(case, _cell, (named, cell_at, laid, task), document, folder, of_cell, task)
         name = repr(value_at(document.value, ("tree",)))
         tree = self._once(case, _named, (name, tree_at), document, "tree", folder)
         if tree:
-            self._once(case, check_tree_file, (tree, tree_at, id(cell)), tree, tree_at, names_of(cell))
+            self._once(case, check_tree_file, (tree, tree_at, id(cell), task), tree, tree_at, *_of_task(cell, task))
         return cell, tree
 
     def _told(self, error: Error) -> Finding:
@@ -244,9 +273,33 @@ def _named(document: Document, key: Literal["cell", "tree"], folder: Path) -> Pa
     return resolve(key, name, Path() if was_typed(place) else folder, place)
 
 
-def _cell(document: Document, folder: Path, assignments: Sequence[Assignment]) -> CableCell | None:
+def _cell(document: Document, folder: Path, assignments: Sequence[Assignment], task: "Task") -> Cell | None:
     path = _named(document, "cell", folder)
-    return load_cell(path, assignments, document.place(("cell",))) if path else None
+    return load_cell(path, assignments, document.place(("cell",)), task=task) if path else None
+
+
+def _task_of_cell(document: Document, folder: Path, assignments: Sequence[Assignment]) -> "Task | None":
+    """The task whose section the scenario's cell holds; None if it names no cell, which is a finding elsewhere.
+
+    Raises `Findings` if the cell cannot be read, or holds no section of a task or several.
+    """
+    path, place = _named(document, "cell", folder), document.place(("cell",))
+    if path is None:
+        return None
+    tasks, known = tasks_of(path, assignments, place), find.names()
+    if len(tasks) == 1:
+        return find.task_named(tasks[0])
+    if tasks:
+        message = f"the cell {shown(path)} has sections of the tasks {' and '.join(tasks)}; write task: {tasks[0]}"
+    else:
+        right = f"add one, such as known.{known[0]}, or write task: with one of {', '.join(known)}"
+        message = f"the cell {shown(path)} has no task's section; {right}"
+    raise Findings([Finding(*place, message)])
+
+
+def _of_task(cell: Cell | None, task: "Task | None") -> tuple[dict[str, dict[str, str]], str | None]:
+    """The names that a tree may refer to, and the name of the task, for `check_tree_file`."""
+    return names_of(cell, task), None if task is None else task.name
 
 
 def description(path: Path) -> str:

@@ -11,7 +11,7 @@ from regrasp.app.files.findings import Finding, Findings
 from regrasp.app.files.overrides import was_typed
 from regrasp.app.files.schema_nodes import value_at
 from regrasp.app.files.yaml_lines import Document, parse
-from regrasp.app.records.result import OLD_OUTCOMES
+from regrasp.app.task.find import old_outcomes
 
 _OUTCOME = ("expect", "outcome")
 
@@ -23,9 +23,10 @@ class OldWordWarning(FutureWarning):
 def warn_of_old_words(document: Document) -> None:
     """Issue an `OldWordWarning`, with file and line, for a scenario of schema 1."""
     word = value_at(document.value, _OUTCOME)
-    if isinstance(word, str) and word in OLD_OUTCOMES:
+    old = old_outcomes()
+    if isinstance(word, str) and word in old:
         place = document.place(_OUTCOME)
-        new = f"expect.outcome: {word} is an old word; write outcome: {OLD_OUTCOMES[word]}"
+        new = f"expect.outcome: {word} is an old word; write outcome: {old[word]}"
         hint = "" if was_typed(place) else ", as regrasp migrate does"
         warnings.warn(str(Finding(*place, new + hint)), OldWordWarning, stacklevel=2)
 
@@ -37,11 +38,12 @@ def migrated(text: str, source: str) -> tuple[str, list[int]]:
     """
     wanted = _translated(parse(text, source).value)
     root = yaml.compose(text, Loader=yaml.SafeLoader)
-    old = {node.start_mark.index: node for node in _outcomes(root) if node.value in OLD_OUTCOMES}
+    words = old_outcomes()
+    old = {node.start_mark.index: node for node in _outcomes(root) if node.value in words}
     new = text
     for begin, node in sorted(old.items(), reverse=True):
         word = new.rindex(node.value, begin, node.end_mark.index)  # an anchor and quotes stay
-        new = new[:word] + OLD_OUTCOMES[node.value] + new[word + len(node.value) :]
+        new = new[:word] + words[node.value] + new[word + len(node.value) :]
     lines = sorted({node.start_mark.line + 1 for node in old.values()})
     with contextlib.suppress(Findings):
         if parse(new, source).value == wanted:
@@ -74,7 +76,7 @@ def _with_new_outcome(expect: Any) -> Any:
 
 
 def _new_word(word: Any) -> Any:
-    return OLD_OUTCOMES.get(word, word) if isinstance(word, str) else word
+    return old_outcomes().get(word, word) if isinstance(word, str) else word
 
 
 def _outcomes(root: yaml.Node | None) -> Iterator[yaml.ScalarNode]:

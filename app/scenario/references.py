@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pydantic import TypeAdapter
 
@@ -12,9 +12,12 @@ from regrasp.app.files.validation import validated_part
 from regrasp.app.files.yaml_lines import Document
 from regrasp.app.scenario.schema import TreeInput
 from regrasp.app.scenario.tree_file import names_of
-from regrasp.interfaces.cable.cell import CableCell
+from regrasp.interfaces.cell import Cell
 from regrasp.interfaces.quote import cut, nearest, quoted
 from regrasp.trees import TreeSyntaxError, check_inputs, read_graph
+
+if TYPE_CHECKING:
+    from regrasp.app.task.task import Task
 
 _INPUT = TypeAdapter[TreeInput](TreeInput)
 
@@ -24,7 +27,7 @@ def tree_text(value: TreeInput) -> str:
     return str(value).lower() if isinstance(value, bool) else str(value)
 
 
-def check_tree_inputs(document: Document, tree: Path | None, cell: CableCell | None) -> None:
+def check_tree_inputs(document: Document, tree: Path | None, cell: Cell | None, task: "Task | None") -> None:
     """Raises `Findings` for inputs that the tree does not have, and for values that it does not take."""
     written = value_at(document.value, ("inputs",))
     if tree is None or not isinstance(written, dict):
@@ -33,14 +36,14 @@ def check_tree_inputs(document: Document, tree: Path | None, cell: CableCell | N
     given = {key: tree_text(value) for key, value in values.items() if value is not None}
     if found := [
         Finding(*document.place(("inputs", key)), f"inputs.{cut(key)}: {message}")
-        for key, message in check_inputs(tree, given, names=names_of(cell))
+        for key, message in check_inputs(tree, given, names=names_of(cell, task))
     ]:
         raise Findings(found)
 
 
-def check_names(document: Document, tree: Path | None) -> None:
-    """Raises `Findings` if faults name obstacles, or nodes of the tree, that do not exist."""
-    if found := [*_obstacles(document), *_nodes(document, tree)]:
+def check_names(document: Document, tree: Path | None, cell: Cell | None) -> None:
+    """Raises `Findings` if faults name obstacles, arms, cameras, or nodes of the tree, that do not exist."""
+    if found := [*_obstacles(document), *_devices(document, cell), *_nodes(document, tree)]:
         raise Findings(found)
 
 
@@ -63,6 +66,20 @@ def _obstacles(document: Document) -> Iterator[Finding]:
         if fault.get("type") == "obstacle_moves_in" and isinstance(name, str) and name not in names:
             message = f"no obstacle {quoted(name)}; {nearest(name, names)}"
             yield Finding(*document.place(("faults", i, "obstacle")), message)
+
+
+def _devices(document: Document, cell: Cell | None) -> Iterator[Finding]:
+    """Arms and cameras that faults name; an arm that a jaw's fault leaves out is the right one."""
+    if cell is None:
+        return
+    known = {"arm": [arm.name for arm in cell.known.arms], "camera": [camera.name for camera in cell.known.cameras]}
+    for i, fault in _faults(document):
+        given = {"arm": "right"} | fault if str(fault.get("type")).startswith("jaw_") else fault
+        for key, names in known.items():
+            name = given.get(key)
+            if isinstance(name, str) and name not in names:
+                right = nearest(name, names) if names else "this cell has none"
+                yield Finding(*document.place(("faults", i, key)), f"no {key} {quoted(name)}; {right}")
 
 
 def _nodes(document: Document, tree: Path | None) -> Iterator[Finding]:

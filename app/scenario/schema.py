@@ -1,17 +1,26 @@
-"""Scenario files as pydantic models: each field with its meaning, its unit and an example."""
+"""Scenario files as pydantic models: each field with its meaning, its unit and an example. Each task has its own."""
 
-from typing import Annotated, Any, get_args
+from copy import copy
+from enum import StrEnum
+from functools import cache, reduce
+from operator import or_
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, get_args
 
-from pydantic import AfterValidator, Field, JsonValue
+from pydantic import AfterValidator, Field, JsonValue, create_model
+from pydantic.fields import FieldInfo
 
-from regrasp.app.tasks.cable.expectations import Expect
-from regrasp.interfaces.fault import AnyFault
+from regrasp.app.task.expect import Expect
+from regrasp.app.task.find import task_named
+from regrasp.interfaces.cause import CauseCode
+from regrasp.interfaces.fault import FAULTS, Fault, ServiceRaises
 from regrasp.interfaces.fields import Color, Direction, Fraction, Model, Vector
 from regrasp.interfaces.scene import Gravity
 from regrasp.interfaces.seed import MAX_SEED
 
-FaultSpec = Annotated[AnyFault, Field(discriminator="type")]
-FAULT_TYPES: dict[str, type] = {get_args(f.model_fields["type"].annotation)[0]: f for f in get_args(AnyFault)}
+if TYPE_CHECKING:
+    from regrasp.app.task.task import Task
+
+SERVICE_CALLS = ("perception.map_obstacles", "motion.move", "motion.straight", "motion.shift")  # of every task
 Edge = Annotated[float, Field(ge=1e-3, le=3)]  # metres
 ObstacleSize = tuple[Edge, Edge, Edge]
 Reach = Annotated[float, Field(ge=0, le=1)]  # metres
@@ -116,7 +125,16 @@ Marker = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$", examples=["sl
 class ScenarioFile(Model):
     """A scenario: which cell, which tree, what goes wrong, and what must come out."""
 
+    TASK: ClassVar[str] = ""  # of the model of a task's files
+
     description: Annotated[str, Field(description="A sentence for the list.", examples=["The end is lost in sight."])]
+    task: Annotated[
+        str | None,
+        Field(
+            description="The job; left out: the one whose section the cell holds.",
+            examples=["cable"],
+        ),
+    ] = None
     cell: Annotated[
         str,
         Field(
@@ -151,7 +169,7 @@ class ScenarioFile(Model):
         LightSpec, Field(description="The light in place of the cell's.", examples=[{"brightness": 0.5}])
     ] = LightSpec()
     faults: Annotated[
-        tuple[FaultSpec, ...],
+        tuple[Fault, ...],
         Field(
             description="What the world does to the robot.",
             examples=[[{"type": "jaw_opens", "when": {"carried": [0.2, 0.65]}}]],
@@ -163,8 +181,8 @@ class ScenarioFile(Model):
     expect: Annotated[
         Expect,
         Field(
-            description="What must come out, by ground truth; left out: success, with the connector stowed.",
-            examples=[{"outcome": "failure", "cause": "search_exhausted"}],
+            description="What must come out, by ground truth; left out: success.",
+            examples=[{"outcome": "failure", "cause": "planning_failed"}],
         ),
     ] = Expect()
     markers: Annotated[
@@ -188,10 +206,65 @@ class ScenarioFile(Model):
         ),
     ] = Field(default_factory=dict)
 
+    def __reduce__(self) -> Any:
+        """Pickle by the task's name: its model is made at run time."""
+        return _restored, (self.TASK, self.model_dump_json(by_alias=True))
 
-def json_schema() -> dict[str, Any]:
-    """The schema of scenario files as JSON Schema, draft 2020-12."""
-    schema = ScenarioFile.model_json_schema()
+
+@cache
+def scenario_model(task: "Task") -> type[ScenarioFile]:
+    """The model of the task's scenario files: with its faults, what they may wait for, its causes and expectations."""
+    faults = tuple(_for_task(fault, task) for fault in (*FAULTS, *task.faults()))
+    spec = Annotated[reduce(or_, faults), Field(discriminator="type")]  # type: ignore[valid-type]
+    causes = StrEnum("CauseCode", {code.name: code.value for code in (*CauseCode, *task.causes())})  # type: ignore[misc]
+    base = task.expect()
+    expect: Any = create_model(
+        "Expect", __base__=base, __doc__=base.__doc__, cause=(causes | None, base.model_fields["cause"])
+    )
+    expect.OLD_OUTCOMES = task.old_outcomes
+    fields: dict[str, Any] = {
+        "faults": (tuple[spec, ...], ScenarioFile.model_fields["faults"]),  # type: ignore[valid-type]
+        "expect": (expect, _with_default(ScenarioFile.model_fields["expect"], expect())),
+    }
+    model: Any = create_model("ScenarioFile", __base__=ScenarioFile, __doc__=ScenarioFile.__doc__ or "", **fields)
+    made: type[ScenarioFile] = model
+    made.TASK = task.name
+    return made
+
+
+def _restored(task: str, text: str) -> ScenarioFile:
+    """A pickled scenario file of that task."""
+    return scenario_model(task_named(task)).model_validate_json(text, strict=True)
+
+
+def fault_types(task: "Task") -> dict[str, type[Fault]]:
+    """The faults of a task's scenarios, those of every task among them, by their names in a file."""
+    faults = (_for_task(fault, task) for fault in (*FAULTS, *task.faults()))
+    return {get_args(fault.model_fields["type"].annotation)[0]: fault for fault in faults}
+
+
+@cache
+def _for_task(fault: type[Fault], task: "Task") -> type[Fault]:
+    """The fault's model, with what the task's faults may wait for, and the services that it has."""
+    when = create_model("When", __base__=task.when(), __doc__=task.when().__doc__)
+    fields: dict[str, Any] = {"when": (when, fault.model_fields["when"])}
+    if issubclass(fault, ServiceRaises):
+        calls = Literal[(*task.service_calls, *SERVICE_CALLS)]  # type: ignore[valid-type]
+        fields["service"] = (calls, fault.model_fields["service"])
+    model: Any = create_model(fault.__name__, __base__=fault, __doc__=fault.__doc__, **fields)
+    made: type[Fault] = model
+    return made
+
+
+def _with_default(info: FieldInfo, default: Any) -> FieldInfo:
+    changed = copy(info)
+    changed.default = default
+    return changed
+
+
+def json_schema(task: "Task") -> dict[str, Any]:
+    """The schema of the task's scenario files as JSON Schema, draft 2020-12."""
+    schema = scenario_model(task).model_json_schema()
     required = [{"required": [key]} for key in schema.pop("required")]
     varied = [{"required": ["vary"], "properties": {"vary": key}} for key in required]
     either = [{"anyOf": [here, there]} for here, there in zip(required, varied, strict=True)]

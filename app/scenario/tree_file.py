@@ -6,41 +6,39 @@ from typing import TYPE_CHECKING
 
 from regrasp.app.files.findings import Finding, Findings, shown
 from regrasp.app.files.resources import read_text
-from regrasp.interfaces.quote import quoted
-from regrasp.perception.pose.technique import TECHNIQUES
+from regrasp.app.task import find
 from regrasp.trees import check_tree
 
 if TYPE_CHECKING:
     from regrasp.app.files.yaml_lines import Place
-    from regrasp.interfaces.cable.cell import CableCell
+    from regrasp.app.task.task import Task
+    from regrasp.interfaces.cell import Cell
 
 
 def check_tree_file(
-    path: Path, where: "Place | None" = None, names: Mapping[str, Collection[str]] | None = None
+    path: Path,
+    where: "Place | None" = None,
+    names: Mapping[str, Collection[str]] | None = None,
+    task: str | None = None,
 ) -> None:
     """Raises `Findings` for all that is wrong in a tree file; if there is no file, at `where`, which names it.
 
-    `names` are the names in the cell, by kind; without them the tree's references to the cell are not checked.
+    `names` are the names in the cell, by kind; without them the tree's references to the cell are not checked. With a
+    `task` its leaves, and those of every task, are known.
     """
     read_text(path, where)
-    found = [Finding(shown(path), line, message) for line, message in check_tree(path, names=names)]
+    found = [Finding(shown(path), line, message) for line, message in check_tree(path, names=names, task=task)]
     if found:
         raise Findings(found)
 
 
-def names_of(cell: "CableCell | None") -> dict[str, dict[str, str]]:
-    """The names in the cell that a tree may refer to, by kind, for `trees.check_tree`.
+def names_of(cell: "Cell | None", task: "Task | None" = None) -> dict[str, dict[str, str]]:
+    """The names in the cell that a tree of the task may refer to, by kind, for `trees.check_tree`.
 
     Each has the reason why it cannot be used in this cell, or "". Without a cell: the names that every cell has.
+    Without a task: those of all tasks.
     """
-    techniques: dict[str, str] = dict.fromkeys(TECHNIQUES, "")
-    if cell is None:
-        return {"technique": techniques}
-    from regrasp.interfaces.cable.cell import PLUGGED_INTO
-
-    if cell.known.cable.connector.tag is None:
-        techniques["fiducial"] = "needs a tag on the connector, and this cell's has none; take the cell thesis_tags"
-    plugged = cell.known.cable.plugged_into
-    empty = f"is empty at the start: the cell's plugged_into is {quoted(plugged)}; write {PLUGGED_INTO}"
-    sockets = {socket.name: "" if socket.name == plugged else empty for socket in cell.known.cable.sockets}
-    return {"socket": {PLUGGED_INTO: ""} | sockets, "technique": techniques}
+    chosen = find.tasks() if task is None else [task]
+    return {
+        kind: names for one in chosen if one.cell_names is not None for kind, names in one.cell_names()(cell).items()
+    }

@@ -11,6 +11,7 @@ from regrasp.interfaces.quote import nearest, quoted
 if TYPE_CHECKING:
     from regrasp.app.files.yaml_lines import Place
     from regrasp.app.task.task import Task
+    from regrasp.app.task.words import Words
 
 GROUP = "regrasp.tasks"
 
@@ -35,6 +36,31 @@ def task_named(name: str, where: "Place | None" = None) -> "Task":
         message = f"the task {name} cannot be loaded: {type(error).__name__}: {error}; mend its package, or remove it"
         raise Findings([Finding(*place, message)]) from error
     return task
+
+
+def words_of(task: str) -> "Words":
+    """The words of the task of that name; those of every task if it is not installed."""
+    from regrasp.app.task.words import PLAIN
+
+    try:
+        return task_named(task).words()
+    except Findings:
+        return PLAIN
+
+
+def of_old_records() -> str:
+    """The task of records from before there were several: the one that has words of that time."""
+    return next((task.name for task in tasks() if task.old_outcomes), "")
+
+
+def old_outcomes() -> dict[str, str]:
+    """The outcomes of schema 1, of all tasks, and what is written today."""
+    return {old: new for task in tasks() for old, new in task.old_outcomes.items()}
+
+
+def old_cell_keys() -> dict[str, str]:
+    """The keys of cell files from before there were sections, of all tasks, and where they are today."""
+    return {old: new for task in tasks() for old, new in task.old_cell_keys.items()}
 
 
 def tasks() -> Iterator["Task"]:

@@ -3,8 +3,8 @@
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-from regrasp.app.records.result import Expectation
 from regrasp.app.task.expect import Expect
+from regrasp.app.task.expectation import Expectation
 
 if TYPE_CHECKING:
     from regrasp.behaviors.services import Services

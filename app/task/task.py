@@ -7,8 +7,9 @@ simulation. Its leaves are a set of the group `regrasp.leaves` with the task's n
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from importlib import import_module
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any
+
+from regrasp.app.task.part import Part
 
 if TYPE_CHECKING:
     from enum import StrEnum
@@ -23,23 +24,8 @@ if TYPE_CHECKING:
     from regrasp.interfaces.fault import Fault, When
     from regrasp.sim.world import World
 
-T = TypeVar("T")
-NOTHING: tuple[Any, ...] = ()
 
-
-class Part(Generic[T]):
-    """A part of a task that is imported when it is asked for. `at` is "module:attribute"."""
-
-    def __init__(self, at: str) -> None:
-        self._module, _, self._attribute = at.partition(":")
-
-    def __call__(self) -> T:
-        """The part itself."""
-        part: T = getattr(import_module(self._module), self._attribute)
-        return part
-
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Task:
     """A task. What is left out is what every task has."""
 
@@ -56,13 +42,14 @@ class Task:
     # What an obstacle, a `JitteredBox` in a cell and a gravity (None: unknown), overlaps: a name and a depth in m.
     obstacle_overlaps: Part["Callable[..., Iterable[tuple[str, float]]]"] | None = None
     expect: Part["type[Expect]"] = Part("regrasp.app.task.expect:Expect")
-    causes: Part["Iterable[StrEnum]"] = Part("regrasp.app.task.task:NOTHING")  # of its leaves' failures
+    causes: Part["Iterable[StrEnum]"] = Part("regrasp.app.task.part:NOTHING")  # of its leaves' failures
     when: Part["type[When]"] = Part("regrasp.interfaces.fault:When")
-    faults: Part["tuple[type[Fault], ...]"] = Part("regrasp.app.task.task:NOTHING")
+    faults: Part["tuple[type[Fault], ...]"] = Part("regrasp.app.task.part:NOTHING")
     service_calls: tuple[str, ...] = ()  # that the fault service_raises may break, besides those of every task
     services: Part["Callable[[World, int, Any], Services]"] = Part("regrasp.app.run.compose:build_services")
     judge: Part["type[Judge[Any]]"] = Part("regrasp.app.task.judge:Judge")
     belief: Part["Callable[[Any], dict[str, Any]]"] = Part("regrasp.app.task.belief:belief")  # for the record
     words: Part["Words"] = Part("regrasp.app.task.words:PLAIN")
     old_outcomes: Mapping[str, str] = field(default_factory=dict)  # of schema 1, and what is written today
+    old_cell_keys: Mapping[str, str] = field(default_factory=dict)  # of cell files from before there were sections
     commands: Part["Callable[[Any], None]"] | None = None  # adds the task's commands to the command line's Typer

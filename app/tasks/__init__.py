@@ -1,1 +1,1 @@
-"""Per task: what counts as success, and what the record tells of the robot's belief."""
+"""The tasks that come with the program: each in a folder, which nothing outside of it imports."""

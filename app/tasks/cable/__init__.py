@@ -1,1 +1,33 @@
-"""The cable task: expectations, the judge of them by ground truth, and the robot's belief for the record."""
+"""The cable task: two arms unplug a cable, lose its end, and get it back with cameras alone."""
+
+from regrasp.app.task.part import Part
+from regrasp.app.task.task import Task
+
+_HERE = "regrasp.app.tasks.cable"
+
+TASK = Task(
+    name="cable",
+    about="Unplug a cable's end and stow it in a clip; get it back whenever it is lost.",
+    objects=Part("regrasp.sim.cable.objects:CableObjects"),
+    cell=Part("regrasp.interfaces.cable.cell:CableCell"),
+    cell_findings=Part(f"{_HERE}.cell_layout:cell_findings"),
+    cell_names=Part(f"{_HERE}.cell_names:cell_names"),
+    obstacle_overlaps=Part(f"{_HERE}.placement:obstacle_overlaps"),
+    expect=Part(f"{_HERE}.expectations:Expect"),
+    causes=Part("regrasp.interfaces.cable.cause:CableCause"),
+    when=Part("regrasp.interfaces.cable.fault:CableWhen"),
+    faults=Part("regrasp.interfaces.cable.fault:FAULTS"),
+    service_calls=("perception.look", "motion.carry", "motion.pick"),
+    services=Part(f"{_HERE}.services:cable_services"),
+    judge=Part(f"{_HERE}.judge:CableJudge"),
+    belief=Part(f"{_HERE}.belief:belief"),
+    words=Part(f"{_HERE}.words:WORDS"),
+    old_outcomes={"stowed": "success", "safe_stop": "failure"},
+    old_cell_keys={
+        **{f"known.{key}": f"known.cable.{key}" for key in ("sockets", "plugged_into", "clip", "connector")},
+        "known.cable_length": "known.cable.length",
+        "hidden.connector_mass": "hidden.cable.connector_mass",
+        "hidden.connector_friction": "hidden.cable.connector_friction",
+    },
+    commands=Part(f"{_HERE}.cli:add_to"),
+)

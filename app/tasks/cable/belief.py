@@ -1,40 +1,28 @@
-"""The robot's belief as plain values, for the record."""
+"""The robot's belief about the cable, as plain values for the record."""
 
-from scipy.spatial.transform import RigidTransform
+from typing import TYPE_CHECKING, Any
 
-from regrasp.app.records.result import ArmState, BeliefState, Pose, Sighting
-from regrasp.behaviors.services import Services
-from regrasp.perception.pose.estimate import Estimate
+from regrasp.app.task.belief import arms, pose
 
-
-def belief_state(services: Services) -> BeliefState:
-    """What the robot knows now from its cameras and joint readings; lengths are rounded to 0.1 mm."""
-    belief, last = services.belief, services.perception.track.last
-    return BeliefState(
-        held=_pose(belief.held),
-        connector=_pose(belief.connector),
-        sure=belief.sure,
-        found_by=belief.found_by,
-        last_seen=None if last is None else _sighting(last),
-        arms={name: _arm(services, name) for name in services.motion.arms},
-        occupied_voxels=len(services.perception.occupancy.occupied_points()),
-        vain_searches=belief.vain_searches,
-        notices=tuple((round(notice.at, 6), notice.by) for notice in belief.notices),
-    )
+if TYPE_CHECKING:
+    from regrasp.behaviors.services import Services
 
 
-def _sighting(seen: Estimate) -> Sighting:
-    return Sighting(round(seen.stamp, 3), seen.camera, tuple(seen.position.round(4).tolist()))
+def belief(services: "Services") -> dict[str, Any]:
+    """What the robot knows now from its cameras and joint readings; lengths are rounded to 0.1 mm.
 
-
-def _arm(services: Services, name: str) -> ArmState:
-    tool = _pose(services.motion.tool(name))
-    assert tool is not None
-    return ArmState(tuple(services.motion.joints(name).round(4).tolist()), tool)
-
-
-def _pose(pose: RigidTransform | None) -> Pose | None:
-    if pose is None:
-        return None
-    turn = pose.rotation.as_quat(canonical=True).round(4).tolist()
-    return Pose(tuple(pose.translation.round(4).tolist()), tuple(turn))
+    `held` is tool_from_connector of the hand, `connector` world_from_connector as last found for a grasp.
+    """
+    known, last = services.belief, services.perception.track.last
+    return {
+        "held": known.held and pose(known.held),
+        "connector": known.connector and pose(known.connector),
+        "sure": known.sure,
+        "found_by": known.found_by,
+        "last_seen": last
+        and {"at": round(last.stamp, 3), "camera": last.camera, "position": last.position.round(4).tolist()},
+        "arms": arms(services),
+        "occupied_voxels": len(services.perception.occupancy.occupied_points()),
+        "vain_searches": known.vain_searches,
+        "notices": [[round(notice.at, 6), notice.by] for notice in known.notices],
+    }

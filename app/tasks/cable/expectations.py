@@ -1,11 +1,10 @@
-"""The expectations of a cable scenario as pydantic models."""
+"""The expectations of a cable scenario as a pydantic model."""
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field
 
-from regrasp.app.records.result import OLD_OUTCOMES
-from regrasp.interfaces.cause import CauseCode
+from regrasp.app.task import expect
 from regrasp.interfaces.fields import Model, NotNegative
 
 EndState = Literal["stowed", "plugged", "held", "lost"]
@@ -22,12 +21,9 @@ class PoseError(Model):
     ] = None
 
 
-class Expect(Model):
+class Expect(expect.Expect):
     """What must come out, by ground truth; what is left out is not looked at."""
 
-    outcome: Annotated[
-        Literal["success", "failure"], Field(description="How the tree ends the run.", examples=["failure"])
-    ] = "success"
     end: Annotated[
         EndState | None,
         Field(
@@ -35,8 +31,6 @@ class Expect(Model):
             examples=["plugged"],
         ),
     ] = None
-    cause: Annotated[CauseCode | None, Field(description="Why it failed.", examples=["search_exhausted"])] = None
-    sim_seconds: Annotated[NotNegative | None, Field(description="Simulated seconds at most.", examples=[120.0])] = None
     tries: Annotated[
         int | None,
         Field(ge=1, le=100, description="How often the hand takes hold at most; unplugging is one.", examples=[2]),
@@ -55,10 +49,6 @@ class Expect(Model):
             examples=[True],
         ),
     ] = None
-    unintended_force: Annotated[
-        NotNegative | None,
-        Field(description="Newtons at most between an arm and what it must not touch, all along.", examples=[5.0]),
-    ] = None
     pose_error: Annotated[
         PoseError | None,
         Field(
@@ -71,14 +61,3 @@ class Expect(Model):
     def end_state(self) -> EndState | None:
         """`end`, or what it is when it is left out."""
         return "stowed" if self.end is None and self.outcome == "success" else self.end
-
-    @field_validator("outcome", mode="before")
-    @classmethod
-    def _of_schema_1(cls, word: object) -> object:
-        return OLD_OUTCOMES.get(word, word) if isinstance(word, str) else word
-
-    @model_validator(mode="after")
-    def _cause_of_a_failure(self) -> Self:
-        if self.cause is not None and self.outcome == "success":
-            raise ValueError("a run that ends in success has no cause; write outcome: failure beside cause")
-        return self

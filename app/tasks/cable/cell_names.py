@@ -1,0 +1,22 @@
+"""The names in a cell that a tree of the cable task may refer to."""
+
+from regrasp.interfaces.cable.cell import PLUGGED_INTO, CableCell
+from regrasp.interfaces.quote import quoted
+from regrasp.perception.pose.technique import TECHNIQUES
+
+
+def cell_names(cell: CableCell | None) -> dict[str, dict[str, str]]:
+    """The names by kind, each with the reason why it cannot be used in this cell, or "".
+
+    Without a cell: the names that every cell has.
+    """
+    techniques: dict[str, str] = dict.fromkeys(TECHNIQUES, "")
+    if cell is None:
+        return {"technique": techniques}
+    cable = cell.known.cable
+    if cable.connector.tag is None:
+        techniques["fiducial"] = "needs a tag on the connector, and this cell's has none; take the cell thesis_tags"
+    plugged = cable.plugged_into
+    empty = f"is empty at the start: the cell's plugged_into is {quoted(plugged)}; write {PLUGGED_INTO}"
+    sockets = {socket.name: "" if socket.name == plugged else empty for socket in cable.sockets}
+    return {"socket": {PLUGGED_INTO: ""} | sockets, "technique": techniques}
