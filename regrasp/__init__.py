@@ -22,14 +22,14 @@ if TYPE_CHECKING:  # at run time `__getattr__` brings these when they are asked 
     from regrasp.app.records.record import OnEvent, Progress
     from regrasp.app.records.result import Result as Result
     from regrasp.app.scenario.load import Scenario as Scenario
-    from regrasp.interfaces.cell import CableCell as CableCell
+    from regrasp.interfaces.cell import Cell as Cell
     from regrasp.interfaces.frame import Intrinsics as Intrinsics
     from regrasp.interfaces.frame import RgbdFrame as RgbdFrame
     from regrasp.perception.pose.estimate import Estimate as Estimate
     from regrasp.perception.pose.estimate import NoEstimate as NoEstimate
 
 _TYPES = {
-    "CableCell": "regrasp.interfaces.cell",
+    "Cell": "regrasp.interfaces.cell",
     "Estimate": "regrasp.perception.pose.estimate",
     "Finding": "regrasp.app.files.findings",
     "Findings": "regrasp.app.files.findings",
@@ -41,7 +41,7 @@ _TYPES = {
     "Scenario": "regrasp.app.scenario.load",
 }
 __all__ = [
-    "CableCell",
+    "Cell",
     "Estimate",
     "Finding",
     "Findings",
@@ -257,7 +257,7 @@ def read_record(folder: str | Path) -> RunRecord:
     return read_record(Path(folder))
 
 
-def load_cell(cell: str | Path = "thesis", overrides: Sequence[str] = ()) -> CableCell:
+def load_cell(cell: str | Path = "thesis", overrides: Sequence[str] = ()) -> Cell:
     """Read and check a cell: a shipped one by its name, or a .yaml file by its path.
 
     `overrides` are assignments such as "known.cable.connector.length=0.08".
@@ -305,7 +305,7 @@ def estimate_pose(
     world_from_camera: RigidTransform | None = None,
     *,
     technique: Literal["rgbd", "fiducial", "detector", "fused"] = "fused",
-    cell: CableCell | str | Path = "thesis",
+    cell: Cell | str | Path = "thesis",
 ) -> Estimate | NoEstimate:
     """Find the connector in a frame.
 
@@ -326,9 +326,13 @@ def estimate_pose(
     from scipy.spatial.transform import RigidTransform
 
     from regrasp.app.tasks.cable.perceive import without_boxes
+    from regrasp.interfaces.cable.cell import CableCell
     from regrasp.perception.pose.technique import make_technique
 
-    known = (load_cell(cell) if isinstance(cell, (str, Path)) else cell).known
+    loaded = load_cell(cell) if isinstance(cell, (str, Path)) else cell
+    if not isinstance(loaded, CableCell):
+        raise ValueError("the cell has no section known.cable, which tells of the connector; take the cell thesis")
+    known = loaded.known
     if world_from_camera is not None and not (
         isinstance(world_from_camera, RigidTransform) and world_from_camera.single
     ):

@@ -6,13 +6,14 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from regrasp.app.cli import calibrate, detector, migrate, perceive, records, run, scenarios, studies, trees
+from regrasp.app.cli import calibrate, migrate, records, run, scenarios, trees
 from regrasp.app.cli.options import EXIT_BAD_INPUT, EXIT_UNMET
 from regrasp.app.files.findings import Findings
 from regrasp.app.interrupts import EXIT_INTERRUPTED
+from regrasp.app.task.find import tasks
 from regrasp.interfaces.quote import MAX_QUOTE, cut, printable
 
-COMMANDS = (  # in the order in which a newcomer uses them
+COMMANDS = (  # in the order in which a newcomer uses them; those that only a task has come last
     "run",
     "explain",
     "replay",
@@ -23,10 +24,7 @@ COMMANDS = (  # in the order in which a newcomer uses them
     "study",
     "doctor",
     "snapshot",
-    "perceive",
     "calibrate",
-    "evaluate-detector",
-    "train-detector",
 )
 
 
@@ -34,7 +32,7 @@ class _Group(TyperGroup):
     """Prints the findings of any command on stderr, one per line, and sets the exit code, also after Ctrl-C."""
 
     def list_commands(self, ctx: Any) -> list[str]:
-        return sorted(super().list_commands(ctx), key=COMMANDS.index)
+        return sorted(super().list_commands(ctx), key=(*COMMANDS, *self.commands).index)
 
     def invoke(self, ctx: Any) -> Any:
         try:
@@ -63,11 +61,13 @@ run.add_to(app)
 records.add_to(app)
 app.add_typer(scenarios.app, name="scenarios")
 app.add_typer(trees.app, name="trees")
-app.add_typer(studies.app, name="study")
-perceive.add_to(app)
+study = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Run many episodes or scenes, and count.")
+app.add_typer(study, name="study")
 calibrate.add_to(app)
 migrate.add_to(app)
-detector.add_to(app)
+for task in tasks():
+    if task.commands is not None:
+        task.commands()(app, study)
 
 
 def _version(wanted: bool) -> None:
@@ -84,7 +84,7 @@ def _root(
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
     ] = False,
 ) -> None:
-    """Two simulated arms unplug a cable, lose its end, and get it back with cameras alone.
+    """Robots in a simulated cell do a task by a behaviour tree, with what goes wrong on the way.
 
     \b
       regrasp doctor                           is this machine ready?

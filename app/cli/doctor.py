@@ -9,10 +9,13 @@ from ctypes.util import find_library
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
+from regrasp.app.files.findings import Findings
 from regrasp.app.files.resources import shipped
 from regrasp.app.records import folders
+from regrasp.app.task import find
+from regrasp.behaviors.registry import leaf_set
 
 if TYPE_CHECKING:
     from regrasp.sim.world import World
@@ -41,6 +44,7 @@ def checks(out: Path = Path("runs")) -> Iterator[Check]:
     yield python(sys.version_info[:3])
     yield Check("platform", "ok", platform.platform())
     yield from (package(name) for name in (*PACKAGES, "opencv-python-headless"))
+    yield from (task(name) for name in find.names())
     yield Check("processors", "ok", str(os.cpu_count()))
     yield output_folder(out)
     yield egl(find_library)
@@ -63,6 +67,18 @@ def package(name: str) -> Check:
         return Check(name, "wrong", "not installed; run make setup")
 
 
+def task(name: str) -> Check:
+    """Whether the task can be loaded, with its leaves."""
+    try:
+        about = find.task_named(name).about
+        leaf_set(name)
+    except Findings as error:
+        return Check(f"task {name}", "wrong", error.items[0].message)
+    except Exception as error:  # any error of its package is what the user must read
+        return Check(f"task {name}", "wrong", f"its leaves cannot be loaded: {type(error).__name__}: {error}")
+    return Check(f"task {name}", "ok", about)
+
+
 def output_folder(out: Path) -> Check:
     """Whether runs can be written below `out`."""
     wrong = folders.run_folder_findings(out / "doctor")
@@ -78,25 +94,28 @@ def egl(find: Callable[[str], str | None]) -> Check:
 def renderer() -> Check:
     """Build the shipped cell's world, which needs all of the above.
 
-    Says how long the rear camera's picture takes.
+    Says how long a camera's picture takes.
     """
-    from regrasp.app.scenario.cell_file import load_cell
+    from regrasp.app.scenario.cell_file import load_cell, tasks_of
 
     try:
         from regrasp.sim.world import World
 
-        world = World(load_cell(shipped("cell")["thesis"]), "zero", seed=0)
+        path = next(iter(shipped("cell").values()))
+        task = find.task_named(tasks_of(path)[0])
+        cell = load_cell(path, task=task)
+        world = World(cell, "zero", 0, task.objects()(cell))
         seen, seconds = world.renderer, _picture_seconds(world)
         world.close()
     except Exception as error:  # any error is what the user must read
         return Check("renderer", "wrong", f"no world can be built: {type(error).__name__}: {error}")
-    text = f"{seen.name}, {1e3 * seconds:.0f} ms for a picture of the rear camera; {seen.device}"
+    text = f"{seen.name}, {1e3 * seconds:.0f} ms for a picture of a camera; {seen.device}"
     return Check("renderer", "ok" if seconds < SLOW_PICTURE else "slow", text)
 
 
-def _picture_seconds(world: "World") -> float:
-    """The least wall-clock time of ten pictures of the rear camera, each with its shadows drawn anew."""
-    camera = world.cameras["rear"]
+def _picture_seconds(world: "World[Any]") -> float:
+    """The least wall-clock time of ten pictures of the first camera, each with its shadows drawn anew."""
+    camera = next(iter(world.cameras.values()))
     pose, intrinsics, light = camera.true_pose(), camera.spec.intrinsics, world.light
     took = []
     for _ in range(11):  # the first one may be compiled

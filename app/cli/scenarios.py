@@ -98,6 +98,9 @@ def print_schema(
     as_markdown: Annotated[
         bool, typer.Option("--markdown", help="A reference to read: each field, its meaning and an example.")
     ] = False,
+    task: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Of which task; by default the first by the alphabet.")
+    ] = None,
 ) -> None:
     """Print what a scenario file may say.
 
@@ -115,9 +118,11 @@ def print_schema(
       regrasp scenarios schema --markdown
     """
     from regrasp.app.files.schema_doc import markdown
-    from regrasp.app.scenario.schema import ScenarioFile, json_schema
+    from regrasp.app.scenario.schema import json_schema, scenario_model
+    from regrasp.app.task import find
 
+    chosen = find.task_named(task or find.names()[0], ("--task", 0))
     if as_markdown:
-        typer.echo(markdown(ScenarioFile.model_json_schema()))
+        typer.echo(markdown(scenario_model(chosen).model_json_schema()))
     else:
-        typer.echo(json.dumps(json_schema(), indent=2, ensure_ascii=False))
+        typer.echo(json.dumps(json_schema(chosen), indent=2, ensure_ascii=False))

@@ -126,14 +126,9 @@ def result_of(run: Run, done: Done[Result]) -> Result:
     code = CauseCode.WALL_LIMIT if done.timed_out else CauseCode.INTERNAL_ERROR
     outcome: Outcome = "wall_limit" if done.timed_out else "internal_error"
     cause = Cause(code, done.error)
+    scenario = run.scenario
     result = Result(
-        run.scenario.name,
-        run.seed,
-        outcome,
-        succeeded=False,
-        task=run.scenario.file.TASK,
-        case=run.scenario.case,
-        cause=cause,
+        scenario.name, run.seed, outcome, succeeded=False, task=scenario.file.TASK, case=scenario.case, cause=cause
     )
     return finish_killed(run.folder, result) if run.folder else result
 
@@ -164,13 +159,5 @@ def row_of(run: Run, done: Done[Result]) -> Row:
 def failure_words(result: Result) -> str:
     """Why a run did not come out as expected, in words: its cause and each unmet expectation."""
     cause = [f"{result.cause.code}: {result.cause.message}"] if result.cause else []
-    return "; ".join(
-        [
-            *cause,
-            *(
-                f"{e.name} is {e.value}, expected {limit_words(e, result.task)}"
-                for e in result.expectations
-                if not e.met
-            ),
-        ]
-    )
+    unmet = (e for e in result.expectations if not e.met)
+    return "; ".join([*cause, *(f"{e.name} is {e.value}, expected {limit_words(e, result.task)}" for e in unmet)])

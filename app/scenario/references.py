@@ -13,6 +13,7 @@ from regrasp.app.files.yaml_lines import Document
 from regrasp.app.scenario.schema import TreeInput
 from regrasp.app.scenario.tree_file import names_of
 from regrasp.interfaces.cell import Cell
+from regrasp.interfaces.fault import JawFault
 from regrasp.interfaces.quote import cut, nearest, quoted
 from regrasp.trees import TreeSyntaxError, check_inputs, read_graph
 
@@ -69,12 +70,13 @@ def _obstacles(document: Document) -> Iterator[Finding]:
 
 
 def _devices(document: Document, cell: Cell | None) -> Iterator[Finding]:
-    """Arms and cameras that faults name; an arm that a jaw's fault leaves out is the right one."""
+    """Arms and cameras that faults name; a jaw's fault that leaves the arm out has a default."""
     if cell is None:
         return
     known = {"arm": [arm.name for arm in cell.known.arms], "camera": [camera.name for camera in cell.known.cameras]}
     for i, fault in _faults(document):
-        given = {"arm": "right"} | fault if str(fault.get("type")).startswith("jaw_") else fault
+        jaw = {"arm": JawFault.model_fields["arm"].default} if str(fault.get("type")).startswith("jaw_") else {}
+        given = {**jaw, **fault}
         for key, names in known.items():
             name = given.get(key)
             if isinstance(name, str) and name not in names:

@@ -52,4 +52,5 @@ class Task:
     words: Part["Words"] = Part("regrasp.app.task.words:PLAIN")
     old_outcomes: Mapping[str, str] = field(default_factory=dict)  # of schema 1, and what is written today
     old_cell_keys: Mapping[str, str] = field(default_factory=dict)  # of cell files from before there were sections
-    commands: Part["Callable[[Any], None]"] | None = None  # adds the task's commands to the command line's Typer
+    # Adds commands to the command line, and to `regrasp study`, both of them Typer's.
+    commands: Part["Callable[[Any, Any], None]"] | None = None

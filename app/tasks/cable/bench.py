@@ -20,10 +20,10 @@ from regrasp.app.files.resources import shipped
 from regrasp.app.run.attempts import Attempts
 from regrasp.app.run.batch import Run, run_all
 from regrasp.app.run.tick_log import TickLog
-from regrasp.app.scenario.cell_file import load_cell
 from regrasp.app.scenario.load import cases, load_scenario
 from regrasp.app.studies.table import print_table
 from regrasp.app.studies.wall_parts import PARTS_HEADER, part_lines
+from regrasp.app.tasks.cable.cells import cable_cell
 from regrasp.app.tasks.cable.studies.demo import SCENARIOS
 from regrasp.app.tasks.cable.studies.planner_bench import print_planner_bench
 from regrasp.behaviors import LEAVES
@@ -176,7 +176,7 @@ def tag_techniques(width: int) -> tuple[Call, Call]:
 
     These are the search for the tag, the fit of its edges, and its two poses.
     """
-    cell = load_cell(shipped("cell")["thesis_tags"])
+    cell = cable_cell("thesis_tags")
     frame, pose = rear_frame(cell, width)
     technique = make_technique("fiducial", cell.known)
     dictionary, fitting = (

@@ -2,18 +2,22 @@
 
 from collections import deque
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
+from regrasp.behaviors.cable.services import CableServices
+from regrasp.sim.cable.ground_truth import CableTruth
+from regrasp.sim.cable.objects import CableObjects
 
-from regrasp.app.records.result import Expectation, Slip
+from regrasp.app.task.expectation import Expectation
+from regrasp.app.task.judge import Judge, at_most
 from regrasp.app.tasks.cable.expectations import EndState, Expect
-from regrasp.behaviors.services import Belief
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.wall_time import counts_as
 from regrasp.sim.cable.phase import ConditionTimer, PhaseParameters
-from regrasp.sim.ground_truth import GroundTruth
+from regrasp.sim.world import World
 
 
 @dataclass(frozen=True)
@@ -42,12 +46,28 @@ class GripWatch:
         self.sliding.update(now, moved >= self._parameters.slide_distance)
 
 
-class Judge:
-    """Watches the ground truth at every tick; at the end it compares with the scenario's expectations."""
+@dataclass(frozen=True)
+class Slip:
+    """One loss of the connector, in simulated seconds; None: it was not noticed."""
 
-    def __init__(self, truth: GroundTruth, expect: Expect, parameters: JudgeParameters = JudgeParameters()) -> None:
-        self._truth, self._expect, self._parameters = truth, expect, parameters
-        self._now = 0.0
+    released_at: float
+    detected_at: float | None
+    detected_by: str | None
+
+
+class CableJudge(Judge[Expect]):
+    """Watches the connector at every tick; at the end it compares with the scenario's expectations."""
+
+    def __init__(
+        self,
+        world: World[CableObjects],
+        services: CableServices,
+        expect: Expect,
+        parameters: JudgeParameters = JudgeParameters(),
+    ) -> None:
+        super().__init__(world, services, expect)
+        self._truth, self._parameters = CableTruth(world), parameters
+        self._cable = world.objects.cell.known.cable
         self._was_held = False
         self._held = ConditionTimer()  # both pads touch it
         self._grip = GripWatch(parameters)
@@ -59,10 +79,9 @@ class Judge:
         self.found_by: str | None = None  # the camera that found the connector first after its loss
 
     @counts_as("record")
-    def observe(self, now: float, belief: Belief) -> None:
+    def observe(self, now: float) -> None:
         """Update with the ground truth after a tick at second `now`."""
-        self._now = now
-        self.found_by = self.found_by or belief.found_by
+        self.found_by = self.found_by or self.services.belief.found_by
         if self._truth.held():
             self._watch_hold(now)
             return
@@ -76,7 +95,7 @@ class Judge:
         if self.losses and not self._was_held and self.settled_pixels is None:
             slow = self._truth.connector_speed() <= PhaseParameters.still_speed
             if self._still.update(now, slow) >= PhaseParameters.still_seconds:
-                self.settled_pixels = self._truth.connector_pixels("rear")
+                self.settled_pixels = self._truth.connector_pixels(self._cable.overview)
 
     def _watch_hold(self, now: float) -> None:
         held_seconds = self._held.update(now, True)
@@ -88,34 +107,26 @@ class Judge:
             self.grasps += 1
             self._was_held = True
 
-    def slips(self, belief: Belief) -> tuple[Slip, ...]:
+    def slips(self) -> tuple[Slip, ...]:
         """Each real loss, with the first notice after it and before the next one.
 
         A loss begins when the connector slides in the jaw: the robot may notice this before the last pad lets go.
         """
         slips = []
         for released, end in pairwise([*self.losses, float("inf")]):
-            notice = next((n for n in belief.notices if released <= n.at < end), None)
+            notice = next((n for n in self.services.belief.notices if released <= n.at < end), None)
             slips.append(Slip(released, notice.at if notice else None, notice.by if notice else None))
         return tuple(slips)
 
-    def expectations(self, outcome: str, cause: str | None, belief: Belief) -> tuple[Expectation, ...]:
-        """Every expectation of the scenario, met or not, given how the run ended and what the robot believes."""
-        wanted = self._expect
-        found = [Expectation("outcome", outcome == wanted.outcome, outcome, wanted.outcome)]
-        if wanted.end_state is not None:
+    def measured(self) -> dict[str, Any]:
+        """The slips."""
+        return {"slips": [asdict(slip) for slip in self.slips()]}
+
+    def states(self) -> Iterator[Expectation]:
+        """Where the connector is at the end."""
+        if (wanted := self.expect.end_state) is not None:
             end = self._end_state()
-            found.append(Expectation("end", end == wanted.end_state, end, wanted.end_state))
-        if wanted.cause is not None:
-            found.append(Expectation("cause", cause == wanted.cause, cause, wanted.cause.value))
-        if wanted.slips is not None:
-            noticed = sum(slip.detected_at is not None for slip in self.slips(belief))
-            met = noticed >= wanted.slips and noticed == len(self.losses)
-            found.append(Expectation("slips", met, noticed, wanted.slips))
-        if wanted.hidden is not None:
-            hidden = self.settled_pixels == 0 and self.found_by == "wrist"
-            found.append(Expectation("hidden", hidden == wanted.hidden, hidden, wanted.hidden))
-        return (*found, *self._limits(belief))
+            yield Expectation("end", end == wanted, end, wanted)
 
     def _end_state(self) -> EndState:
         if self._truth.stowed():
@@ -124,26 +135,26 @@ class Judge:
             return "plugged"
         return "held" if self._truth.held() else "lost"
 
-    def _limits(self, belief: Belief) -> Iterator[Expectation]:
-        """The expectations that are upper limits."""
-        wanted = self._expect
-        yield from _at_most("sim_seconds", self._now, wanted.sim_seconds)
-        yield from _at_most("tries", self.grasps, wanted.tries)
-        yield from _at_most("detection_delay", self._longest_delay(belief), wanted.detection_delay)
-        peak = max(self._truth.contact_peaks().values(), default=0.0)
-        yield from _at_most("unintended_force", peak, wanted.unintended_force)
+    def limits(self) -> Iterator[Expectation]:
+        """Losses and how soon they were noticed, then the limits of every task, then the seat's error."""
+        wanted = self.expect
+        if wanted.slips is not None:
+            noticed = sum(slip.detected_at is not None for slip in self.slips())
+            met = noticed >= wanted.slips and noticed == len(self.losses)
+            yield Expectation("slips", met, noticed, wanted.slips)
+        if wanted.hidden is not None:
+            hidden = self.settled_pixels == 0 and self.found_by == self._cable.search
+            yield Expectation("hidden", hidden == wanted.hidden, hidden, wanted.hidden)
+        yield from at_most("tries", self.grasps, wanted.tries)
+        yield from at_most("detection_delay", self._longest_delay(), wanted.detection_delay)
+        yield from super().limits()
         if wanted.pose_error is not None:
             position, angle_deg = self._truth.seat_error()
-            yield from _at_most("pose_error.position", position, wanted.pose_error.position)
-            yield from _at_most("pose_error.angle_deg", angle_deg, wanted.pose_error.angle_deg)
+            yield from at_most("pose_error.position", position, wanted.pose_error.position)
+            yield from at_most("pose_error.angle_deg", angle_deg, wanted.pose_error.angle_deg)
 
-    def _longest_delay(self, belief: Belief) -> float | None:
+    def _longest_delay(self) -> float | None:
         """The longest time (s) from a loss to its notice; 0 without a loss, None if one was not noticed."""
-        delays = [None if s.detected_at is None else s.detected_at - s.released_at for s in self.slips(belief)]
+        delays = [None if s.detected_at is None else s.detected_at - s.released_at for s in self.slips()]
         known = [delay for delay in delays if delay is not None]
         return max(known, default=0.0) if len(known) == len(delays) else None
-
-
-def _at_most(name: str, value: float | None, limit: float | None) -> Iterator[Expectation]:
-    if limit is not None:
-        yield Expectation(name, value is not None and value <= limit, value and round(value, 4), limit)

@@ -22,7 +22,8 @@ def _belief_lines(belief: Mapping[str, Any]) -> Iterator[str]:
     else:
         yield "connector not found since it was lost, or never lost"
     if seen := belief["last_seen"]:
-        yield f"connector seen last at {seen['at']:.2f} s by the {seen['camera']} camera at {numbers(seen['position'])} m"
+        at, where = f"{seen['at']:.2f} s", numbers(seen["position"])
+        yield f"connector seen last at {at} by the {seen['camera']} camera at {where} m"
     yield f"searches in vain since then: {belief['vain_searches']}"
     yield from robot_lines(belief)
     for at, by in belief["notices"]:

@@ -123,9 +123,9 @@ def evaluate_detector(
 
 
 def _load(cell: str) -> "CableCell":
-    from regrasp.app.scenario.cell_file import load_cell
+    from regrasp.app.tasks.cable.cells import cable_cell
 
-    return load_cell(resolve("cell", cell, Path()))
+    return cable_cell(resolve("cell", cell, Path()))
 
 
 def _detector(cell: "CableCell", model: Path | None) -> Any:

@@ -94,7 +94,7 @@ def perceive(
     \b
     Exit code: 0 found, 1 not found, 2 bad input.
     """
-    from regrasp.app.scenario.cell_file import load_cell
+    from regrasp.app.tasks.cable.cells import cable_cell
 
     count, wrong = len(rgb), list[Finding]()
     none = [None] * count
@@ -107,7 +107,7 @@ def perceive(
     tint = None if color is None else _color(color, wrong)
     if wrong:
         raise Findings(wrong)
-    known = load_cell(resolve("cell", cell, Path()), laid_out=False).known
+    known = cable_cell(resolve("cell", cell, Path()), laid_out=False).known
     given = {"color": tint, "length": length, "radius": radius}
     told = {key: value for key, value in given.items() if value is not None}
     connector = known.cable.connector.model_copy(update=told)

@@ -1,4 +1,4 @@
-"""`regrasp study`: many episodes or scenes, counted."""
+"""The cable task's studies in `regrasp study`."""
 
 import math
 import os
@@ -14,10 +14,13 @@ from regrasp.app.interrupts import late_imports
 from regrasp.app.records import folders
 from regrasp.interfaces.quote import nearest, quoted
 
-app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Run many episodes or scenes, and count.")
+
+def add_to(study: typer.Typer) -> None:
+    """Add the studies to `regrasp study`."""
+    for command in (demo, pose, coverage):
+        study.command(command.__name__)(command)
 
 
-@app.command("demo")
 def demo(
     seeds: Annotated[str, typer.Option(metavar="A:B", help="Seeds from A up to, not including, B.")],
     jobs: Annotated[int, typer.Option(min=1, help="Episodes side by side.")] = os.cpu_count() or 1,
@@ -52,7 +55,6 @@ CellName = Annotated[
 ]
 
 
-@app.command("pose")
 def pose(
     seeds: Annotated[str, typer.Option(metavar="A:B", help="Trials: seeds from A up to, not including, B.")] = "0:3",
     techniques: Techniques = None,
@@ -97,7 +99,6 @@ def pose(
     raise typer.Exit(run_pose(setups, chosen, jobs, out, shown_ones, both_cameras))
 
 
-@app.command("coverage")
 def coverage(
     seeds: Annotated[str, typer.Option(metavar="A:B", help="Scenes: seeds from A up to, not including, B.")] = "0:200",
     techniques: Techniques = None,

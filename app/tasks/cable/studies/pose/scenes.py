@@ -17,7 +17,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from regrasp.app.files.findings import Findings
 from regrasp.app.files.overrides import parse_overrides
 from regrasp.app.files.resources import resolve
-from regrasp.app.scenario.cell_file import load_cell
+from regrasp.app.tasks.cable.cells import cable_cell
 from regrasp.interfaces.cable.cell import CableCell
 from regrasp.interfaces.cell import Box, FixedMount
 from regrasp.interfaces.frame import RgbdFrame
@@ -92,7 +92,7 @@ def study_cell(name: str = "thesis", overrides: Sequence[str] = (), cable_stiffn
     assignments, wrong = parse_overrides([f"hidden.cable.stiffness.zero={cable_stiffness}", *overrides])
     if wrong:
         raise Findings(wrong)
-    return load_cell(resolve("cell", name, Path()), assignments)
+    return cable_cell(resolve("cell", name, Path()), assignments)
 
 
 def frames(

@@ -1,4 +1,7 @@
-"""`python -m regrasp.app.tasks.cable.studies.pose.sheet FILE`: the pose study's configurations as one image, colour above depth."""
+"""The pose study's configurations as one image, colour above depth.
+
+python -m regrasp.app.tasks.cable.studies.pose.sheet FILE
+"""
 
 import sys
 
