@@ -72,7 +72,7 @@ class When(Model):
 class Fault(Model):
     """Base of all faults."""
 
-    type: str
+    type: str = Field(description="Which fault.", examples=["jaw_opens"])
     when: When = Field(description="When it begins.", examples=[{"at": [5.0, 8.0]}])
 
 

@@ -57,13 +57,13 @@ class Document:
         self.move(path, (*path[:-1], name))
 
     def move(self, path: Path, new: Path) -> None:
-        """Move the value at `path`, which must exist, to `new`; mappings on the way are added."""
+        """Move the value at `path`, which must exist, to `new`; missing mappings on the way are added."""
         parent: Any = self.value
         for step in path[:-1]:
             parent = parent[step]
         value, parent = parent.pop(path[-1]), self.value
         for length, step in enumerate(new[:-1], 1):
-            if not isinstance(parent.get(step), dict):
+            if isinstance(parent, dict) and parent.get(step) is None:
                 parent[step] = {}
                 self.places.setdefault(new[:length], self.place(path))
             parent = parent[step]

@@ -17,7 +17,7 @@ from regrasp.app.files.yaml_lines import Path as KeyPath
 from regrasp.app.scenario.old_words import OldWordWarning
 from regrasp.app.task import find
 from regrasp.interfaces.cell import Cell, WristMount
-from regrasp.interfaces.quote import MAX_QUOTE, cut, nearest, quoted
+from regrasp.interfaces.quote import nearest, quoted
 
 if TYPE_CHECKING:
     from regrasp.app.task.task import Task
@@ -43,8 +43,9 @@ def load_cell(
     """
     document = _read(path, where)
     assignments = [_with_new_key(assignment) for assignment in assignments]
-    fits = isinstance(document.value, dict)  # else only that is reported, not the assignments
-    _, found = catch_findings(apply_assignments, document, assignments if fits else ())
+    if not isinstance(document.value, dict):  # only that is told, not the assignments
+        validated(document, Cell)
+    _, found = catch_findings(apply_assignments, document, assignments)
     if task is None:
         task = find.task_named(_only_task(document, shown(path)))
     model = task.cell()
@@ -64,8 +65,9 @@ def load_cell(
 def tasks_of(path: Path, assignments: Sequence[Assignment] = (), where: Place | None = None) -> list[str]:
     """The tasks whose sections a cell file holds. Raises `Findings` if it cannot be read."""
     document = _read(path, where)
-    if isinstance(document.value, dict):
-        catch_findings(apply_assignments, document, [_with_new_key(assignment) for assignment in assignments])
+    if not isinstance(document.value, dict):
+        validated(document, Cell)
+    catch_findings(apply_assignments, document, [_with_new_key(assignment) for assignment in assignments])
     return _sections(document)
 
 
@@ -190,6 +192,6 @@ def _misnamed(document: Document, cell: Cell) -> Iterator[Finding]:
     for i, camera in enumerate(known.cameras):
         if isinstance(camera.mount, WristMount) and camera.mount.arm not in groups["arms"]:
             path: KeyPath = ("known", "cameras", i, "mount", "arm")
-            arms = groups["arms"]
-            right = nearest(camera.mount.arm, arms) if arms else "this cell has none"
-            yield Finding(*document.place(path), f"no arm {quoted(cut(camera.mount.arm, MAX_QUOTE))}; {right}")
+            arms, arm = groups["arms"], camera.mount.arm
+            right = nearest(arm, arms) if arms else "this cell has none"
+            yield Finding(*document.place(path), f"known.cameras.{i}.mount.arm: no arm {quoted(arm)}; {right}")

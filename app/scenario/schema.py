@@ -128,13 +128,6 @@ class ScenarioFile(Model):
     TASK: ClassVar[str] = ""  # of the model of a task's files
 
     description: Annotated[str, Field(description="A sentence for the list.", examples=["The end is lost in sight."])]
-    task: Annotated[
-        str | None,
-        Field(
-            description="The job; left out: the one whose section the cell holds.",
-            examples=["cable"],
-        ),
-    ] = None
     cell: Annotated[
         str,
         Field(
@@ -142,6 +135,10 @@ class ScenarioFile(Model):
             examples=["thesis"],
         ),
     ]
+    task: Annotated[
+        str | None,
+        Field(description="The job; left out: the one whose section the cell holds.", examples=["cable"]),
+    ] = None
     tree: Annotated[
         str,
         Field(
@@ -219,7 +216,11 @@ def scenario_model(task: "Task") -> type[ScenarioFile]:
     causes = StrEnum("CauseCode", {code.name: code.value for code in (*CauseCode, *task.causes())})  # type: ignore[misc]
     base = task.expect()
     expect: Any = create_model(
-        "Expect", __base__=base, __doc__=base.__doc__, cause=(causes | None, base.model_fields["cause"])
+        "Expect",
+        __base__=base,
+        __doc__=base.__doc__,
+        __module__=base.__module__,
+        cause=(causes | None, base.model_fields["cause"]),
     )
     expect.OLD_OUTCOMES = task.old_outcomes
     fields: dict[str, Any] = {
@@ -246,12 +247,15 @@ def fault_types(task: "Task") -> dict[str, type[Fault]]:
 @cache
 def _for_task(fault: type[Fault], task: "Task") -> type[Fault]:
     """The fault's model, with what the task's faults may wait for, and the services that it has."""
-    when = create_model("When", __base__=task.when(), __doc__=task.when().__doc__)
+    base = task.when()
+    when = create_model("When", __base__=base, __doc__=base.__doc__, __module__=base.__module__)
     fields: dict[str, Any] = {"when": (when, fault.model_fields["when"])}
     if issubclass(fault, ServiceRaises):
         calls = Literal[(*task.service_calls, *SERVICE_CALLS)]  # type: ignore[valid-type]
         fields["service"] = (calls, fault.model_fields["service"])
-    model: Any = create_model(fault.__name__, __base__=fault, __doc__=fault.__doc__, **fields)
+    model: Any = create_model(
+        fault.__name__, __base__=fault, __doc__=fault.__doc__, __module__=fault.__module__, **fields
+    )
     made: type[Fault] = model
     return made
 

@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from regrasp.app.records.record import Record
-from regrasp.app.records.result import Expectation, Result
+from regrasp.app.records.result import Result
+from regrasp.app.task.expectation import Expectation
 from regrasp.interfaces.cable.cause import CableCause
 from regrasp.interfaces.cause import Cause
 

@@ -10,9 +10,10 @@ from py_trees.decorators import Retry
 from scripted import F, R, S, Script
 
 from regrasp.app.records.record import Record
-from regrasp.app.records.result import ArmState, BeliefState, Expectation, Pose, Result, Sighting, Slip
+from regrasp.app.records.result import Result
 from regrasp.app.run.attempts import Attempts
 from regrasp.app.run.tick_log import TickLog
+from regrasp.app.task.expectation import Expectation
 from regrasp.interfaces.cause import Cause
 
 TREE = """\
@@ -32,18 +33,18 @@ TREE = """\
   </BehaviorTree>
 </root>
 """
-POSE = Pose((0.1, 0.2, 0.3), (0.0, 0.0, 0.0, 1.0))
-BELIEF = BeliefState(
-    held=None,
-    connector=POSE,
-    sure=True,
-    found_by="wrist",
-    last_seen=Sighting(1.25, "rear", (0.3, 0.1, 0.4)),
-    arms={"left": ArmState((0.0,) * 6, POSE)},
-    occupied_voxels=1902,
-    vain_searches=2,
-    notices=((1.5, "gap"),),
-)
+POSE = {"position": [0.1, 0.2, 0.3], "quaternion": [0.0, 0.0, 0.0, 1.0]}
+BELIEF = {
+    "held": None,
+    "connector": POSE,
+    "sure": True,
+    "found_by": "wrist",
+    "last_seen": {"at": 1.25, "camera": "rear", "position": [0.3, 0.1, 0.4]},
+    "arms": {"left": {"joints": [0.0] * 6, "tool": POSE}},
+    "occupied_voxels": 1902,
+    "vain_searches": 2,
+    "notices": [[1.5, "gap"]],
+}
 
 
 def write_record(folder: Path, seed: int = 7, gap: float = 0.0443, **changes: Any) -> Path:
@@ -70,7 +71,8 @@ def write_record(folder: Path, seed: int = 7, gap: float = 0.0443, **changes: An
         "cause": attempts.cause(),
         "chain": attempts.failed_chain(),
         "expectations": (Expectation("outcome", False, "failure", "success"), Expectation("slips", True, 1, 1)),
-        "slips": (Slip(0.4, 0.5, "gap"),),
+        "task": "cable",
+        "measured": {"slips": [{"released_at": 0.4, "detected_at": 0.5, "detected_by": "gap"}]},
         "sim_seconds": clock[0],
         "belief": BELIEF,
         "attempts": tuple(attempts.made),

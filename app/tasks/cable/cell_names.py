@@ -1,11 +1,15 @@
 """The names in a cell that a tree of the cable task may refer to."""
 
-from regrasp.interfaces.cable.cell import PLUGGED_INTO, CableCell
+from typing import TYPE_CHECKING
+
 from regrasp.interfaces.quote import quoted
 from regrasp.perception.pose.technique import TECHNIQUES
 
+if TYPE_CHECKING:
+    from regrasp.interfaces.cable.cell import CableCell
 
-def cell_names(cell: CableCell | None) -> dict[str, dict[str, str]]:
+
+def cell_names(cell: "CableCell | None") -> dict[str, dict[str, str]]:
     """The names by kind, each with the reason why it cannot be used in this cell, or "".
 
     Without a cell: the names that every cell has.
@@ -13,6 +17,8 @@ def cell_names(cell: CableCell | None) -> dict[str, dict[str, str]]:
     techniques: dict[str, str] = dict.fromkeys(TECHNIQUES, "")
     if cell is None:
         return {"technique": techniques}
+    from regrasp.interfaces.cable.cell import PLUGGED_INTO  # late: it brings scipy
+
     cable = cell.known.cable
     if cable.connector.tag is None:
         techniques["fiducial"] = "needs a tag on the connector, and this cell's has none; take the cell thesis_tags"

@@ -16,9 +16,10 @@ from regrasp.app.cli.options import parse_seeds
 from regrasp.app.files.findings import Findings
 from regrasp.app.files.resources import shipped
 from regrasp.app.records.folders import new_folder
-from regrasp.app.records.result import Expectation, Result, Slip
+from regrasp.app.records.result import Result
 from regrasp.app.run.batch import Settings
 from regrasp.app.run.observers import Observers
+from regrasp.app.task.expectation import Expectation
 from regrasp.interfaces.cable.cause import CableCause
 from regrasp.interfaces.cause import Cause
 
@@ -41,7 +42,8 @@ def result(**changes: Any) -> Result:
         "outcome": "success",
         "succeeded": True,
         "expectations": (Expectation("slips", True, 1, 1), Expectation("unintended_force", True, 1.23456, 5.0)),
-        "slips": (Slip(12.0, 12.25, "gap"),),
+        "task": "cable",
+        "measured": {"slips": [{"released_at": 12.0, "detected_at": 12.25, "detected_by": "gap"}]},
         "sim_seconds": 80.0,
         "wall_seconds": 100.0,
         "real_time_factor": 0.8,
@@ -95,7 +97,7 @@ def test_quiet_shows_the_summary_alone(calls: list[SimpleNamespace]) -> None:
 def test_what_was_not_met_exits_1_with_the_cause(monkeypatch: pytest.MonkeyPatch) -> None:
     cause = Cause(CableCause.SEARCH_EXHAUSTED, "18 stops, nothing seen", "root/search")
     unmet = result(
-        outcome="failure", succeeded=False, cause=cause, expectations=(Expectation("slips", False, 0, 1),), slips=()
+        outcome="failure", succeeded=False, cause=cause, expectations=(Expectation("slips", False, 0, 1),), measured={}
     )
     use_episode(monkeypatch, lambda *_, **__: unmet)
     ran = invoke("run", "mine.yaml")

@@ -11,11 +11,12 @@ from regrasp.app.cli.commands import app
 from regrasp.app.cli.run_every import run_every
 from regrasp.app.files.findings import Findings
 from regrasp.app.records.record import Record
-from regrasp.app.records.result import Expectation, Result
+from regrasp.app.records.result import Result
 from regrasp.app.run.batch import Row, Run, Settings, row_of
 from regrasp.app.run.junit import write_junit
 from regrasp.app.run.processes import Done
 from regrasp.app.scenario.load import Scenario, cases, load_scenario
+from regrasp.app.task.expectation import Expectation
 from regrasp.interfaces.cable.cause import CableCause
 from regrasp.interfaces.cause import Cause
 

@@ -54,7 +54,7 @@ def test_the_page_of_a_run_that_stopped_safely(tmp_path: Path) -> None:
         "  lost at 0.40 s, noticed at 0.50 s by gap",
         "",
         "What the robot knew at the end",
-        "  the right hand holds nothing",
+        "  the hand holds nothing",
         "  connector found by the wrist camera at (0.100, 0.200, 0.300) m, all of it seen",
         "  connector seen last at 1.25 s by the rear camera at (0.300, 0.100, 0.400) m",
         "  searches in vain since then: 2",

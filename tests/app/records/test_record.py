@@ -8,19 +8,32 @@ import pytest
 from regrasp.app.files.findings import Findings
 from regrasp.app.files.whole_file import write_whole
 from regrasp.app.records.record import Record
-from regrasp.app.records.result import ArmState, Attempt, BeliefState, Expectation, Link, Pose, Result, Sighting, Slip
+from regrasp.app.records.result import Attempt, Link, Result
+from regrasp.app.task.expectation import Expectation
 from regrasp.interfaces.cause import Cause, CauseCode
 
 FIELDS = [
-    *("schema", "scenario", "seed", "outcome", "succeeded", "case", "cause", "chain", "traceback", "expectations"),
-    *("slips", "sim_seconds", "wall_seconds", "real_time_factor", "wall_by_part", "longest_tick"),
+    *(
+        "schema",
+        "scenario",
+        "seed",
+        "outcome",
+        "succeeded",
+        "task",
+        "case",
+        "cause",
+        "chain",
+        "traceback",
+        "expectations",
+    ),
+    *("measured", "sim_seconds", "wall_seconds", "real_time_factor", "wall_by_part", "longest_tick"),
     *("renderer", "versions", "belief", "attempts"),
 ]
 
 
 def test_the_documentation_names_every_field() -> None:
     told = (Path(__file__).parents[3] / "app" / "records" / "RECORD.md").read_text()
-    kinds = (Result, Cause, Link, Expectation, Slip, BeliefState, Pose, Sighting, ArmState, Attempt)
+    kinds = (Result, Cause, Link, Expectation, Attempt)
     fields = [field.name for kind in kinds for field in dataclasses.fields(kind)]
     assert [name for name in fields if f"`{name}`" not in told] == []
 
@@ -36,7 +49,7 @@ def a_result() -> Result:
             Expectation("unintended_force", False, np.float64(7.5), 5.0),
             Expectation("x", True, np.inf, None),
         ),
-        slips=(Slip(10.0, None, None),),
+        measured={"lit": np.float64(2.5)},
         sim_seconds=12.5,
     )
 
@@ -46,7 +59,7 @@ def test_the_result_file_has_exactly_its_fields(tmp_path: Path) -> None:
         record.finish(a_result())
     read = json.loads((tmp_path / "a" / "run" / "result.json").read_text())
     assert list(read) == FIELDS
-    assert read["schema"] == 2
+    assert read["schema"] == 3
     assert read["cause"] == {
         "code": "out_of_reach",
         "message": "0.82 m from the right arm, reach 0.75 m",
@@ -54,7 +67,7 @@ def test_the_result_file_has_exactly_its_fields(tmp_path: Path) -> None:
     }
     assert read["expectations"][0] == {"name": "unintended_force", "met": False, "value": 7.5, "limit": 5.0}
     assert read["expectations"][1]["value"] is None  # JSON has no infinity
-    assert read["slips"] == [{"released_at": 10.0, "detected_at": None, "detected_by": None}]
+    assert read["measured"] == {"lit": 2.5}
     assert {"python", "py_trees", "pybullet", "numpy", "opencv", "ompl"} <= set(read["versions"])
 
 

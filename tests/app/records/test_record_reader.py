@@ -76,7 +76,7 @@ def test_what_holds_no_run_is_one_finding(folder: Path, name: str) -> None:
         ("events.jsonl", '{"a":' * 100_000 + "\n", "events.jsonl:1: not JSON: recursion limit"),
         ("events.jsonl", "\x1b]0;mine\x07\n", "events.jsonl:1: not JSON"),
         ("result.json", '{\n "schema": 1,,\n}', "result.json:2: not JSON"),
-        ("result.json", '{"schema": 3}', "result.json:1: schema 3 is newer than 2"),
+        ("result.json", '{"schema": 4}', "result.json:1: schema 4 is newer than 3"),
         ("result.json", '{"scenario": "a"}', "result.json:1: no 'schema'"),
         ("result.json", '{"schema": 1, "scenario": "a"}', "result.json:1: seed"),
     ],

@@ -18,7 +18,7 @@ def test_a_cause_is_told_by_the_event_of_the_failure() -> None:
     assert [(c and c.code, c and c.message, c and c.node) for c in causes] == [("slipped", "gap 3 mm", "a/b")] * 2
 
 
-@pytest.mark.parametrize("values", [{}, {"code": "no such", "message": "x"}, {"code": "slipped", "message": 3}])
+@pytest.mark.parametrize("values", [{}, {"code": 3, "message": "x"}, {"code": "slipped", "message": 3}])
 def test_an_event_that_names_no_cause_names_none(values: dict[str, object]) -> None:
     [attempt] = attempts_from_ticks([NodeExecution("a", 0.0, 1.0, "FAILURE")], [Event(1.0, "failed", "a", values)])
     assert attempt.cause is None

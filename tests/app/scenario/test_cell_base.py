@@ -6,7 +6,7 @@ import pytest
 
 from regrasp.app.files.findings import Findings
 from regrasp.app.files.resources import shipped
-from regrasp.app.scenario.cell_file import load_cell
+from regrasp.app.tasks.cable.cells import cable_cell
 
 
 def cell(folder: Path, text: str) -> Path:
@@ -17,24 +17,24 @@ def cell(folder: Path, text: str) -> Path:
 
 def findings(path: Path) -> list[str]:
     with pytest.raises(Findings) as raised:
-        load_cell(path)
+        cable_cell(path)
     return [str(item).replace(f"{path.parent}/", "") for item in raised.value.items]
 
 
 def test_the_tagged_cell_is_the_thesiss_with_two_tags() -> None:
-    plain, tagged = (load_cell(shipped("cell")[name]) for name in ("thesis", "thesis_tags"))
+    plain, tagged = (cable_cell(shipped("cell")[name]) for name in ("thesis", "thesis_tags"))
     connector, clip = tagged.known.cable.connector, tagged.known.cable.clip
     assert connector.tag is not None
     assert clip.tag is not None
     assert connector.tag.number != clip.tag.number
     bare = {"connector": connector.model_copy(update={"tag": None}), "clip": clip.model_copy(update={"tag": None})}
-    assert tagged.model_copy(update={"known": tagged.known.model_copy(update=bare)}) == plain
+    assert tagged.model_copy(update={"known": tagged.known.with_cable(**bare)}) == plain
 
 
 def test_mappings_are_joined_and_lists_replaced(tmp_path: Path) -> None:
     box = "{name: back_panel, center: [1, 0, 0], size: [1, 1, 1]}"
-    text = f"base: thesis\nknown:\n  connector: {{radius: 0.012}}\n  boxes:\n    - {box}\n"
-    plain, mine = load_cell(shipped("cell")["thesis"]), load_cell(cell(tmp_path, text))
+    text = f"base: thesis\nknown:\n  cable: {{connector: {{radius: 0.012}}}}\n  boxes:\n    - {box}\n"
+    plain, mine = cable_cell(shipped("cell")["thesis"]), cable_cell(cell(tmp_path, text))
     assert mine.known.cable.connector == plain.known.cable.connector.model_copy(update={"radius": 0.012})
     assert [box.name for box in mine.known.boxes] == ["back_panel"]
     assert mine.hidden == plain.hidden
@@ -42,26 +42,28 @@ def test_mappings_are_joined_and_lists_replaced(tmp_path: Path) -> None:
 
 def test_a_base_may_be_a_file_beside_the_cell(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "below.yaml").write_text(shipped("cell")["thesis"].read_text())
-    path = cell(tmp_path, "base: below.yaml\nknown: {cable_length: 0.5}\n")
+    path = cell(tmp_path, "base: below.yaml\nknown: {cable: {length: 0.5}}\n")
     monkeypatch.chdir("/")
-    assert load_cell(path).known.cable.length == 0.5
+    assert cable_cell(path).known.cable.length == 0.5
 
 
 def test_what_is_wrong_is_told_where_it_stands(tmp_path: Path) -> None:
     source = shipped("cell")["thesis"].read_text()
-    (tmp_path / "below.yaml").write_text(source.replace("cable_length: 0.513", "cable_length: long"))
-    line = 1 + next(i for i, text in enumerate(source.splitlines()) if "cable_length" in text)
-    text = "base: below.yaml\nknown:\n  connector: {radius: -1, tag: {number: 50, size: 1e3}}\n  clip: 3\n"
+    (tmp_path / "below.yaml").write_text(source.replace("    length: 0.513", "    length: long"))
+    line = 1 + next(i for i, text in enumerate(source.splitlines()) if "length: 0.513" in text)
+    text = "base: below.yaml\nknown:\n cable:\n  connector: {radius: -1, tag: {number: 50, size: 1e3}}\n  clip: 3\n"
     assert findings(cell(tmp_path, text)) == [
-        f"below.yaml:{line}: known.cable.length is 'long'; expected a number (at least 0.0001, at most 10)",
-        "mine.yaml:3: '1e3' is text to YAML, not a number; write 1.0e+3",
-        "mine.yaml:3: key 'center' is missing in known.cable.connector.tag; "
-        "expected 3 values, each a number in metres, such as 0.3 (at least -5, at most 5)",
-        "mine.yaml:3: key 'plate' is missing in known.cable.connector.tag; expected a number (at least 0.0001, at most 10)",
-        "mine.yaml:3: known.cable.connector.radius is -1; "
+        f"below.yaml:{line}: known.cable.length is 'long'; "
         "expected a number in metres, such as 0.3 (at least 0.0001, at most 10)",
-        "mine.yaml:3: known.cable.connector.tag.number is 50; expected a whole number (at least 0, at most 49)",
-        "mine.yaml:4: known.cable.clip is 3; "
+        "mine.yaml:4: '1e3' is text to YAML, not a number; write 1.0e+3",
+        "mine.yaml:4: key 'center' is missing in known.cable.connector.tag; "
+        "expected 3 values, each a number in metres, such as 0.3 (at least -5, at most 5)",
+        "mine.yaml:4: key 'plate' is missing in known.cable.connector.tag; "
+        "expected a number (at least 0.0001, at most 10)",
+        "mine.yaml:4: known.cable.connector.radius is -1; "
+        "expected a number in metres, such as 0.3 (at least 0.0001, at most 10)",
+        "mine.yaml:4: known.cable.connector.tag.number is 50; expected a whole number (at least 0, at most 49)",
+        "mine.yaml:5: known.cable.clip is 3; "
         "expected a mapping of seat, axis, capture_distance, capture_angle_deg, hold_force, bracket, tag",
     ]
 

@@ -7,16 +7,16 @@ import numpy as np
 import pybullet as p
 import pytest
 import yaml
+from regrasp.sim.cable.objects import cable_world
 
 from regrasp.app.files.findings import Findings
 from regrasp.app.files.overrides import parse_overrides
 from regrasp.app.files.resources import shipped
 from regrasp.app.scenario.cell_file import load_cell
 from regrasp.app.scenario.load import load_scenario
-from regrasp.app.scenario.placement import cable_at_start
+from regrasp.app.tasks.cable.placement import cable_at_start
 from regrasp.interfaces.cable.cell import CableCell
 from regrasp.interfaces.scene import GRAVITIES, Gravity
-from regrasp.sim.world import World
 
 
 def findings(*overrides: str, scenario: str = "no_obstacle") -> list[str]:
@@ -30,17 +30,17 @@ def findings(*overrides: str, scenario: str = "no_obstacle") -> list[str]:
 @pytest.mark.parametrize(
     ("override", "expected"),
     [
-        ("known.plugged_into=back_3", "a cable 0.553 m long does not reach a connector in socket back_3, 0.582 m away"),
+        ("known.cable.plugged_into=back_3", "a cable 0.553 m long does not reach a connector in socket back_3, 0.582 m away"),
         ("hidden.cable.length=0.54", "a cable 0.54 m long does not reach a connector in socket back_4, 0.545 m away"),
-        ("known.plugged_into=right_1", "'right_1', the last socket, holds the cable's other end; name another"),
+        ("known.cable.plugged_into=right_1", "'right_1', the last socket, holds the cable's other end; name another"),
         ("known.arms.0.sleep.2=3", "3 rad is past the limits of the left arm's elbow; write one"),
         ("known.boxes.0.center.2=0.03", "floor reaches 0.050 m into the left arm's base; move one of them"),
         ("known.boxes.0.center.2=0.3", "no way to take hold of a connector in socket back_4: 1152 grasp candidates: "),
         ("known.boxes.0.center.2=0.48", "floor reaches 0.015 m into the stowed connector; move one of them"),
         ("known.cameras.0.mount.position=[0.5145, 0, 0.3]", "the rear camera is inside back_panel; move one of them"),
         ("known.arms.1.base=[0, 0.1, 0]", "the right arm's base reaches 0.079 m into the left arm's base; move one"),
-        ("known.cable.clip.seat=[0.2, 0.9, 0.4]", "the clip is 1.13 m from the right arm's shoulder, which reaches 0.80 m"),
-        ("known.connector={length: 0.09, radius: 0.05, color: [1, 0, 0]}", "back_panel reaches 0.015 m into the plug"),
+        ("known.cable.clip.seat=[0.2, 0.9, 0.4]", "the clip is 1.13 m from the right arm's shoulder, which reaches"),
+        ("known.cable.connector={length: 0.09, radius: 0.05, color: [1, 0, 0]}", "back_panel reaches 0.015 m into the plug"),
         ("known.cable.connector.radius=0.022", "a connector 44 mm thick does not fit the jaw, which opens"),
         ("known.boxes.0.name=back_panel", "2 boxes are named 'back_panel'; rename them"),
         ("known.cameras.0.mount.position=[-0.3, 0, -0.5]", "the rear camera sees neither the plugged connector"),
@@ -68,7 +68,7 @@ def test_an_obstacle_where_the_connector_is_to_be_stowed_is_told() -> None:
 @pytest.mark.parametrize("socket", ["back_1", "back_2"])
 def test_the_connector_may_begin_in_another_socket(socket: str) -> None:
     """A tree asks the cell where it is plugged in, unless an input names a socket, which then must be that one."""
-    plugged = f"cell.known.plugged_into={socket}"
+    plugged = f"cell.known.cable.plugged_into={socket}"
     assert findings(plugged) == findings(plugged, f"inputs.socket={socket}") == []
     [told] = findings(plugged, "inputs.socket=back_4")
     assert f"is 'back_4' here, which is empty at the start: the cell's plugged_into is '{socket}'" in told
@@ -97,8 +97,10 @@ def test_a_position_may_be_one_vector_or_one_for_each_gravity() -> None:
 @pytest.mark.parametrize("gravity", GRAVITIES)
 def test_the_cable_hangs_at_the_start_as_the_world_lays_it(cell: CableCell, gravity: Gravity) -> None:
     points = cable_at_start(cell, gravity)
-    world = World(cell, gravity, seed=0, renderer="software")
-    states = p.getLinkStates(world.cable.body, range(cell.hidden.cable.links), 1, 1, physicsClientId=world.client)
+    world = cable_world(cell, gravity, 0)
+    states = p.getLinkStates(
+        world.objects.cable.body, range(cell.hidden.cable.links), 1, 1, physicsClientId=world.client
+    )
     np.testing.assert_allclose(points[:-1], [state[4] for state in states], atol=0.003)
     world.close()
 

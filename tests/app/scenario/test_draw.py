@@ -4,8 +4,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from regrasp.app.scenario.sampling import draw_faults, draw_obstacles
-from regrasp.app.scenario.schema import ObstacleSpec, ScenarioFile
-from regrasp.interfaces.fault import JawOpens, When
+from regrasp.app.scenario.schema import ObstacleSpec, ScenarioFile, scenario_model
+from regrasp.app.tasks.cable import TASK
+from regrasp.interfaces.fault import JawOpens
 from regrasp.interfaces.scene import Gravity
 
 JITTER = (0.004, 0.006, 0.002)
@@ -22,9 +23,15 @@ def a_file(gravity: Gravity = "zero", bottom: float = 0.10) -> ScenarioFile:
         }
     )
     floor = piece.model_copy(update={"name": "flat", "jitter": (0.0, 0.0, 0.0)})
-    fault = JawOpens(type="jaw_opens", when=When(carried=(0.3, 0.8)), seconds=1.5)
-    return ScenarioFile(
-        description="", cell="thesis", tree="recovery", gravity=gravity, obstacles=(piece, floor), faults=(fault,)
+    return scenario_model(TASK).model_validate(
+        {
+            "description": "",
+            "cell": "thesis",
+            "tree": "recovery",
+            "gravity": gravity,
+            "obstacles": (piece, floor),
+            "faults": ({"type": "jaw_opens", "when": {"carried": (0.3, 0.8)}, "seconds": 1.5},),
+        }
     )
 
 
@@ -51,8 +58,7 @@ def test_pieces_lie_within_their_jitter(seed: int) -> None:
 def test_faults_lie_within_their_share_of_the_way(seed: int) -> None:
     [fault] = draw_faults(a_file(), np.random.default_rng(seed))
     assert isinstance(fault, JawOpens)
-    assert fault.when.carried is not None
-    least, most = fault.when.carried
+    least, most = fault.when.model_dump()["carried"]
     assert 0.3 <= least == most <= 0.8
     assert fault.seconds == 1.5
 

@@ -80,7 +80,7 @@ def test_overrides_change_scenario_and_cell(scenario: Path) -> None:
     assert loaded.file.gravity == "earth"
     assert loaded.file.obstacles[0].size == (0.1, 0.1, 0.1)
     assert loaded.inputs == {"tries": "2"}
-    assert loaded.file.expect.cause is CableCause.SEARCH_EXHAUSTED
+    assert loaded.file.expect.cause == CableCause.SEARCH_EXHAUSTED
     assert loaded.cell.hidden.errors.arm_tool == 0
     # Socket 0 is the anchor that the others are aliases of: an override holds for the one item that it names.
     assert [s.depth for s in loaded.cell.known.cable.sockets] == [0.02, 0.015, 0.015, 0.015, 0.015]
@@ -211,7 +211,7 @@ def test_a_wrong_override_is_a_finding(scenario: Path, override: str, expected: 
 
 def test_what_an_override_makes_of_a_list_is_told_at_the_list(scenario: Path) -> None:
     [finding] = findings("cell.known.arms.1.name=left")
-    assert f"cells/thesis.yaml:{ARMS}: arms are left, left; give one each of left, right" in finding
+    assert f"cells/thesis.yaml:{ARMS}: 2 arms are named 'left'; rename them" in finding
 
 
 @pytest.mark.parametrize("key", ["tree", "cell"])

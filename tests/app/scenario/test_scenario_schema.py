@@ -14,9 +14,13 @@ from regrasp.app.cli.commands import app
 from regrasp.app.files.findings import Findings
 from regrasp.app.files.resources import shipped
 from regrasp.app.scenario.load import cases
-from regrasp.app.scenario.schema import ScenarioFile, json_schema
+from regrasp.app.scenario.schema import ScenarioFile, json_schema, scenario_model
+from regrasp.app.tasks.cable import TASK
 from regrasp.app.tasks.cable.expectations import Expect
+from regrasp.interfaces.cable.fault import CableSnags
 from regrasp.interfaces.fault import JawOpens
+
+OURS = {ours.__module__ for ours in (ScenarioFile, Expect, JawOpens, CableSnags)}
 
 
 def fields(model: type[BaseModel]) -> Iterator[tuple[str, FieldInfo]]:
@@ -29,14 +33,15 @@ def fields(model: type[BaseModel]) -> Iterator[tuple[str, FieldInfo]]:
 
 def models(annotation: Any) -> Iterator[type[BaseModel]]:
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        if annotation.__module__ in (ScenarioFile.__module__, Expect.__module__, JawOpens.__module__):
+        if annotation.__module__ in OURS:
             yield annotation
         return
     for part in get_args(annotation):
         yield from models(part)
 
 
-FIELDS = dict(fields(ScenarioFile))
+MODEL = scenario_model(TASK)
+FIELDS = dict(fields(MODEL))
 
 
 def test_the_fields_of_all_parts_are_looked_at() -> None:
@@ -57,9 +62,9 @@ def test_a_field_says_what_it_means_and_gives_an_example_that_holds(name: str) -
 
 
 def test_the_json_schema_is_whole() -> None:
-    schema = json_schema()
+    schema = json_schema(TASK)
     assert schema["$schema"] == "https://json-schema.org/draft/2020-12/schema"
-    assert set(schema["properties"]) == set(ScenarioFile.model_fields)
+    assert set(schema["properties"]) == set(MODEL.model_fields)
     assert schema["additionalProperties"] is False
     references = set(_references(schema))
     assert references == {f"#/$defs/{name}" for name in schema["$defs"]}
@@ -78,7 +83,7 @@ def _references(node: Any) -> Iterator[str]:
 
 
 def test_the_command_prints_the_schema_and_a_reference_with_every_field() -> None:
-    assert json.loads(CliRunner().invoke(app, ["scenarios", "schema"]).stdout) == json_schema()
+    assert json.loads(CliRunner().invoke(app, ["scenarios", "schema"]).stdout) == json_schema(TASK)
     text = CliRunner().invoke(app, ["scenarios", "schema", "--markdown"]).stdout
     rows = [line for line in text.splitlines() if line.startswith("| `")]
     assert all(line.replace("\\|", "").count("|") == 7 for line in rows)
@@ -96,7 +101,7 @@ def test_the_reference_that_ships_is_what_the_command_prints() -> None:
 
 def with_jsonschema() -> Any:
     """A validator of the published schema, from a library that only this test would need."""
-    return pytest.importorskip("jsonschema").Draft202012Validator(json_schema())
+    return pytest.importorskip("jsonschema").Draft202012Validator(json_schema(TASK))
 
 
 def test_every_shipped_scenario_is_right_by_the_published_schema() -> None:
@@ -140,5 +145,5 @@ def test_the_published_schema_takes_what_the_check_takes(tmp_path: Path, changes
 def test_a_key_that_a_file_must_have_may_stand_in_vary_alone() -> None:
     """As the schema says it: each such key at the top, or in `vary`."""
     gravity = {"required": ["vary"], "properties": {"vary": {"required": ["gravity"]}}}
-    assert {"anyOf": [{"required": ["gravity"]}, gravity]} in json_schema()["allOf"]
-    assert len(json_schema()["allOf"]) == len(_WHOLE)
+    assert {"anyOf": [{"required": ["gravity"]}, gravity]} in json_schema(TASK)["allOf"]
+    assert len(json_schema(TASK)["allOf"]) == len(_WHOLE)

@@ -9,9 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from regrasp.app.records.result import Expectation, Result, Slip
+from regrasp.app.records.result import Result
 from regrasp.app.scenario.load import Scenario
 from regrasp.app.studies.statistics import wilson_interval
+from regrasp.app.task.expectation import Expectation
 from regrasp.app.tasks.cable.studies.demo import run_demo
 from regrasp.interfaces.cable.cause import CableCause
 from regrasp.interfaces.cause import Cause
@@ -38,7 +39,8 @@ def episode(scenario: Scenario, out: Path | None, *, seed: int, video: bool, ren
             Expectation("outcome", not failed, "success", "success"),
             Expectation("unintended_force", True, 1.0 + seed, 5.0),
         ),
-        slips=(Slip(10.0, 10.5, "fingers"), Slip(20.0, None, None)),
+        task="cable",
+        measured={"slips": [{"released_at": 10.0, "detected_at": 10.5, "detected_by": "fingers"}]},
         sim_seconds=90.0 + seed,
         real_time_factor=2.0,
         wall_by_part={"physics": 9.0 + seed, "step loop": 3.0 + seed, "start": 1.8},
@@ -56,9 +58,8 @@ def test_a_study_goes_on_to_its_end_and_counts_every_run(tmp_path: Path, capfd: 
     ]
     good = rows["tall_obstacle", "earth", 0]
     assert good["succeeded"]
-    assert good["detection_delays"] == [0.5]
-    assert good["detected_by"] == ["fingers"]
-    assert (good["slips"], good["unintended_force"], good["unmet"]) == (2, 1.0, [])
+    assert [slip["detected_by"] for slip in good["measured"]["slips"]] == ["fingers"]
+    assert (good["unintended_force"], good["unmet"]) == (1.0, [])
     assert good["peak_memory_mb"] > 5
     bad = rows["tall_obstacle", "zero", 1]
     assert (bad["outcome"], bad["unmet"], bad["cause"]["code"]) == ("failure", ["outcome"], "search_exhausted")

@@ -80,7 +80,8 @@ def pose(
       regrasp study pose --techniques rgbd --configurations 3,6,7,8,9 --no-grasp
 
     \b
-    The configurations, and how a trial goes: app/tasks/cable/studies/pose/POSE.md.
+    The configurations, and how a trial goes: POSE.md in
+    app/tasks/cable/studies/pose/.
     Exit code: 0 done, 1 a scene broke off, 2 bad input, 130 Ctrl-C.
     """
     chosen, wrong = parse_seeds(seeds), _unfit(out, "pose.json")
