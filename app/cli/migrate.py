@@ -28,8 +28,7 @@ def migrate(
       regrasp migrate suites/*.scenario.yaml
 
     \b
-    What changes: under expect, outcome: stowed becomes success (end: stowed is then the default), and
-    outcome: safe_stop becomes failure.
+    What changes: under expect, an outcome of older scenarios becomes success or failure.
     """
     import os
 

@@ -34,8 +34,8 @@ def explain(
 ) -> None:
     """Say what a run tried and why it ended so.
 
-    Each attempt with when it began and how it ended, the chain of causes, the losses of the connector, and what the
-    robot knew at the end.
+    Each attempt with when it began and how it ended, the chain of causes, what the task measured, and what the robot
+    knew at the end.
 
     \b
     Example:

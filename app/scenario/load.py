@@ -17,6 +17,7 @@ from regrasp.app.records.result import DEFAULT_CASE
 from regrasp.app.scenario import vary
 from regrasp.app.scenario.cell_file import load_cell, tasks_of
 from regrasp.app.scenario.old_words import warn_of_old_words
+from regrasp.app.scenario.other_tasks import words_of_others
 from regrasp.app.scenario.placement import check_obstacles
 from regrasp.app.scenario.references import check_names, check_tree_inputs, tree_text
 from regrasp.app.scenario.schema import ScenarioFile, scenario_model
@@ -214,6 +215,8 @@ class _Source:
             value = _REQUIRED | {key: value for key, value in document.value.items() if key in changed}
             document = replace(document, value=value)
         file, errors = read_as(document, model)
+        told = words_of_others(document, find.task_named(model.TASK)) if errors and model.TASK else {}
+        errors = [_retold(error, told.get(error.path)) for error in errors]
         errors = [error for error in errors if not self._is_for_cases(case, error)]
         self.note((self._told(error) for error in errors), case)
         if not case:
@@ -247,6 +250,11 @@ class _Source:
         if error.is_missing and len(error.path) == 1:
             return error.path in self._varied
         return error.is_of_several and case == "" and any(_holds(error.path, key) for key in self._varied)
+
+
+def _retold(error: Error, message: str | None) -> Error:
+    """The error, with this message in place of its own."""
+    return error if message is None else error._replace(finding=replace(error.finding, message=message))
 
 
 def _holds(outer: KeyPath, inner: KeyPath) -> bool:

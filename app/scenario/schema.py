@@ -137,7 +137,7 @@ class ScenarioFile(Model):
     ]
     task: Annotated[
         str | None,
-        Field(description="The job; left out: the one whose section the cell holds.", examples=["cable"]),
+        Field(description="The job; left out: the one whose section the cell holds.", examples=["button"]),
     ] = None
     tree: Annotated[
         str,
@@ -223,7 +223,10 @@ def scenario_model(task: "Task") -> type[ScenarioFile]:
         cause=(causes | None, base.model_fields["cause"]),
     )
     expect.OLD_OUTCOMES = task.old_outcomes
+    name = copy(ScenarioFile.model_fields["task"])
+    name.examples = [task.name]
     fields: dict[str, Any] = {
+        "task": (str | None, name),
         "faults": (tuple[spec, ...], ScenarioFile.model_fields["faults"]),  # type: ignore[valid-type]
         "expect": (expect, _with_default(ScenarioFile.model_fields["expect"], expect())),
     }

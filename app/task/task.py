@@ -1,6 +1,6 @@
 """What a task bundles, and where its parts are.
 
-A task is a job that the engine does not know: unplugging a cable, pressing a button. It names its parts as
+A task is a job that the engine does not know, such as pressing a button. It names its parts as
 "module:attribute", and each is imported when it is asked for: checking a scenario brings the models, and a run the
 simulation. Its leaves are a set of the group `regrasp.leaves` with the task's name (`regrasp.behaviors.registry`).
 """

@@ -24,6 +24,7 @@ def by_gravity(scenario: Any, folder: Path) -> Result:
         scenario.file.seed,
         "success" if stowed else "failure",
         succeeded=stowed,
+        task="cable",
         cause=None if stowed else Cause(CableCause.SEARCH_EXHAUSTED, "not seen from 18 stops"),
         expectations=(Expectation("outcome", stowed, "success" if stowed else "failure", "success"),),
     )

@@ -35,6 +35,7 @@ def episode(scenario: Scenario, out: Path | None, *, seed: int, video: bool, ren
     assert out is not None
     met = seed == 0
     result = Result(
+        task="cable",
         scenario=scenario.name,
         seed=seed,
         outcome="success" if met else "failure",
