@@ -9,8 +9,8 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from regrasp.app.files.resources import shipped
 from regrasp.app.scenario.cell_file import load_cell
-from regrasp.interfaces.cable.cell import Tag
 from regrasp.interfaces.frame import RgbdFrame
+from regrasp.interfaces.tag import Tag
 from regrasp.sim.cameras.depth_noise import DepthNoise
 from regrasp.sim.render.fiducials import compound_visual, tag_boxes
 from regrasp.sim.render.renderer import LightState, RendererName, make_renderer
