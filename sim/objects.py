@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import TypeVar
 
+from regrasp.interfaces.cell import Cell
 from regrasp.sim.engine import Engine
 from regrasp.sim.faults.effects import TaskEffects
 from regrasp.sim.faults.faults import TriggerState
@@ -58,7 +59,10 @@ class TaskObjects:
 
 
 class NoObjects(TaskObjects):
-    """For a task whose objects the cell itself has."""
+    """For a task that adds nothing to its cell. Like other tasks' objects it is made from the cell, if one is given."""
+
+    def __init__(self, cell: Cell | None = None) -> None:
+        pass
 
 
 # Covariant: a world of some task's objects will do where a world of any objects is wanted.

@@ -190,7 +190,7 @@ def test_an_arm_on_what_the_task_forbids_is_counted(solo: Cell, untouchable: boo
 def test_without_objects_and_with_one_arm_of_another_name_all_else_works(solo: Cell) -> None:
     opens = JawOpens(type="jaw_opens", when=When(at=(0.2, 0.2)), arm=ARM, seconds=None)
     setup = SceneSetup((OBSTACLE,), (opens,), (Prop("box", (0.05, 0.05, 0.05), (0.0, 1.0, 0.0)),))
-    world = World(solo, "earth", 7, NoObjects(), setup)
+    world = World(solo, "earth", 7, NoObjects(solo), setup)
     arm = world.arms[ARM]
     start = arm.reading().positions
     goal = start + np.array([0.4, 0.3, -0.3, 0.0, 0.2, 0.0])
