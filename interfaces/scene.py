@@ -3,8 +3,6 @@
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-from scipy.spatial.transform import RigidTransform
-
 from regrasp.interfaces.cell import Box
 from regrasp.interfaces.fault import Fault
 from regrasp.interfaces.fields import Color
@@ -37,13 +35,8 @@ class Prop:
 
 @dataclass(frozen=True)
 class SceneSetup:
-    """What one run adds to the cell.
-
-    `connector_at` is the pose world_from_connector at the start, on a stand; None for the connector in its socket. The
-    props are out of sight until they are placed.
-    """
+    """What one run adds to the cell. The props are out of sight until they are placed."""
 
     obstacles: tuple[Obstacle, ...] = ()
     faults: tuple[Fault, ...] = ()
-    connector_at: RigidTransform | None = None
     props: tuple[Prop, ...] = ()

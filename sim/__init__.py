@@ -1,4 +1,4 @@
-"""The simulated world: arms, cable, sockets, cameras and their noise, faults, ground truth."""
+"""The simulated world: engine, scene, arms, cameras and their noise, tasks' objects, faults, ground truth."""
 
 import contextlib
 import os

@@ -1,88 +1,75 @@
 """Ground truth of a world, for judges, studies and tests. The robot's software never reads it."""
 
+from collections.abc import Callable
+from typing import Generic
+
 import numpy as np
 import pybullet as p
 from numpy.typing import NDArray
-from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.frame import Intrinsics
-from regrasp.sim.render.visuals import segmentation_id
+from regrasp.sim.objects import ObjectsT
+from regrasp.sim.render.visuals import VisualItem, segmentation_id
 from regrasp.sim.world import World
 
 _OUT_OF_VIEW = -100.0  # m, in all three coordinates
 
 
-class GroundTruth:
-    """Ground truth of one world."""
+class GroundTruth(Generic[ObjectsT]):
+    """Ground truth of one world of any task. A task derives its own for its objects."""
 
-    def __init__(self, world: World) -> None:
+    def __init__(self, world: World[ObjectsT]) -> None:
         self._world = world
-
-    def connector_pose(self) -> RigidTransform:
-        """Pose world_from_connector."""
-        return self._world.connector_pose()
-
-    def connector_speed(self) -> float:
-        """Speed of the connector's centre in m/s."""
-        return float(np.linalg.norm(self._world.connector_velocity()))
-
-    def held(self) -> bool:
-        """Whether both pads of the right hand touch the connector."""
-        return all(self._world.pads_touching("right"))
-
-    def touched(self) -> bool:
-        """Whether any pad of the right hand touches the connector."""
-        return any(self._world.pads_touching("right"))
-
-    def connector_in_hand(self) -> FloatArray:
-        """The connector's centre (3,) m in the frame between the pads of the right hand."""
-        return self._world.arms["right"].in_tool(self._world.connector_position())
-
-    def plugged(self) -> bool:
-        """Whether the connector sits in its socket."""
-        return self._world.socket.holds
-
-    def stowed(self) -> bool:
-        """Whether the connector sits in the clip."""
-        return self._world.clip.holds
-
-    def seat_error(self) -> tuple[float, float]:
-        """Error of the connector to its seat in the clip: distance of the centres (m), angle of the axes (degrees)."""
-        error = self._world.cell.known.cable.clip.world_from_seat.inv() * self._world.connector_pose()
-        cosine = error.rotation.as_matrix()[0, 0]
-        return float(np.linalg.norm(error.translation)), float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
-
-    def connector_pixels(self, camera: str) -> int:
-        """Number of the connector's pixels in the newest frame of that camera."""
-        ids = self._world.cameras[camera].true_ids()
-        return 0 if ids is None else self._count(ids)
-
-    def occluded_share(self, camera: str, magnification: int = 8) -> float:
-        """Share, 0 to 1, of the connector's pixels, without its tag, that obstacles now occlude in that camera.
-
-        The pixels are those of a camera with `magnification` times the focal length, so that parts of a pixel count.
-        Choice: with 8, an obstacle's edge is uncertain by a tenth of a percent of the connector.
-        """
-        world, seen_by = self._world, self._world.cameras[camera]
-        target = seen_by.true_pose().inv().apply(world.connector_pose().translation)
-        closer = _centred_on(target, seen_by.spec.intrinsics, magnification)
-        items, end = world.visuals.items, (world.cable.body, world.cable.connector_link)
-        with_all = world.visuals.snapshot().copy()
-        with_all[[(i.body, i.link) == end and i.kind == p.GEOM_BOX for i in items], :, 3] = _OUT_OF_VIEW  # the tag
-        without = with_all.copy()
-        obstacles = [body for name, body in world.boxes.items() if name.startswith("obstacle ")]
-        without[[item.body in obstacles for item in items], :, 3] = _OUT_OF_VIEW
-        free, left = (self._count(seen_by.segmentation(poses, closer)) for poses in (without, with_all))
-        return 1.0 - left / free
-
-    def _count(self, ids: NDArray[np.int32]) -> int:
-        cable = self._world.cable
-        return int(np.count_nonzero(ids == segmentation_id(cable.body, cable.connector_link)))
 
     def contact_peaks(self) -> dict[str, float]:
         """Largest normal force in N, so far, between each arm and each body that it must not touch."""
         return dict(self._world.contact_peaks)
+
+    def pixels(self, camera: str, body: int, link: int = -1) -> int:
+        """Number of pixels of a body's link in the newest frame of that camera; 0 before the first."""
+        ids = self._world.cameras[camera].true_ids()
+        return 0 if ids is None else _count(ids, body, link)
+
+    def occlusion(
+        self,
+        camera: str,
+        body: int,
+        link: int = -1,
+        left_out: Callable[[VisualItem], bool] = lambda item: False,
+        magnification: int = 8,
+    ) -> float:
+        """Share, 0 to 1, of the pixels of a body's link that obstacles now occlude in that camera.
+
+        Items of the link that are `left_out` count as if they were not there. The pixels are those of a camera with
+        `magnification` times the focal length, so that parts of a pixel count. Choice: with 8, an obstacle's edge is
+        uncertain by a tenth of a percent of a thing 0.1 m long.
+
+        Raises:
+            ZeroDivisionError: that camera would not see the link without obstacles either.
+        """
+        world, seen_by = self._world, self._world.cameras[camera]
+        target = seen_by.true_pose().inv().apply(_position(world.client, body, link))
+        closer = _centred_on(target, seen_by.spec.intrinsics, magnification)
+        items = world.visuals.items
+        with_all = world.visuals.snapshot().copy()
+        with_all[[(i.body, i.link) == (body, link) and left_out(i) for i in items], :, 3] = _OUT_OF_VIEW
+        without = with_all.copy()
+        obstacles = [fixed for name, fixed in world.fixed_bodies.items() if name.startswith("obstacle ")]
+        without[[item.body in obstacles for item in items], :, 3] = _OUT_OF_VIEW
+        free, left = (_count(seen_by.segmentation(poses, closer), body, link) for poses in (without, with_all))
+        return 1.0 - left / free
+
+
+def _count(ids: NDArray[np.int32], body: int, link: int) -> int:
+    return int(np.count_nonzero(ids == segmentation_id(body, link)))
+
+
+def _position(client: int, body: int, link: int) -> FloatArray:
+    """Position (3,) m of a link's frame in the world; for the base, -1, of its inertial frame."""
+    if link == -1:
+        return np.array(p.getBasePositionAndOrientation(body, physicsClientId=client)[0])
+    return np.array(p.getLinkState(body, link, computeForwardKinematics=1, physicsClientId=client)[4])
 
 
 def _centred_on(center: FloatArray, camera: Intrinsics, magnification: int) -> Intrinsics:

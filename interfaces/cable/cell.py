@@ -10,6 +10,8 @@ from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cell import Box, Cell, KnownCell, WristMount, pose_along
 from regrasp.interfaces.fields import Color, Direction, Force, Friction, Length, Mass, Model, Size, Vector
 from regrasp.interfaces.hidden_world import HiddenWorld
+from regrasp.interfaces.tag import TAG_DICTIONARY as TAG_DICTIONARY
+from regrasp.interfaces.tag import Tag as Tag
 
 
 class Socket(Model):
@@ -47,26 +49,6 @@ class Socket(Model):
 
 
 PLUGGED_INTO = "plugged_into"  # stands for the name of the socket that the cell names under this key
-
-TAG_DICTIONARY = "DICT_4X4_50"  # of cv2.aruco. Choice: the fewest cells, so they are the largest on a small plate
-
-
-class Tag(Model):
-    """An ArUco tag of `TAG_DICTIONARY` in the middle of a square white plate, fixed on a body.
-
-    In the body's frame it faces +y, and its own x axis points along x. It stands for a printed film of a fraction of a
-    gram that gives way to a hand: it is visible, and has neither mass nor a collision shape.
-    """
-
-    number: Annotated[int, Field(ge=0, le=49)]
-    size: Length  # edge of the black square
-    plate: Length  # edge of the plate, with the white border that the tag needs
-    center: Vector  # of its face, in the body's frame
-
-    @property
-    def body_from_tag(self) -> RigidTransform:
-        """Pose of the tag in the body's frame: x to its right, y to its top, z out of its face towards the viewer."""
-        return RigidTransform.from_components(self.center, Rotation.from_matrix([[1, 0, 0], [0, 0, 1], [0, -1, 0]]))
 
 
 class Clip(Model):

@@ -1,4 +1,4 @@
-"""Holders of the connector in the cell: a socket with a pull-out force, and a snap-in clip.
+"""Holders of the connector in the cell, and their bodies: a socket with a pull-out force, and a snap-in clip.
 
 Both are physical models with stated numbers. Neither depends on the gripper, so neither helps the robot.
 """
@@ -14,8 +14,11 @@ import pybullet as p
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import FloatArray
-from regrasp.interfaces.cable.cell import Clip
+from regrasp.interfaces.cable.cell import Clip, KnownCable
+from regrasp.interfaces.cell import Box
+from regrasp.sim.bodies import build_box
 from regrasp.sim.cable.cable import BodyState
+from regrasp.sim.render.fiducials import compound_visual, tag_boxes
 
 
 @dataclass(frozen=True)
@@ -37,6 +40,19 @@ class ClipParameters:
     click_speed: float = 0.02  # m/s; the lips close on a connector that is slower than this ...
     click_seconds: float = 0.2  # ... for so long
     rearm_distance: float = 1.5  # capture distances by which a pulled-out connector must leave before it is taken again
+
+
+def build_fixtures(client: int, cable: KnownCable) -> dict[str, int]:
+    """Create the clip's bracket, the sockets' blocks and the clip's tag; the ids of all but the tag by name."""
+    bodies = {box.name: build_box(client, box) for box in cable.clip.bracket}
+    for socket in cable.sockets:
+        block = Box(name=socket.name, center=socket.center, size=socket.size, color=socket.color)
+        bodies[socket.name] = build_box(client, block, socket.world_from_block)
+    tag = cable.clip.tag
+    if tag is not None:
+        world_from_tag = cable.clip.world_from_seat * tag.body_from_tag
+        p.createMultiBody(0, -1, compound_visual(client, tag_boxes(tag), world_from_tag), physicsClientId=client)
+    return bodies
 
 
 @dataclass(frozen=True)

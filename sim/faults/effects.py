@@ -1,17 +1,13 @@
 """Effects of the faults on the world's parts. The models of faulty grippers, cameras and arms are in those parts."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 import pybullet as p
-from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces import fault as f
-from regrasp.interfaces.arrays import FloatArray
-from regrasp.interfaces.cable.fault import CableSnags, ConnectorKnocked
-from regrasp.sim.cable.cable import CableBody
 from regrasp.sim.cameras.camera import SimCamera
 from regrasp.sim.render.renderer import LightState
 from regrasp.sim.robot.arm import SimArm
@@ -21,26 +17,25 @@ from regrasp.sim.robot.arm import SimArm
 class FaultParameters:
     """Numbers of faults that the scenario file does not give."""
 
-    knock_seconds: float = 0.02  # s over which a knock's impulse is spread
     cover_transmission: float = 0.02  # share of the light that passes a covered lens; the fault's description quotes it
 
 
 class FaultTarget(Protocol):
-    """The parts of a world that faults act on."""
+    """The parts of a world that faults act on. `fixed_bodies` are PyBullet's ids by name, such as `obstacle NAME`."""
 
     client: int
     step_seconds: float
     arms: dict[str, SimArm]
     cameras: dict[str, SimCamera]
-    cable: CableBody
-    boxes: dict[str, int]
-    light: LightState
+    fixed_bodies: dict[str, int]
+
+    @property
+    def light(self) -> LightState:
+        """The present light."""
+        ...
 
     def set_light(self, light: LightState) -> None:
         """Change the light."""
-
-    def connector_pose(self) -> RigidTransform:
-        """True pose world_from_connector."""
 
 
 def _nothing(*_: float) -> None:
@@ -61,25 +56,30 @@ class Effect:
     seconds: float | None = None
 
 
+# What makes the effect of a task's own fault: from the fault with its ranges drawn, the world, and a generator that
+# belongs to this fault alone. By the fault's class.
+TaskEffects = Mapping[type[f.Fault], Callable[[Any, FaultTarget, np.random.Generator], Effect]]
+
+
 def effect_of(
     fault: f.Fault,
     world: FaultTarget,
     rng: np.random.Generator,
+    of_task: TaskEffects,
     parameters: FaultParameters = FaultParameters(),
 ) -> Effect:
-    """The effect on the world of a fault whose ranges are drawn; no effect for a fault of the robot's software.
+    """The effect on the world of a fault whose ranges are drawn; none for a fault of the robot's software.
 
-    `rng` belongs to this fault alone.
+    `rng` belongs to this fault alone; `of_task` are the effects of the task's own faults.
+
+    Raises:
+        KeyError: the fault names an arm or a camera that the world does not have.
     """
-    jaw = world.arms["right"].gripper
+    if type(fault) in of_task:
+        return of_task[type(fault)](fault, world, rng)
     match fault:
-        case f.JawOpens():
-            return Effect(lambda: jaw.set_fault(forced_open=True), lambda: jaw.set_fault(forced_open=False))
-        case f.JawWeakens():
-            share = fault.force_share
-            return Effect(lambda: jaw.set_fault(force_share=share), lambda: jaw.set_fault(force_share=1.0))
-        case f.JawStuck():
-            return Effect(lambda: jaw.set_fault(stuck=True), lambda: jaw.set_fault(stuck=False))
+        case f.JawFault():
+            return _jaw(fault, world)
         case f.CameraFault():
             return _camera(fault, world, rng, parameters.cover_transmission)
         case f.LightChanges():
@@ -88,11 +88,18 @@ def effect_of(
             return _joint(fault, world)
         case f.ObstacleMovesIn():
             return _obstacle(fault, world)
-        case ConnectorKnocked():
-            return _knock(fault, world, parameters.knock_seconds)
-        case CableSnags():
-            return _snag(fault, world)
     return Effect()
+
+
+def _jaw(fault: f.JawFault, world: FaultTarget) -> Effect:
+    jaw = world.arms[fault.arm].gripper
+    match fault:
+        case f.JawOpens():
+            return Effect(lambda: jaw.set_fault(forced_open=True), lambda: jaw.set_fault(forced_open=False))
+        case f.JawWeakens():
+            share = fault.force_share
+            return Effect(lambda: jaw.set_fault(force_share=share), lambda: jaw.set_fault(force_share=1.0))
+    return Effect(lambda: jaw.set_fault(stuck=True), lambda: jaw.set_fault(stuck=False))
 
 
 def _camera(fault: f.CameraFault, world: FaultTarget, rng: np.random.Generator, cover_transmission: float) -> Effect:
@@ -130,7 +137,7 @@ def _joint(fault: f.JointFault, world: FaultTarget) -> Effect:
 
 def _obstacle(fault: f.ObstacleMovesIn, world: FaultTarget) -> Effect:
     names = (f"obstacle {fault.obstacle}", f"obstacle {fault.obstacle} stand")
-    bodies = [world.boxes[name] for name in names if name in world.boxes]
+    bodies = [world.fixed_bodies[name] for name in names if name in world.fixed_bodies]
     poses = [p.getBasePositionAndOrientation(body, physicsClientId=world.client) for body in bodies]
     way = np.array(fault.by)
     seconds = max(float(np.linalg.norm(way)) / fault.speed, world.step_seconds)
@@ -143,32 +150,3 @@ def _obstacle(fault: f.ObstacleMovesIn, world: FaultTarget) -> Effect:
             p.resetBaseVelocity(body, (way / seconds * moving).tolist(), [0, 0, 0], physicsClientId=world.client)
 
     return Effect(end=lambda: place(seconds, moving=False), step=place, seconds=seconds)
-
-
-def _knock(fault: ConnectorKnocked, world: FaultTarget, seconds: float) -> Effect:
-    force = (np.array(fault.impulse) / seconds).tolist()
-    cable = world.cable
-
-    def push(_: float) -> None:
-        at = world.connector_pose().translation.tolist()
-        p.applyExternalForce(cable.body, cable.connector_link, force, at, p.WORLD_FRAME, physicsClientId=world.client)
-
-    return Effect(step=push, seconds=seconds)
-
-
-def _snag(fault: CableSnags, world: FaultTarget) -> Effect:
-    cable, client = world.cable, world.client
-    link = round(fault.along * (cable.links - 1))
-    caught: list[FloatArray] = []
-
-    def position() -> FloatArray:
-        return np.array(p.getLinkState(cable.body, link, 0, 1, physicsClientId=client)[0])
-
-    def pull(_: float) -> None:
-        at = position()
-        force = fault.stiffness * (caught[0] - at)
-        size = float(np.linalg.norm(force))
-        force *= min(1.0, fault.max_force / size) if size > 0 else 0.0
-        p.applyExternalForce(cable.body, link, force.tolist(), at.tolist(), p.WORLD_FRAME, physicsClientId=client)
-
-    return Effect(begin=lambda: caught.append(position()), step=pull)

@@ -8,9 +8,9 @@ import pybullet as p
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import Mask
-from regrasp.interfaces.cable.cell import TAG_DICTIONARY, Tag
 from regrasp.interfaces.cell import Box
 from regrasp.interfaces.fields import Color
+from regrasp.interfaces.tag import TAG_DICTIONARY, Tag
 
 WHITE, BLACK = (0.92, 0.92, 0.90), (0.04, 0.04, 0.04)  # choice: about the reflectance of paper and toner
 MAX_PARTS = 16  # PyBullet's limit of parts of one visual shape

@@ -100,7 +100,7 @@ class GlRenderer:
             self._placed = (poses.copy(), light)
         target.use()
         target.clear()
-        _write(self._draw, "world_to_clip", _clip_from_camera(intrinsics) @ world_from_camera.inv().as_matrix())
+        _write(self._draw, "world_to_screen", _screen_from_camera(intrinsics) @ world_from_camera.inv().as_matrix())
         self._shadows.use()
         for group in self._groups:
             group.draw.render(instances=len(group.mesh.rows))
@@ -158,7 +158,7 @@ def _write(program: Any, name: str, matrix: FloatArray) -> None:
     program[name].write(np.ascontiguousarray(matrix.T, "f4").tobytes())
 
 
-def _clip_from_camera(k: Intrinsics) -> FloatArray:
+def _screen_from_camera(k: Intrinsics) -> FloatArray:
     """OpenGL's projection matrix (4, 4) for intrinsics `k`, with image rows downwards.
 
     GL measures from a pixel's edge, `k` from its centre: the half pixel between them makes the 1 in the third column.

@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Z_NEAR, Z_FAR = 0.02, 10.0  # m along the optical axis: clip planes, nothing outside them is drawn
+Z_NEAR, Z_FAR = 0.02, 10.0  # m along the optical axis: nothing nearer or farther is drawn
 BACKGROUND = (0.72, 0.74, 0.78)  # RGB: the lab's distant wall
 
 

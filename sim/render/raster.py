@@ -96,11 +96,11 @@ def draw_triangles(
             start = a * e0[2] + b * e1[2] + c * e2[2]
             end = slope, fall, start - 1.0 / near
             for v in range(top, bottom + 1):
-                low, high = _clip(e0, v, 0.0, float(width))
-                low, high = _clip(e1, v, low, high)
-                low, high = _clip(e2, v, low, high)
+                low, high = _narrowed(e0, v, 0.0, float(width))
+                low, high = _narrowed(e1, v, low, high)
+                low, high = _narrowed(e2, v, low, high)
                 if cut:
-                    low, high = _clip(end, v, low, high)
+                    low, high = _narrowed(end, v, low, high)
                 if low < high:
                     first = ceil(low)
                     value = slope * first + fall * v + start
@@ -120,7 +120,7 @@ def _cross(p: NDArray[np.float64], q: NDArray[np.float64]) -> tuple[float, float
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _clip(edge: tuple[float, float, float], v: int, low: float, high: float) -> tuple[float, float]:
+def _narrowed(edge: tuple[float, float, float], v: int, low: float, high: float) -> tuple[float, float]:
     """What of low <= u < high in row `v` lies where the plane is negative.
 
     Two triangles with an edge in common find the same u for it: no pixel is left out, and none is drawn twice.

@@ -1,7 +1,7 @@
 """GLSL of the OpenGL renderer."""
 
 VERTEX = """#version 330
-uniform mat4 world_to_clip;
+uniform mat4 world_to_screen;
 uniform mat4 world_to_light;
 uniform float texel;  // metres that a texel of the shadow map covers
 in vec3 at; in vec3 normal;
@@ -15,7 +15,7 @@ void main() {
     // looked up a little off the surface, else it shadows itself in stripes
     in_light = (world_to_light * vec4(place + 1.5 * texel * n, 1.0)).xyz;
     paint = color; seen = item;
-    gl_Position = world_to_clip * vec4(place, 1.0);
+    gl_Position = world_to_screen * vec4(place, 1.0);
 }"""
 
 FRAGMENT = """#version 330
@@ -34,7 +34,7 @@ void main() {
     float warp = 4.0 * sin(11.0 * place.z + 7.0 * place.y);
     float grain = 1.0 + 0.03 * sin(90.0 * place.x + warp) * sin(37.0 * (place.y + place.z) + warp);
     rgb = vec4(paint * grain * (ambient + diffuse * lit * max(facing, 0.0)), 1.0);
-    depth = 1.0 / gl_FragCoord.w;  // clip w is the distance along the optical axis
+    depth = 1.0 / gl_FragCoord.w;  // its w is one over the distance along the optical axis
     id = seen;
 }"""
 

@@ -15,10 +15,10 @@ FINGER_FACE = 0.0135  # measured on rtb-data's meshes: a finger's inner face lie
 # 0.018 in front of the maker's ee_gripper_link. A finger so ends 0.012 past what it holds, to hold a plug near a panel.
 PAD_CENTER_X = 0.0565
 PAD_LENGTH = 0.024  # along the fingers
-PAD_HEIGHT = 0.034  # of the finger's 0.061; a cylinder gripped over such a length resists the cable's bending moment
+PAD_HEIGHT = 0.034  # of the finger's 0.061; a cylinder gripped over such a length resists a bending moment
 CAMERA_SIZE = (0.025, 0.090, 0.025)  # body of the D435i
 BRACKET = (0.008, 0.030)  # thickness and width of the camera's bracket, which is visible and has no collision shape
-# The real arms are black. Choice: grey, so that no lit part of them is as dark as the cable.
+# The real arms are black. Choice: grey, so that no lit part of them is as dark as what is black in a cell.
 ARM_COLOR = (0.30, 0.30, 0.31)
 
 

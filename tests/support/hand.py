@@ -1,4 +1,6 @@
-"""What the tests make a hand do: reach the connector, close on it, draw it along a line."""
+"""What the tests make an arm and its hand do: reach the connector, close on it, draw it along a line."""
+
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import RigidTransform
@@ -7,6 +9,7 @@ from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.trajectory import Trajectory
 from regrasp.motion.grasping.grasps import grasp_candidates
 from regrasp.motion.robots.kinematics import ArmKinematics, wrap
+from regrasp.sim.cable.objects import CableObjects
 from regrasp.sim.world import World
 
 STANDOFF = 0.06  # m before the grasp
@@ -15,7 +18,7 @@ GRIP_FORCE = 20.0  # N a finger
 GENTLE = 0.0005  # m: the jaw closes by so much at speed; from farther the blow alone throws the plug out of its socket
 
 
-def drive(world: World, arm: str, goal: FloatArray, seconds: float) -> None:
+def drive(world: World[Any], arm: str, goal: FloatArray, seconds: float) -> None:
     """Move an arm to the joints `goal` (6,) rad from rest to rest and wait a little."""
     start = world.arms[arm].reading().positions
     s = np.linspace(0.0, 1.0, 40)
@@ -25,7 +28,7 @@ def drive(world: World, arm: str, goal: FloatArray, seconds: float) -> None:
     world.advance(seconds + 0.1)
 
 
-def kinematics(world: World, arm: str) -> ArmKinematics:
+def kinematics(world: World[Any], arm: str) -> ArmKinematics:
     return ArmKinematics(RigidTransform.from_translation(world.cell.known.arm(arm).base))
 
 
@@ -33,34 +36,36 @@ def nearest(solutions: FloatArray, q: FloatArray) -> FloatArray:
     return np.asarray(min(solutions, key=lambda s: float(np.abs(wrap(s - q)).max())))
 
 
-def take_hold(world: World) -> None:
-    """Bring the right hand round the connector by the preferred grasp and close it."""
-    robot, arm = kinematics(world, "right"), world.arms["right"]
-    connector = world.cell.known.cable.connector
+def take_hold(world: World[CableObjects]) -> None:
+    """Bring the hand round the connector by the preferred grasp and close it."""
+    known = world.objects.cell.known.cable
+    hand, connector = known.hand, known.connector
+    robot, arm = kinematics(world, hand), world.arms[hand]
     arm.gripper.open(0.06)
-    for grasp in grasp_candidates(world.connector_pose(), connector.length, connector.radius, shallow=SHALLOW):
+    for grasp in grasp_candidates(world.objects.connector_pose(), connector.length, connector.radius, shallow=SHALLOW):
         back = grasp.world_from_tool * RigidTransform.from_translation([-STANDOFF, 0.0, 0.0])
         before, at = robot.ik(back), robot.ik(grasp.world_from_tool)
         if len(before) and len(at):
             break
     start = nearest(before, arm.reading().positions)
-    drive(world, "right", start, 2.5)
-    drive(world, "right", nearest(at, start), 0.8)
+    drive(world, hand, start, 2.5)
+    drive(world, hand, nearest(at, start), 0.8)
     arm.gripper.open(2 * connector.radius + GENTLE)
     world.advance(1.0)
     arm.gripper.close(GRIP_FORCE)
     world.advance(0.6)
 
 
-def draw(world: World, way: FloatArray, seconds: float) -> None:
-    """Move the right hand by `way` (3,) m along a line without turning it, and wait a little."""
+def draw(world: World[CableObjects], way: FloatArray, seconds: float) -> None:
+    """Move the hand by `way` (3,) m along a line without turning it, and wait a little."""
     start_to_draw(world, way, seconds)
     world.advance(seconds + 0.1)
 
 
-def start_to_draw(world: World, way: FloatArray, seconds: float, steps: int = 5) -> None:
-    """Let the right hand begin to move by `way` (3,) m along a line."""
-    robot, arm = kinematics(world, "right"), world.arms["right"]
+def start_to_draw(world: World[CableObjects], way: FloatArray, seconds: float, steps: int = 5) -> None:
+    """Let the hand begin to move by `way` (3,) m along a line."""
+    hand = world.objects.cell.known.cable.hand
+    robot, arm = kinematics(world, hand), world.arms[hand]
     path = [arm.reading().positions]
     tool = robot.tool(path[0])
     for share in np.linspace(0.0, 1.0, steps + 1)[1:]:

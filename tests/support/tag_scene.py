@@ -7,16 +7,15 @@ import pybullet as p
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from regrasp.app.files.resources import shipped
-from regrasp.app.scenario.cell_file import load_cell
-from regrasp.interfaces.cable.cell import Tag
+from regrasp.app.tasks.cable.cells import cable_cell
 from regrasp.interfaces.frame import RgbdFrame
+from regrasp.interfaces.tag import Tag
 from regrasp.sim.cameras.depth_noise import DepthNoise
 from regrasp.sim.render.fiducials import compound_visual, tag_boxes
 from regrasp.sim.render.renderer import LightState, RendererName, make_renderer
 from regrasp.sim.render.visuals import Visuals
 
-CELL = load_cell(shipped("cell")["thesis_tags"])
+CELL = cable_cell("thesis_tags")
 KNOWN, CONNECTOR, CAMERA = CELL.known, CELL.known.cable.connector, CELL.known.camera("rear")
 K = CAMERA.intrinsics
 assert CONNECTOR.tag is not None

@@ -9,7 +9,7 @@ import yaml
 
 from regrasp.interfaces.cable.cell import CableCell
 from regrasp.interfaces.trajectory import Trajectory
-from regrasp.sim.world import World
+from regrasp.sim.cable.objects import cable_world
 
 LOOKS = range(4, 21, 4)  # tenths of a second at which the second reader looks
 
@@ -22,7 +22,7 @@ def small_cell() -> CableCell:
 
 
 def main(second_reader: bool) -> None:
-    world = World(small_cell(), "earth", seed=11, renderer="software")
+    world = cable_world(small_cell(), "earth", seed=11)
     for name, arm in world.arms.items():
         start = arm.reading().positions
         goal = start + np.array([0.3, 0.4, -0.3, 0.5, 0.2, 0.6])
@@ -33,7 +33,7 @@ def main(second_reader: bool) -> None:
         world.advance(0.1)
         if tenth == 10:
             world.arms["right"].gripper.close(15.0)
-        digest.update(world.connector_pose().as_matrix().tobytes())
+        digest.update(world.objects.connector_pose().as_matrix().tobytes())
         for arm in world.arms.values():
             reading = arm.reading()
             digest.update(np.concatenate([reading.positions, reading.velocities, reading.efforts]).tobytes())

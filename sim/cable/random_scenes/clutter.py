@@ -11,7 +11,7 @@ from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cable.cell import CableKnown, Connector, Socket
 from regrasp.interfaces.cell import Box
 from regrasp.interfaces.fields import Color
-from regrasp.sim.build import OUT_OF_SIGHT
+from regrasp.sim.bodies import OUT_OF_SIGHT
 
 _HIDDEN_POSITION = OUT_OF_SIGHT.translation.tolist()
 _ALONG_X = (0.0, np.sqrt(0.5), 0.0, np.sqrt(0.5))  # PyBullet's cylinders and capsules lie along z

@@ -11,7 +11,8 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from regrasp.interfaces.arrays import FloatArray, Mask
 from regrasp.interfaces.cable.cell import CableCell
 from regrasp.interfaces.cell import OPTICAL, CameraSpec, WristMount
-from regrasp.sim.build import OUT_OF_SIGHT, build_boxes
+from regrasp.sim.bodies import OUT_OF_SIGHT, build_box
+from regrasp.sim.cable.fixtures import build_fixtures
 from regrasp.sim.cable.random_scenes.clutter import (
     contrasting_color,
     make_cable,
@@ -49,7 +50,7 @@ class RandomSceneParameters:
     high: Triple = (0.48, 0.42, 0.62)  # ... in which the centre of a free or held connector lies
     plugged_share: float = 0.15  # of the pictures show the connector in a socket,
     stowed_share: float = 0.1  # in the clip,
-    held_share: float = 0.2  # in the right gripper; in the others it hangs free
+    held_share: float = 0.2  # in the hand; in the others it hangs free
     occluded_share: float = 0.6  # of the pictures have a piece of foam in front of the connector
     clutter: int = 8  # objects in a scene; a picture shows some of them
     occluders: int = 3  # pieces of foam in a scene; a picture shows some of them
@@ -102,8 +103,8 @@ class RandomScene:
         self._low, self._high = np.array(parameters.low), np.array(parameters.high)
         self._light = parameters.held_out_light if held_out else parameters.light
         self._known = repainted(rearranged(cell.known, rng) if held_out else cell.known, rng)
-        bodies = build_boxes(self._client, self._known, ())
-        self._walls = [bodies[box.name] for box in cell.known.boxes]
+        self._walls = [build_box(self._client, box) for box in self._known.boxes]
+        build_fixtures(self._client, self._known.cable)
         self._arms = {spec.name: self._make_arm(spec.name) for spec in cell.known.arms}
         connector, radius = cell.known.cable.connector, cell.hidden.cable.radius
         dark = random_color(rng, (0.02, 0.25))
@@ -173,8 +174,8 @@ class RandomScene:
             p.resetJointState(arm.body, arm.links[finger], side * opening, physicsClientId=self._client)
 
     def _in_hand(self) -> RigidTransform:
-        """The connector's pose in the right gripper, with the arm posed so that it is in the connector's box."""
-        rng, arm = self._rng, self._arms["right"]
+        """The connector's pose in the hand, with the arm posed so that it is in the connector's box."""
+        rng, arm = self._rng, self._arms[self._known.cable.hand]
         tool = arm.tool_pose()
         for _ in range(30):  # choice: about three draws of four end outside the box
             self._pose_arm(arm)

@@ -11,9 +11,9 @@ from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cable.cell import CableCell
 from regrasp.sim.cable.cable import BodyState
 from regrasp.sim.cable.fixtures import BodyLink, ClipHold, ClipParameters, Hold, SocketHold
-from regrasp.sim.world import WorldParameters
+from regrasp.sim.cable.objects import CableObjectsParameters
 
-STAND_FORCE = WorldParameters().stand_force
+STAND_FORCE = CableObjectsParameters().stand_force
 RAMP = 2.0  # N/s
 LET_GO = 1.0  # N around the stated force
 SEATED = 0.0005  # m

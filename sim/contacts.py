@@ -1,0 +1,32 @@
+"""Contacts of the arms with what they must not touch."""
+
+from collections.abc import Mapping
+
+import pybullet as p
+
+from regrasp.sim.robot.arm import SimArm
+
+
+class ContactWatch:
+    """Notes the largest normal force of each arm against each body that it must not touch.
+
+    `forbidden` gives the names of those bodies by their ids; an arm must not touch another one either. `peaks` holds
+    the forces in N by "NAME arm - OTHER".
+    """
+
+    def __init__(self, client: int, arms: Mapping[str, SimArm], forbidden: Mapping[int, str]) -> None:
+        self._client, self._arms = client, arms
+        self._named = {**forbidden, **{arm.body: name for name, arm in arms.items()}}
+        self.peaks: dict[str, float] = {}
+
+    def look(self) -> None:
+        """Look at the contacts of the last step."""
+        for name, arm in self._arms.items():
+            sums: dict[str, float] = {}
+            for contact in p.getContactPoints(arm.body, physicsClientId=self._client):
+                other = self._named.get(contact[2] if contact[1] == arm.body else contact[1])
+                if other is not None and other != name:
+                    sums[other] = sums.get(other, 0.0) + contact[9]
+            for other, force in sums.items():
+                key = f"{name} arm - {other}"
+                self.peaks[key] = max(self.peaks.get(key, 0.0), force)

@@ -1,0 +1,51 @@
+"""The scene of a world: what stands still in it, and its props."""
+
+import pybullet as p
+from scipy.spatial.transform import RigidTransform, Rotation
+
+from regrasp.interfaces.arrays import FloatArray
+from regrasp.interfaces.cell import KnownCell
+from regrasp.interfaces.scene import Obstacle, SceneSetup
+from regrasp.sim.bodies import OUT_OF_SIGHT, build_box, build_prop
+from regrasp.sim.engine import Engine
+from regrasp.sim.objects import TaskObjects
+
+
+class Scene:
+    """The cell's boxes, the fixed bodies of the task's objects, obstacles and props, built in this order.
+
+    `fixed_bodies` holds the ids of all but the props by name: the boxes' names, those that the task gives, and
+    `obstacle NAME`. `forbidden` names the bodies that no arm must touch: boxes and obstacles.
+    """
+
+    def __init__(self, engine: Engine, known: KnownCell, objects: TaskObjects, setup: SceneSetup) -> None:
+        self._client = engine.client
+        boxes = {box.name: build_box(self._client, box) for box in known.boxes}
+        of_task = objects.build_fixed(engine)
+        obstacles = self._build_obstacles(setup.obstacles)
+        self._props = [build_prop(self._client, prop) for prop in setup.props]
+        self.fixed_bodies: dict[str, int] = {**boxes, **of_task, **obstacles}
+        self.forbidden = {body: name for name, body in (boxes | obstacles).items()}
+
+    def place_obstacle(self, name: str, center: FloatArray) -> None:
+        """Move an obstacle that has no stand: the centre of its box to `center` (3,) m."""
+        body = self.fixed_bodies[f"obstacle {name}"]
+        turn = p.getBasePositionAndOrientation(body, physicsClientId=self._client)[1]
+        p.resetBasePositionAndOrientation(body, center.tolist(), turn, physicsClientId=self._client)
+
+    def place_prop(self, number: int, pose: RigidTransform | None) -> None:
+        """Put prop `number` at `pose`, world_from_prop, or with None out of sight."""
+        at = OUT_OF_SIGHT if pose is None else pose
+        turn = at.rotation.as_quat().tolist()
+        p.resetBasePositionAndOrientation(
+            self._props[number], at.translation.tolist(), turn, physicsClientId=self._client
+        )
+
+    def _build_obstacles(self, obstacles: tuple[Obstacle, ...]) -> dict[str, int]:
+        bodies = {}
+        for obstacle in obstacles:
+            turn = Rotation.from_euler("z", obstacle.yaw)
+            for box in (obstacle.box, obstacle.stand):
+                if box is not None:
+                    bodies[f"obstacle {box.name}"] = build_box(self._client, box, turn)
+        return bodies
