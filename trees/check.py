@@ -76,7 +76,7 @@ def check_runs(root: Element, trees: Mapping[str, Element], known: Mapping[str, 
     if main is None:
         return []
     expanded = ExpandedTree(main, trees, known)
-    return [*expanded.findings, *check_flow(expanded.root)]
+    return [*expanded.findings, *check_flow(expanded.root, known)]
 
 
 def unknown(what: str, word: str, known: Collection[str]) -> str:

@@ -21,6 +21,7 @@ from py_trees.composites import Composite
 from py_trees.decorators import Decorator
 from py_trees.ports import BehaviourWithPorts, PortInformation
 
+from regrasp.behaviors.keys import USES, declared
 from regrasp.interfaces.devices import TICK
 from regrasp.trees.element import read_elements
 from regrasp.trees.load import load_tree
@@ -79,16 +80,11 @@ class ScriptedLeaf(BehaviourWithPorts):
 
 
 def stand_ins(leaves: Mapping[str, Any]) -> dict[str, type]:
-    """A scripted class for each leaf class, with the same ports and statuses, so that the tree file passes its check.
+    """A scripted class for each leaf class, with the same ports, declared keys and statuses: the check finds the same.
 
     Decorators and composites are the tree's logic and stay what they are.
     """
-    return {
-        tag: leaf
-        if issubclass(leaf, (Decorator, Composite))
-        else _stand_in(tag, leaf.input_ports(), leaf.output_ports(), getattr(leaf, "RETURNS", ANY_STATUS))
-        for tag, leaf in leaves.items()
-    }
+    return {tag: leaf if issubclass(leaf, (Decorator, Composite)) else _of(tag, leaf) for tag, leaf in leaves.items()}
 
 
 def leaves_named_in(path: Path) -> dict[str, type]:
@@ -104,6 +100,13 @@ def leaves_named_in(path: Path) -> dict[str, type]:
             ports.setdefault(element.tag, set()).update(element.attributes.keys() - {"name"})
     anything = PortInformation(data_type=str, required=False)
     return {tag: _stand_in(tag, dict.fromkeys(sorted(names), anything), {}) for tag, names in ports.items()}
+
+
+def _of(tag: str, leaf: Any) -> type[ScriptedLeaf]:
+    scripted = _stand_in(tag, leaf.input_ports(), leaf.output_ports(), getattr(leaf, "RETURNS", ANY_STATUS))
+    for use in USES:
+        setattr(scripted, use, declared(leaf, use))
+    return scripted
 
 
 def _stand_in(
@@ -172,7 +175,7 @@ class ScriptedTree:
         self.tree = py_trees.trees.BehaviourTree(load_tree(path, stand_ins(leaves), inputs))
         self.ticks = 0
         silent = SimpleNamespace(info=_nothing, warning=_nothing)
-        services = SimpleNamespace(clock=self, belief=SimpleNamespace(causes=[]), log=silent)  # for our decorators
+        services = SimpleNamespace(clock=self, log=silent)  # for our decorators
         self.tree.setup(services=services)
         self._table = TickTable(self.tree.root)
         self.tree.add_visitor(self._table)
