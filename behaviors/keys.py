@@ -74,6 +74,9 @@ class Key(Generic[T]):
         return f"{self.name} ({self.about})"
 
 
+Keys = tuple[Key[Any], ...]  # as a class declares them
+
+
 class MissingKeyError(LookupError):
     """A key holds nothing and has no default."""
 
@@ -84,7 +87,7 @@ class MissingKeyError(LookupError):
 CAUSES: Key[tuple[Cause, ...]] = Key("causes", "causes of the leaves that failed, the latest last", default=())
 
 
-def declared(node: type, use: Use) -> tuple[Key[Any], ...]:
+def declared(node: type, use: Use) -> Keys:
     """The keys that a class and its base classes declare in their attribute of that name."""
     return tuple(dict.fromkeys(key for cls in reversed(node.__mro__) for key in vars(cls).get(use, ())))
 
@@ -114,9 +117,9 @@ class WithKeys:
     `WRITES`: written or cleared. A node that uses another key raises TypeError.
     """
 
-    NEEDS: ClassVar[tuple[Key[Any], ...]] = ()
-    READS: ClassVar[tuple[Key[Any], ...]] = ()
-    WRITES: ClassVar[tuple[Key[Any], ...]] = ()
+    NEEDS: ClassVar[Keys] = ()
+    READS: ClassVar[Keys] = ()
+    WRITES: ClassVar[Keys] = ()
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)

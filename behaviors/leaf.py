@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 from py_trees.common import Status
 from py_trees.ports import BehaviourWithPorts, PortInformation
 
-from regrasp.behaviors.keys import CAUSES, MissingKeyError, WithKeys
+from regrasp.behaviors.keys import CAUSES, Keys, MissingKeyError, WithKeys
 from regrasp.behaviors.services import Services
 from regrasp.interfaces.cause import Cause, CauseCode, ServiceError
 from regrasp.motion.failure import PlanningError
@@ -43,8 +43,8 @@ class WithServices(WithKeys):
     run.
     """
 
-    READS = (CAUSES,)
-    WRITES = (CAUSES,)
+    READS: ClassVar[Keys] = (CAUSES,)
+    WRITES: ClassVar[Keys] = (CAUSES,)
 
     name: str
     feedback_message: str

@@ -15,7 +15,7 @@ from py_trees.common import Status
 from py_trees.ports import PortsMixin
 from py_trees.ports_utils import convert_str_to_type, is_instance_of_type
 
-from regrasp.behaviors.keys import Key, declared
+from regrasp.behaviors.keys import Keys, declared
 from regrasp.interfaces.quote import nearest
 
 Accepts = Any  # a type, or the words that may stand there as a tuple of strings
@@ -82,9 +82,9 @@ class ElementKind:
     max_children: int | None = 0
     about: str = ""
     returns: frozenset[Status] = ANY_STATUS
-    needs: tuple[Key[Any], ...] = ()
-    reads: tuple[Key[Any], ...] = ()
-    writes: tuple[Key[Any], ...] = ()
+    needs: Keys = ()
+    reads: Keys = ()
+    writes: Keys = ()
 
 
 _MEMORY = {"memory": Attribute(("true", "false"), takes_key=False, about="true: go on at the child that was running")}

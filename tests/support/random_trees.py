@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from py_trees.common import Status
 from py_trees.ports import BehaviourWithPorts, PortInformation
 
+from regrasp.behaviors.keys import Key, WithKeys
 from regrasp.trees.vocabulary import BUILT_IN
 
 Ports = dict[str, PortInformation]
@@ -55,7 +56,51 @@ class Write(Dice):
         return super().update()
 
 
-LEAVES: dict[str, type[py_trees.behaviour.Behaviour]] = {c.__name__: c for c in (Dice, Yes, No, Busy, Read, Write)}
+A: Key[int] = Key("toy/a", "a number")
+B: Key[int] = Key("toy/b", "another number")
+
+
+class Put(WithKeys, Dice):
+    WRITES = (A,)
+
+    def update(self) -> Status:
+        if self.dice.random() < 0.7:
+            self.write(A, 1)
+        return super().update()
+
+
+class Need(WithKeys, Dice):
+    NEEDS = (A,)
+
+    def update(self) -> Status:
+        self.read(A)
+        return super().update()
+
+
+class Turn(Need):
+    """Turns one key into another."""
+
+    WRITES = (A, B)
+
+    def update(self) -> Status:
+        status = super().update()
+        self.write(B, self.read(A))
+        if self.dice.random() < 0.5:
+            self.clear(A)
+        return status
+
+
+class NeedBoth(Need):
+    NEEDS = (B,)
+
+    def update(self) -> Status:
+        self.read(B)
+        return super().update()
+
+
+LEAVES: dict[str, type[py_trees.behaviour.Behaviour]] = {
+    leaf.__name__: leaf for leaf in (Dice, Yes, No, Busy, Read, Write, Put, Need, Turn, NeedBoth)
+}
 
 _BOOL, _KEY = st.sampled_from(["true", "false"]), st.sampled_from(["{a}", "{b}"])
 _CONTROL: dict[str, dict[str, st.SearchStrategy[str]]] = {

@@ -11,6 +11,7 @@ from py_trees.parsers.behaviour_tree_xml import parse_behaviour_tree_xml
 from py_trees.ports import NoDataAvailable
 from random_trees import LEAVES, Dice, trees
 
+from regrasp.behaviors.keys import MissingKeyError
 from regrasp.trees import check_tree
 
 
@@ -34,12 +35,17 @@ def seen(path: Path, seed: int) -> dict[str, set[int]]:
                     succeeded.add(line_of(node.name))
             if root.status is not Status.RUNNING:
                 break
-    except NoDataAvailable:
+    except (NoDataAvailable, MissingKeyError):
         pass
     return {"never reached": reached, "never succeed": succeeded, "before": {line_of(name) for name in Dice.ticked}}
 
 
-WORDS = {"is never reached": "never reached", "can never succeed": "never succeed", "reads /": "before"}
+WORDS = {
+    "is never reached": "never reached",
+    "can never succeed": "never succeed",
+    "reads /": "before",
+    "needs toy/": "before",
+}
 
 
 @settings(max_examples=60)
