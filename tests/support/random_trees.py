@@ -1,6 +1,7 @@
 """Random tree files, and leaves that end each tick in any status that they may return."""
 
 import random
+from collections.abc import Collection
 from typing import Any, ClassVar
 
 import py_trees
@@ -124,8 +125,12 @@ def _element(tag: str, attributes: dict[str, st.SearchStrategy[str]], children: 
     return st.tuples(st.just(tag), st.fixed_dictionaries(attributes), children)
 
 
-_LEAF = st.sampled_from(sorted(LEAVES)).flatmap(lambda tag: _element(tag, _LEAF_PORTS.get(tag, {}), st.just([])))
+KEYED = ("Dice", "Need", "NeedBoth", "Put", "Turn")
 _SUBTREE = _element("SubTree", {"ID": st.just("Inner")}, st.just([]))
+
+
+def _leaf(tags: Collection[str]) -> st.SearchStrategy[Node]:
+    return st.sampled_from(sorted(tags)).flatmap(lambda tag: _element(tag, _LEAF_PORTS.get(tag, {}), st.just([])))
 
 
 def _parents(nodes: st.SearchStrategy[Node]) -> st.SearchStrategy[Node]:
@@ -145,13 +150,13 @@ def _text(node: Node, lines: list[str]) -> None:
 
 
 @st.composite
-def trees(draw: st.DrawFn) -> str:
-    """The text of a tree file of known words with all that they need; what it does may still be wrong."""
-    main = draw(st.recursive(_LEAF | _SUBTREE, _parents, max_leaves=10))
+def trees(draw: st.DrawFn, tags: Collection[str] = tuple(LEAVES)) -> str:
+    """The text of a tree file of these leaves with all that they need; what it does may still be wrong."""
+    main = draw(st.recursive(_leaf(tags) | _SUBTREE, _parents, max_leaves=10))
     lines = ['<root main_tree_to_execute="Main">', '<BehaviorTree ID="Main">']
     _text(main, lines)
     lines[-1] += "</BehaviorTree>"
-    inner = draw(st.recursive(_LEAF, _parents, max_leaves=4))
+    inner = draw(st.recursive(_leaf(tags), _parents, max_leaves=4))
     lines.append('<BehaviorTree ID="Inner">')
     _text(inner, lines)
     lines[-1] += "</BehaviorTree></root>"
