@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 from py_trees.common import Status
 from py_trees.ports import BehaviourWithPorts, PortInformation
 
+from regrasp.behaviors.keys import CAUSES, Keys, MissingKeyError, WithKeys
 from regrasp.behaviors.services import Services
 from regrasp.interfaces.cause import Cause, CauseCode, ServiceError
 from regrasp.motion.failure import PlanningError
@@ -34,8 +35,16 @@ class LeafPort(PortInformation):
     names: str | None = None
 
 
-class WithServices:
-    """A node of a tree that has the run's services, and says why it fails."""
+class WithServices(WithKeys):
+    """A node of a tree that has the run's services, uses declared keys, and says why it fails.
+
+    Override `work`; py_trees calls it through `update`. When a service raises ServiceError the arms stop and the node
+    fails; it fails also when a key that it reads holds nothing. Any other exception is a programming error and ends the
+    run.
+    """
+
+    READS: ClassVar[Keys] = (CAUSES,)
+    WRITES: ClassVar[Keys] = (CAUSES,)
 
     name: str
     feedback_message: str
@@ -56,11 +65,25 @@ class WithServices:
 
     def fail_with(self, cause: Cause) -> Status:
         """Record a cause, which may be another node's, and return FAILURE."""
-        self.services.belief.causes.append(cause)
+        self.write(CAUSES, (*self.read(CAUSES), cause))
         self.feedback_message = cause.message
         values = {} if cause.node == self.path else {"of": cause.node}
         self.services.log.warning("failed", node=self.path, code=str(cause.code), message=cause.message, **values)
         return Status.FAILURE
+
+    def work(self) -> Status:
+        """Do one tick of the work."""
+        raise NotImplementedError
+
+    def update(self) -> Status:
+        """Tick, and fail when a service breaks off or a key holds nothing."""
+        try:
+            return self.work()
+        except ServiceError as error:
+            self.services.motion.stop()
+            return self.fail(CauseCode.SERVICE_FAILED, str(error))
+        except MissingKeyError as error:
+            return self.fail(CauseCode.KEY_MISSING, str(error))
 
     def say(self, event: str, **values: Any) -> None:
         """Write an event of this node into the run's log."""
@@ -68,26 +91,10 @@ class WithServices:
 
 
 class Leaf(WithServices, BehaviourWithPorts):
-    """A leaf with services, which says why it fails. Override `work`; py_trees calls it through `update`.
-
-    When a service raises ServiceError the arms stop and the leaf fails. Any other exception is a programming error and
-    ends the run.
-    """
+    """A leaf with services, which says why it fails."""
 
     # The statuses that `update` may return. The tree's check needs them to find nodes that are never reached.
     RETURNS: ClassVar[frozenset[Status]] = frozenset({Status.SUCCESS, Status.FAILURE, Status.RUNNING})
-
-    def work(self) -> Status:
-        """Do one tick of the work."""
-        raise NotImplementedError
-
-    def update(self) -> Status:
-        """Tick, and fail when a service breaks off."""
-        try:
-            return self.work()
-        except ServiceError as error:
-            self.services.motion.stop()
-            return self.fail(CauseCode.SERVICE_FAILED, str(error))
 
 
 class StepsLeaf(Leaf):

@@ -3,7 +3,6 @@
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from regrasp.interfaces.cause import Cause
 from regrasp.interfaces.devices import Clock
 
 if TYPE_CHECKING:
@@ -32,7 +31,6 @@ class Belief:
     found_by: str | None = None  # the camera that found it last
     vain_searches: int = 0  # searches that failed since the connector was found last
     notices: list[LossNotice] = field(default_factory=list)
-    causes: list[Cause] = field(default_factory=list)  # of the leaves that failed, the latest last
 
 
 @dataclass

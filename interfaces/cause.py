@@ -20,6 +20,7 @@ class CauseCode(StrEnum):
     SERVICE_FAILED = "service_failed"
     TOO_MANY_TRIES = "too_many_tries"
     KEY_DIFFERS = "key_differs"
+    KEY_MISSING = "key_missing"
     TIMED_OUT = "timed_out"
     TIME_LIMIT = "time_limit"
     WALL_LIMIT = "wall_limit"

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 
+from regrasp.behaviors.keys import CAUSES
 from regrasp.trees.vocabulary import BUILT_IN, Attribute, ElementKind, element_kinds
 
 _SUBTREE = ElementKind(
@@ -17,7 +18,7 @@ def all_elements(leaves: Mapping[str, type]) -> dict[str, ElementKind]:
 
 
 def describe(tag: str, kind: ElementKind, full: bool = False) -> Iterator[str]:
-    """Lines: the element with the first line of what it does (or all of it), then each attribute."""
+    """Lines: the element with the first line of what it does (or all of it), then each attribute and declared key."""
     about = kind.about.splitlines() or [""]
     yield f"{tag:<18} {about[0]}".rstrip()
     if full:
@@ -25,6 +26,8 @@ def describe(tag: str, kind: ElementKind, full: bool = False) -> Iterator[str]:
         yield f"    {'returns':<14} {', '.join(sorted(status.value.lower() for status in kind.returns))}"
     for name, attribute in kind.attributes.items():
         yield f"    {name:<14} {_attribute(attribute)}"
+    for use, keys in (("needs", kind.needs), ("reads", kind.reads), ("writes", kind.writes)):
+        yield from (f"    {key.name:<14} {use}: {key.about}" for key in keys if key is not CAUSES)  # any leaf's
 
 
 def _attribute(attribute: Attribute) -> str:

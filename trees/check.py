@@ -6,12 +6,13 @@ stated, unknown attributes, empty composites, ports without a value.
 
 import re
 from collections.abc import Collection, Iterator, Mapping
-from itertools import islice
+from itertools import chain, islice
 from pathlib import Path
 
 from regrasp.interfaces.quote import cut, quoted
 from regrasp.trees.element import Element, TreeSyntaxError, key_of, read_elements
 from regrasp.trees.flow import check_flow
+from regrasp.trees.leaf_sets import check_task, installed_leaves, not_imported
 from regrasp.trees.vocabulary import COUNTERPARTS, CellNames, ElementKind, element_kinds, suggestion
 from regrasp.trees.wiring import ExpandedTree, TreeTooLarge
 
@@ -25,29 +26,30 @@ def check_tree(
     leaves: Mapping[str, type] | None = None,
     names: CellNames | None = None,
     max_findings: int = 500,
+    task: str | None = None,
 ) -> list[TreeFinding]:
     """All findings, in line order, at most `max_findings`; a file without findings loads.
 
-    `leaves` maps a tag to its class, by default all of ours. `names` holds, for each kind of object in the cell, the
-    names that a port may take, {"socket": ["back_1", ...]}; without it names are not checked.
+    `leaves` maps a tag to its class, by default those that are installed. `names` holds, for each kind of object in the
+    cell, the names that a port may take, {"socket": ["back_1", ...]}; without it names are not checked. `task` is the
+    scenario's; without it the tree's leaves must be of one task.
 
     Raises:
         TypeError: a leaf class without ports.
     """
-    if leaves is None:
-        from regrasp.behaviors import LEAVES  # late: toy leaves do without them
-
-        leaves = LEAVES
     try:
         root = read_elements(path)
     except OSError as error:
         return [(0, f"cannot be read: {error.strerror}; name a file that can")]
     except TreeSyntaxError as error:
         return [(error.line, str(error))]
-    return sorted(set(islice(_findings(root, element_kinds(leaves, names)), max_findings)))
+    if leaves is None:
+        leaves = installed_leaves(root, task)
+    findings = chain(_findings(root, element_kinds(leaves, names), leaves), check_task(root, leaves, task))
+    return sorted(set(islice(findings, max_findings)))
 
 
-def _findings(root: Element, known: Mapping[str, ElementKind]) -> Iterator[TreeFinding]:
+def _findings(root: Element, known: Mapping[str, ElementKind], leaves: Mapping[str, type]) -> Iterator[TreeFinding]:
     given = [tree for tree in root.children if tree.tag == "BehaviorTree"]
     trees = {tree.attributes["ID"]: tree for tree in given if tree.attributes.get("ID")}
     keys = {identifier: _keys_used(tree) for identifier, tree in trees.items()}
@@ -56,7 +58,7 @@ def _findings(root: Element, known: Mapping[str, ElementKind]) -> Iterator[TreeF
         yield from _check_names(tree)
         for element in tree.walk():
             if element is not tree:
-                yield from _check_element(element, known, keys)
+                yield from _check_element(element, known, keys, leaves)
     yield from _never_run(root, trees)
     loops = [*_loops(trees)]
     yield from loops
@@ -76,7 +78,7 @@ def check_runs(root: Element, trees: Mapping[str, Element], known: Mapping[str, 
     if main is None:
         return []
     expanded = ExpandedTree(main, trees, known)
-    return [*expanded.findings, *check_flow(expanded.root)]
+    return [*expanded.findings, *check_flow(expanded.root, known)]
 
 
 def unknown(what: str, word: str, known: Collection[str]) -> str:
@@ -139,7 +141,7 @@ def _check_names(tree: Element) -> Iterator[TreeFinding]:
 
 
 def _check_element(
-    element: Element, known: Mapping[str, ElementKind], keys: Mapping[str, set[str]]
+    element: Element, known: Mapping[str, ElementKind], keys: Mapping[str, set[str]], leaves: Mapping[str, type]
 ) -> Iterator[TreeFinding]:
     if element.tag == "SubTree":
         yield from _check_subtree(element, keys)
@@ -148,7 +150,8 @@ def _check_element(
         if right := COUNTERPARTS.get(element.tag):
             yield element.line, f"unknown element {quoted(element.tag)}; write {right}"
         else:
-            yield element.line, unknown("element", element.tag, [*known, "SubTree"])
+            right = suggestion(element.tag, [*known, "SubTree"])
+            yield element.line, f"unknown element {quoted(element.tag)}{not_imported(leaves)}; {right}"
         return
     kind = known[element.tag]
     if len(element.children) < kind.min_children:

@@ -4,7 +4,7 @@ It follows all possible runs at once: a leaf may end every tick in any status th
 impossible in every run, so a tree that can work has no findings.
 """
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from functools import reduce
 from operator import or_
 from typing import NamedTuple
@@ -12,7 +12,7 @@ from typing import NamedTuple
 from py_trees.common import Status
 
 from regrasp.interfaces.quote import cut
-from regrasp.trees.vocabulary import ANY_STATUS, BUILT_IN
+from regrasp.trees.vocabulary import ANY_STATUS, BUILT_IN, ElementKind
 from regrasp.trees.wiring import ExpandedNode, Wire
 
 SUCCESS, FAILURE, RUNNING = Status.SUCCESS, Status.FAILURE, Status.RUNNING
@@ -52,22 +52,41 @@ _TO: dict[str, dict[Status, tuple[Status, ...]]] = {  # what decorators make of 
 _GOES_ON = {"Sequence": SUCCESS, "Fallback": FAILURE, "Selector": FAILURE}
 
 
-def check_flow(root: ExpandedNode) -> Iterator[tuple[int, str]]:
-    """Findings (line, sentence) about what no run of the tree can do."""
+def check_flow(root: ExpandedNode, known: Mapping[str, ElementKind]) -> Iterator[tuple[int, str]]:
+    """Findings (line, sentence) about what no run of the tree can do; `known` are the kinds of elements by tag."""
     flow = _Flow(root)
     nodes = [*root.walk()]
     yield from _unreachable(nodes, flow)
     yield from _hopeless(nodes, flow)
-    writers: dict[str, Wire] = {}
+    writers: dict[str, list[Wire]] = {}
     for wire in (wire for node in nodes for wire in node.writes):
-        writers.setdefault(wire.path, wire)
+        writers.setdefault(wire.path, []).append(wire)
+    too_early = flow.too_early
     for reader in flow.readers:
-        if reader.path not in writers:
-            yield reader.line, f"{reader.what} reads {cut(reader.path)}, which no port writes; wire an output to it"
-    for reader in flow.too_early:
-        if writer := writers.get(reader.path):
-            early = f"{reader.what} reads {cut(reader.path)} before anything can have written it"
-            yield reader.line, f"{early}; tick {writer.what.partition(':')[0]} of line {writer.line} before it"
+        # A leaf that writes what it needs is no help to itself.
+        others = [wire for wire in writers.get(reader.path, []) if (wire.line, wire.what) != (reader.line, reader.what)]
+        if not others:
+            yield reader.line, _unwritten(reader, known)
+        elif reader in too_early:
+            yield reader.line, _early(reader, others[0])
+
+
+def _unwritten(reader: Wire, known: Mapping[str, ElementKind]) -> str:
+    """The sentence about a reader whose key nothing writes."""
+    if reader.key is None:
+        return f"{reader.what} reads {cut(reader.path)}, which no port writes; wire an output to it"
+    own = reader.what.partition(" ")[0]
+    tags = [tag for tag, kind in known.items() if reader.key in kind.writes and tag != own]
+    right = f"tick {' or '.join(tags)} before it" if tags else "no leaf that is known does, so remove it"
+    return f"{reader.what} needs {reader.key.text}, which nothing in this tree writes; {right}"
+
+
+def _early(reader: Wire, writer: Wire) -> str:
+    """The sentence about a reader that is ticked before the writer of its key can have been."""
+    right = f"tick {writer.what.partition(':')[0]} of line {writer.line} before it"
+    if reader.key is None:
+        return f"{reader.what} reads {cut(reader.path)} before anything can have written it; {right}"
+    return f"{reader.what} needs {reader.key.text}, which nothing can have written before it; {right}"
 
 
 def _unreachable(nodes: list[ExpandedNode], flow: "_Flow") -> Iterator[tuple[int, str]]:

@@ -9,6 +9,7 @@ from py_trees.common import Status
 
 from regrasp.interfaces.quote import quoted
 from regrasp.trees.element import Element, key_of, read_elements
+from regrasp.trees.leaf_sets import installed_leaves
 from regrasp.trees.run_stats import NodeStats
 from regrasp.trees.vocabulary import BUILT_IN
 from regrasp.trees.wiring import MAX_NODES, MAX_TREE_DEPTH
@@ -91,7 +92,8 @@ class _Scope:
 
 
 def read_graph(path: Path, leaves: Mapping[str, type] | None = None, inputs: Mapping[str, str] | None = None) -> Node:
-    """The file's main tree. `leaves` maps a tag to its class, by default all of ours; others show as far as written.
+    """The file's main tree. `leaves` maps a tag to its class, by default those that are installed; others show as
+    far as written.
 
     `inputs` take the place of the main BehaviorTree's default values, as in `load_tree`.
 
@@ -100,11 +102,9 @@ def read_graph(path: Path, leaves: Mapping[str, type] | None = None, inputs: Map
         TreeSyntaxError: it is not well-formed.
         ValueError: it has no main tree, or more nodes or depth than a tree may have.
     """
-    if leaves is None:
-        from regrasp.behaviors import LEAVES  # late: toy leaves do without them
-
-        leaves = LEAVES
     root = read_elements(path)
+    if leaves is None:
+        leaves = installed_leaves(root)
     trees = {tree.attributes.get("ID", ""): tree for tree in root.children}
     main = root.attributes.get("main_tree_to_execute", "")
     if main not in trees or not trees[main].children:

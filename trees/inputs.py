@@ -5,6 +5,7 @@ from pathlib import Path
 
 from regrasp.trees.check import TreeFinding, check_runs, unknown
 from regrasp.trees.element import TreeSyntaxError, read_elements
+from regrasp.trees.leaf_sets import installed_leaves
 from regrasp.trees.vocabulary import CellNames, element_kinds
 from regrasp.trees.wiring import TreeTooLarge
 
@@ -17,10 +18,6 @@ def check_inputs(
     Findings that `check_tree` has without the inputs are not repeated; a file that cannot be read gives none. `leaves`
     and `names` as in `check_tree`.
     """
-    if leaves is None:
-        from regrasp.behaviors import LEAVES  # late, as in `check_tree`
-
-        leaves = LEAVES
     try:
         root = read_elements(path)
     except (OSError, TreeSyntaxError):
@@ -29,7 +26,7 @@ def check_inputs(
     main = trees.get(root.attributes.get("main_tree_to_execute", ""))
     if main is None:
         return
-    known = element_kinds(leaves, names)
+    known = element_kinds(installed_leaves(root) if leaves is None else leaves, names)
 
     def found() -> list[TreeFinding]:
         try:

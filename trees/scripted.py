@@ -21,8 +21,10 @@ from py_trees.composites import Composite
 from py_trees.decorators import Decorator
 from py_trees.ports import BehaviourWithPorts, PortInformation
 
+from regrasp.behaviors.keys import USES, declared
 from regrasp.interfaces.devices import TICK
-from regrasp.trees.element import read_elements
+from regrasp.trees.element import TreeSyntaxError, read_elements
+from regrasp.trees.leaf_sets import installed_leaves
 from regrasp.trees.load import load_tree
 from regrasp.trees.paths import find_path, in_tree_order, node_paths
 from regrasp.trees.tick_table import TickTable
@@ -79,16 +81,18 @@ class ScriptedLeaf(BehaviourWithPorts):
 
 
 def stand_ins(leaves: Mapping[str, Any]) -> dict[str, type]:
-    """A scripted class for each leaf class, with the same ports and statuses, so that the tree file passes its check.
+    """A scripted class for each leaf class, with the same ports, declared keys and statuses: the check finds the same.
 
     Decorators and composites are the tree's logic and stay what they are.
     """
-    return {
-        tag: leaf
-        if issubclass(leaf, (Decorator, Composite))
-        else _stand_in(tag, leaf.input_ports(), leaf.output_ports(), getattr(leaf, "RETURNS", ANY_STATUS))
-        for tag, leaf in leaves.items()
-    }
+    return {tag: leaf if issubclass(leaf, (Decorator, Composite)) else _of(tag, leaf) for tag, leaf in leaves.items()}
+
+
+def _installed(path: Path) -> Mapping[str, type]:
+    try:
+        return installed_leaves(read_elements(path))
+    except (OSError, TreeSyntaxError):
+        return {}  # findings of the tree's check
 
 
 def leaves_named_in(path: Path) -> dict[str, type]:
@@ -104,6 +108,13 @@ def leaves_named_in(path: Path) -> dict[str, type]:
             ports.setdefault(element.tag, set()).update(element.attributes.keys() - {"name"})
     anything = PortInformation(data_type=str, required=False)
     return {tag: _stand_in(tag, dict.fromkeys(sorted(names), anything), {}) for tag, names in ports.items()}
+
+
+def _of(tag: str, leaf: Any) -> type[ScriptedLeaf]:
+    scripted = _stand_in(tag, leaf.input_ports(), leaf.output_ports(), getattr(leaf, "RETURNS", ANY_STATUS))
+    for use in USES:
+        setattr(scripted, use, declared(leaf, use))
+    return scripted
 
 
 def _stand_in(
@@ -148,8 +159,8 @@ class ScriptedTree:
     `script` maps leaves, by tag, by tree path or by the path's last parts ("bring/carry"), to their scripts; a path
     goes before a tag. The other leaves follow the script `default` as far as they can: a leaf that never ends in its
     status stays RUNNING, one that is never RUNNING ends at once. `leaves` are the real classes, whose ports and
-    statuses the scripted leaves take over, by default all of ours; `inputs` are those of `load_tree`. Two trees at a
-    time share the blackboard.
+    statuses the scripted leaves take over, by default those that are installed; `inputs` are those of `load_tree`.
+    Two trees at a time share the blackboard.
 
     Raises:
         trees.TreeError: the tree file has findings.
@@ -166,13 +177,11 @@ class ScriptedTree:
         inputs: Mapping[str, str] | None = None,
     ) -> None:
         if leaves is None:
-            from regrasp.behaviors import LEAVES  # late: toy leaves do without them
-
-            leaves = LEAVES
+            leaves = _installed(path)
         self.tree = py_trees.trees.BehaviourTree(load_tree(path, stand_ins(leaves), inputs))
         self.ticks = 0
         silent = SimpleNamespace(info=_nothing, warning=_nothing)
-        services = SimpleNamespace(clock=self, belief=SimpleNamespace(causes=[]), log=silent)  # for our decorators
+        services = SimpleNamespace(clock=self, log=silent)  # for our decorators
         self.tree.setup(services=services)
         self._table = TickTable(self.tree.root)
         self.tree.add_visitor(self._table)

@@ -15,6 +15,7 @@ from py_trees.common import Status
 from py_trees.ports import PortsMixin
 from py_trees.ports_utils import convert_str_to_type, is_instance_of_type
 
+from regrasp.behaviors.keys import Keys, declared
 from regrasp.interfaces.quote import nearest
 
 Accepts = Any  # a type, or the words that may stand there as a tuple of strings
@@ -71,13 +72,19 @@ class Attribute:
 
 @dataclass(frozen=True)
 class ElementKind:
-    """One kind of element; `max_children` None for any number, `returns` the statuses that its `update` may return."""
+    """One kind of element; `max_children` None for any number, `returns` the statuses that its `update` may return.
+
+    `needs`, `reads` and `writes` are the keys that a leaf class declares.
+    """
 
     attributes: Mapping[str, Attribute] = field(default_factory=dict)
     min_children: int = 0
     max_children: int | None = 0
     about: str = ""
     returns: frozenset[Status] = ANY_STATUS
+    needs: Keys = ()
+    reads: Keys = ()
+    writes: Keys = ()
 
 
 _MEMORY = {"memory": Attribute(("true", "false"), takes_key=False, about="true: go on at the child that was running")}
@@ -143,8 +150,8 @@ def element_kinds(leaves: Mapping[str, type], names: CellNames | None = None) ->
     """Every element but SubTree: the built-in ones and the leaves.
 
     A leaf may declare more than py_trees asks for: its ports `above` and `names` (see
-    `regrasp.behaviors.leaf.LeafPort`), its class `RETURNS`. A port for a name takes those in `names`, or any string
-    where there are none.
+    `regrasp.behaviors.leaf.LeafPort`), its class `RETURNS` and keys (`regrasp.behaviors.keys`). A port for a name takes
+    those in `names`, or any string where there are none.
 
     Raises:
         TypeError: a leaf class without ports, which the parser could not build.
@@ -160,6 +167,7 @@ def _leaf_kind(tag: str, leaf: Any, names: CellNames) -> ElementKind:
         for is_output, declared in ((False, leaf.input_ports()), (True, leaf.output_ports()))
         for name, port in declared.items()
     }
+    needs, returns = declared(leaf, "NEEDS"), getattr(leaf, "RETURNS", ANY_STATUS)
     is_composite = issubclass(leaf, py_trees.composites.Composite)
     is_parent = is_composite or issubclass(leaf, py_trees.decorators.Decorator)
     return ElementKind(
@@ -167,7 +175,10 @@ def _leaf_kind(tag: str, leaf: Any, names: CellNames) -> ElementKind:
         min_children=int(is_parent),
         max_children=None if is_composite else int(is_parent),
         about=inspect.cleandoc(leaf.__doc__ or ""),
-        returns=getattr(leaf, "RETURNS", ANY_STATUS),
+        returns=returns | {Status.FAILURE} if needs else returns,  # when a key that it needs was cleared
+        needs=needs,
+        reads=declared(leaf, "READS"),
+        writes=declared(leaf, "WRITES"),
     )
 
 

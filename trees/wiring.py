@@ -1,9 +1,13 @@
-"""The tree that will run, its subtrees expanded and its ports wired to blackboard keys as py_trees' parser does it."""
+"""The tree that will run: its subtrees expanded, its ports wired to blackboard keys as py_trees' parser does it.
+
+A key that a leaf class declares is a wire like a port's.
+"""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from regrasp.behaviors.keys import Key
 from regrasp.interfaces.quote import cut, quoted
 from regrasp.trees.element import Element, key_of
 from regrasp.trees.vocabulary import Attribute, ElementKind
@@ -15,10 +19,10 @@ MAX_TREE_DEPTH = 150
 
 @dataclass(frozen=True)
 class Wire:
-    """A port that is wired to a blackboard key.
+    """A port that is wired to a blackboard key, or a declared `key`.
 
     `what` is its name in messages, `line` its place in the file, `path` the key, `type` that of its values. The type is
-    None where it is unknown: a misspelt port or element, which may be meant to write.
+    None where it is unknown: of a declared key, and of a misspelt port or element, which may be meant to write.
     """
 
     what: str
@@ -27,6 +31,7 @@ class Wire:
     type: Any
     required: bool = False  # a reader that needs a value
     seeded: bool = False  # a writer whose default is on the blackboard from the start
+    key: Key[Any] | None = None
 
 
 @dataclass(eq=False)
@@ -98,7 +103,9 @@ class ExpandedTree:
         self.findings: list[tuple[int, str]] = []
         self.root = ExpandedNode(main)
         self._expand(self.root, main, _Scope("", {}).inner(main), 1)
-        self.findings += _mistyped([*self.root.walk()])
+        nodes = [*self.root.walk()]
+        self._connect_keys(nodes)
+        self.findings += _mistyped(nodes)
 
     def _expand(self, node: ExpandedNode, parent: Element, scope: _Scope, depth: int) -> None:
         for child in parent.children:
@@ -131,6 +138,17 @@ class ExpandedTree:
             if value.startswith("{") and attribute.takes_key:  # literals are checked where they stand
                 self._wire(node, what, attribute, source)
 
+    def _connect_keys(self, nodes: list[ExpandedNode]) -> None:
+        """Add the declared keys to reads and writes. An element that nobody knows may be meant to write any of them."""
+        needed = {key for node in nodes if node.kind for key in node.kind.needs}
+        for node in nodes:
+            element = node.element
+            if node.kind:
+                node.reads += [_key_wire(element, key, required=True) for key in node.kind.needs]
+                node.writes += [_key_wire(element, key) for key in node.kind.writes]
+            elif element.tag not in ("BehaviorTree", "SubTree"):
+                node.writes += [_key_wire(element, key) for key in needed]
+
     def _wire(self, node: ExpandedNode, what: str, attribute: Attribute, source: _Source) -> None:
         wrong = None
         if source.is_constant and attribute.is_output:
@@ -147,6 +165,10 @@ class ExpandedTree:
             (node.writes if attribute.is_output else node.reads).append(wire)
         if wrong:
             self.findings.append((node.element.line, f"{what} {wrong}"))
+
+
+def _key_wire(element: Element, key: Key[Any], required: bool = False) -> Wire:
+    return Wire(element.label, element.line, key.path, None, required, key=key)
 
 
 def _mistyped(nodes: list[ExpandedNode]) -> Iterator[tuple[int, str]]:

@@ -27,7 +27,7 @@ def check_tree_file(
     `task` its leaves, and those of every task, are known.
     """
     read_text(path, where)
-    found = [Finding(shown(path), line, message) for line, message in check_tree(path, names=names)]
+    found = [Finding(shown(path), line, message) for line, message in check_tree(path, names=names, task=task)]
     if found:
         raise Findings(found)
 

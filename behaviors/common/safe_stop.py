@@ -5,6 +5,7 @@ from typing import ClassVar
 
 from py_trees.common import Status
 
+from regrasp.behaviors.keys import CAUSES
 from regrasp.behaviors.leaf import LeafSteps, StepsLeaf
 from regrasp.interfaces.cause import CauseCode
 
@@ -36,6 +37,7 @@ class SafeStop(StepsLeaf):
         status = super().update()
         if status is not Status.SUCCESS:
             return status
-        if not self.services.belief.causes:
+        causes = self.read(CAUSES)
+        if not causes:
             return self.fail(CauseCode.INTERNAL_ERROR, "stopped safely, and nothing says why")
-        return self.fail_with(self.services.belief.causes[-1])
+        return self.fail_with(causes[-1])

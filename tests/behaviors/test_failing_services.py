@@ -30,7 +30,7 @@ def test_a_service_that_breaks_off_stops_the_arms_and_fails_the_leaf(
 
     monkeypatch.setattr(stage.perception, "look", breaks)
     assert stage.run(stage.tree(LEAF.format(leaf)), 3.0) is Status.FAILURE
-    [cause] = stage.belief.causes
+    [cause] = stage.causes
     assert (cause.code, cause.message) == (CauseCode.SERVICE_FAILED, "perception.look broke off")
     assert stage.motion.stopped == 1
 
@@ -58,7 +58,7 @@ def test_a_leaf_takes_other_parameters(stage: Stage, monkeypatch: pytest.MonkeyP
 def test_without_any_camera_the_cause_is_the_cameras(stage: Stage, leaf: str) -> None:
     stage.perception.troubles |= {"rear": REAR, "wrist": WRIST}
     assert stage.run(stage.tree(LEAF.format(leaf)), 5.0) is Status.FAILURE
-    [cause] = stage.belief.causes
+    [cause] = stage.causes
     assert cause.code is CauseCode.CAMERA_FAILED
     assert REAR in cause.message
 
@@ -66,14 +66,14 @@ def test_without_any_camera_the_cause_is_the_cameras(stage: Stage, leaf: str) ->
 def test_without_the_wrist_camera_there_is_no_search(stage: Stage) -> None:
     stage.perception.troubles["wrist"] = WRIST
     assert stage.run(stage.tree(LEAF.format("SpiralSearch")), 5.0) is Status.FAILURE
-    assert stage.belief.causes[-1].code is CauseCode.CAMERA_FAILED
+    assert stage.causes[-1].code is CauseCode.CAMERA_FAILED
     assert [arm for arm, _ in stage.motion.moves] == ["left"]  # back to sleep
 
 
 def test_a_start_without_the_rear_camera_is_no_start(stage: Stage) -> None:
     stage.perception.troubles["rear"] = REAR
     assert stage.run(stage.tree(LEAF.format("StartUp")), 5.0) is Status.FAILURE
-    assert stage.belief.causes[-1].code is CauseCode.CAMERA_FAILED
+    assert stage.causes[-1].code is CauseCode.CAMERA_FAILED
     assert stage.clock.t == pytest.approx(2.0, abs=0.11)
 
 
@@ -101,6 +101,6 @@ def test_a_jaw_that_does_not_close_is_told_three_times(stage: Stage) -> None:
     stage.motion.grippers["right"].gap = 0.05
     stage.motion.pick = lambda *_, **__: stage.motion.move("right", np.zeros((1, 6)))  # type: ignore[attr-defined]
     assert stage.run(stage.tree('<Unplug name="unplug" socket="back_4"/>'), 9.0) is Status.FAILURE
-    assert stage.belief.causes[-1].code is CauseCode.GRIPPER_FAILED
+    assert stage.causes[-1].code is CauseCode.GRIPPER_FAILED
     assert [what for what, _ in stage.motion.grippers["right"].told] == ["close"] * 3
     assert stage.clock.t > 3 * HandParameters().close_time

@@ -1,6 +1,6 @@
 """Services that do what a test tells them, on a clock that is turned by hand."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import SimpleNamespace
@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from py_trees.common import Status
 from scipy.spatial.transform import RigidTransform
 
-from regrasp.behaviors import LEAVES
+from regrasp.behaviors import LEAVES, keys
 from regrasp.behaviors.services import Belief, Services
 from regrasp.interfaces.cable.cell import CableKnown
+from regrasp.interfaces.cause import Cause
 from regrasp.interfaces.frame import RgbdFrame
 from regrasp.interfaces.reading import GripperReading
 from regrasp.motion.failure import PlanningError
@@ -173,17 +174,29 @@ class FakePerception:
         return 0
 
 
+class Causes(Sequence[Cause]):
+    """The causes so far, at any time."""
+
+    def __getitem__(self, index: Any) -> Any:
+        return keys.causes()[index]
+
+    def __len__(self) -> int:
+        return len(keys.causes())
+
+
 @dataclass
 class Stage:
-    """The fakes of one test, and the services made of them."""
+    """The fakes of one test on an empty blackboard, and the services made of them."""
 
     known: CableKnown
     folder: Path
     clock: Clock = field(default_factory=Clock)
     log: Log = field(default_factory=Log)
     belief: Belief = field(default_factory=Belief)
+    causes: Causes = field(default_factory=Causes)
 
     def __post_init__(self) -> None:
+        py_trees.blackboard.Blackboard.clear()
         self.motion = FakeMotion(self.clock)
         self.perception = FakePerception(self.clock)
         self.services = Services(

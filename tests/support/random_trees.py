@@ -1,6 +1,7 @@
 """Random tree files, and leaves that end each tick in any status that they may return."""
 
 import random
+from collections.abc import Collection
 from typing import Any, ClassVar
 
 import py_trees
@@ -8,6 +9,7 @@ from hypothesis import strategies as st
 from py_trees.common import Status
 from py_trees.ports import BehaviourWithPorts, PortInformation
 
+from regrasp.behaviors.keys import Key, WithKeys
 from regrasp.trees.vocabulary import BUILT_IN
 
 Ports = dict[str, PortInformation]
@@ -55,7 +57,51 @@ class Write(Dice):
         return super().update()
 
 
-LEAVES: dict[str, type[py_trees.behaviour.Behaviour]] = {c.__name__: c for c in (Dice, Yes, No, Busy, Read, Write)}
+A: Key[int] = Key("toy/a", "a number")
+B: Key[int] = Key("toy/b", "another number")
+
+
+class Put(WithKeys, Dice):
+    WRITES = (A,)
+
+    def update(self) -> Status:
+        if self.dice.random() < 0.7:
+            self.write(A, 1)
+        return super().update()
+
+
+class Need(WithKeys, Dice):
+    NEEDS = (A,)
+
+    def update(self) -> Status:
+        self.read(A)
+        return super().update()
+
+
+class Turn(Need):
+    """Turns one key into another."""
+
+    WRITES = (A, B)
+
+    def update(self) -> Status:
+        status = super().update()
+        self.write(B, self.read(A))
+        if self.dice.random() < 0.5:
+            self.clear(A)
+        return status
+
+
+class NeedBoth(Need):
+    NEEDS = (B,)
+
+    def update(self) -> Status:
+        self.read(B)
+        return super().update()
+
+
+LEAVES: dict[str, type[py_trees.behaviour.Behaviour]] = {
+    leaf.__name__: leaf for leaf in (Dice, Yes, No, Busy, Read, Write, Put, Need, Turn, NeedBoth)
+}
 
 _BOOL, _KEY = st.sampled_from(["true", "false"]), st.sampled_from(["{a}", "{b}"])
 _CONTROL: dict[str, dict[str, st.SearchStrategy[str]]] = {
@@ -79,8 +125,12 @@ def _element(tag: str, attributes: dict[str, st.SearchStrategy[str]], children: 
     return st.tuples(st.just(tag), st.fixed_dictionaries(attributes), children)
 
 
-_LEAF = st.sampled_from(sorted(LEAVES)).flatmap(lambda tag: _element(tag, _LEAF_PORTS.get(tag, {}), st.just([])))
+KEYED = ("Dice", "Need", "NeedBoth", "Put", "Turn")
 _SUBTREE = _element("SubTree", {"ID": st.just("Inner")}, st.just([]))
+
+
+def _leaf(tags: Collection[str]) -> st.SearchStrategy[Node]:
+    return st.sampled_from(sorted(tags)).flatmap(lambda tag: _element(tag, _LEAF_PORTS.get(tag, {}), st.just([])))
 
 
 def _parents(nodes: st.SearchStrategy[Node]) -> st.SearchStrategy[Node]:
@@ -100,13 +150,13 @@ def _text(node: Node, lines: list[str]) -> None:
 
 
 @st.composite
-def trees(draw: st.DrawFn) -> str:
-    """The text of a tree file of known words with all that they need; what it does may still be wrong."""
-    main = draw(st.recursive(_LEAF | _SUBTREE, _parents, max_leaves=10))
+def trees(draw: st.DrawFn, tags: Collection[str] = tuple(LEAVES)) -> str:
+    """The text of a tree file of these leaves with all that they need; what it does may still be wrong."""
+    main = draw(st.recursive(_leaf(tags) | _SUBTREE, _parents, max_leaves=10))
     lines = ['<root main_tree_to_execute="Main">', '<BehaviorTree ID="Main">']
     _text(main, lines)
     lines[-1] += "</BehaviorTree>"
-    inner = draw(st.recursive(_LEAF, _parents, max_leaves=4))
+    inner = draw(st.recursive(_leaf(tags), _parents, max_leaves=4))
     lines.append('<BehaviorTree ID="Inner">')
     _text(inner, lines)
     lines[-1] += "</BehaviorTree></root>"

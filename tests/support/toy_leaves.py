@@ -6,6 +6,8 @@ import py_trees
 from py_trees.common import Status
 from py_trees.ports import BehaviourWithPorts, PortInformation
 
+from regrasp.behaviors.keys import Key, WithKeys
+
 Ports = dict[str, PortInformation]
 
 
@@ -94,6 +96,58 @@ class ToySeen(_Leaf):
     def update(self) -> Status:
         return Status.SUCCESS
 
+
+WIDTH: Key[float] = Key("toy/width", "width of what the hand holds, m")
+GRASPS: Key[int] = Key("toy/grasps", "grasps so far", default=0)
+
+
+class ToyGrip(WithKeys, _Leaf):
+    """Takes hold of something."""
+
+    INPUT_PORTS: ClassVar[Ports] = {}
+    OUTPUT_PORTS: ClassVar[Ports] = {}
+    READS = (GRASPS,)
+    WRITES = (WIDTH, GRASPS)
+
+    def update(self) -> Status:
+        self.write(WIDTH, 0.04)
+        self.write(GRASPS, self.read(GRASPS) + 1)
+        return Status.SUCCESS
+
+
+class ToyPull(WithKeys, _Leaf):
+    INPUT_PORTS: ClassVar[Ports] = {}
+    OUTPUT_PORTS: ClassVar[Ports] = {}
+    NEEDS = (WIDTH,)
+
+    def update(self) -> Status:
+        self.read(WIDTH)
+        return Status.SUCCESS
+
+
+class ToyRegrip(ToyPull):
+    """Needs what it writes."""
+
+    WRITES = (WIDTH,)
+    RETURNS = frozenset({Status.SUCCESS})
+
+
+class ToyDrop(WithKeys, _Leaf):
+    INPUT_PORTS: ClassVar[Ports] = {}
+    OUTPUT_PORTS: ClassVar[Ports] = {}
+    WRITES = (WIDTH,)
+
+    def update(self) -> Status:
+        self.clear(WIDTH)
+        return Status.SUCCESS
+
+
+KEY_LEAVES: dict[str, type[py_trees.behaviour.Behaviour]] = {
+    "Grip": ToyGrip,
+    "Pull": ToyPull,
+    "Regrip": ToyRegrip,
+    "Drop": ToyDrop,
+}
 
 LEAVES: dict[str, type[py_trees.behaviour.Behaviour]] = {
     "Wait": ToyWait,

@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 from py_trees.common import Status
 from py_trees.parsers.behaviour_tree_xml import parse_behaviour_tree_xml
 from py_trees.ports import NoDataAvailable
-from random_trees import LEAVES, Dice, trees
+from random_trees import KEYED, LEAVES, Dice, trees
 
+from regrasp.behaviors.keys import MissingKeyError
 from regrasp.trees import check_tree
 
 
@@ -34,16 +35,21 @@ def seen(path: Path, seed: int) -> dict[str, set[int]]:
                     succeeded.add(line_of(node.name))
             if root.status is not Status.RUNNING:
                 break
-    except NoDataAvailable:
+    except (NoDataAvailable, MissingKeyError):
         pass
     return {"never reached": reached, "never succeed": succeeded, "before": {line_of(name) for name in Dice.ticked}}
 
 
-WORDS = {"is never reached": "never reached", "can never succeed": "never succeed", "reads /": "before"}
+WORDS = {
+    "is never reached": "never reached",
+    "can never succeed": "never succeed",
+    "reads /": "before",
+    "needs toy/": "before",
+}
 
 
-@settings(max_examples=60)
-@given(text=trees(), seeds=st.lists(st.integers(0, 2**32), min_size=3, max_size=3))
+@settings(max_examples=120)
+@given(text=trees() | trees(KEYED), seeds=st.lists(st.integers(0, 2**32), min_size=3, max_size=3))
 def test_no_run_shows_what_a_finding_says_cannot_be(
     tmp_path_factory: pytest.TempPathFactory, text: str, seeds: list[int]
 ) -> None:
@@ -108,6 +114,14 @@ IN_TIME = {
 @pytest.mark.parametrize("body", EARLY.values(), ids=EARLY.keys())
 def test_a_key_that_is_read_before_any_run_can_have_written_it_is_a_finding(tmp_path: Path, body: str) -> None:
     assert [s for s in check(tmp_path, body) if "Read" in s] == TOO_EARLY
+
+
+PUT, TURN, NEED, BOTH = '<Put name="p"/>', '<Turn name="t"/>', '<Need name="n"/>', '<NeedBoth name="b"/>'
+IN_TIME |= {
+    "a key of two": sequence(PUT, TURN, BOTH),
+    "a key that may be cleared": sequence(PUT, TURN, NEED),
+    "a key in a later try": wrapped("Retry", sequence(sequence(DICE, NEED, name="s1"), PUT, tag="Fallback"), RETRY),
+}
 
 
 @pytest.mark.parametrize("body", IN_TIME.values(), ids=IN_TIME.keys())

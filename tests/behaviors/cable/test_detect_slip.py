@@ -37,7 +37,7 @@ def test_the_finger_gap_tells_of_an_end_that_stays_near(stage: Stage) -> None:
     [notice] = stage.belief.notices
     assert notice.by == "gap"
     assert notice.at == pytest.approx(lost_at + 0.10, abs=0.06)  # the median of five readings, one a tick
-    [cause] = stage.belief.causes
+    [cause] = stage.causes
     assert cause.code is CableCause.SLIPPED
     assert cause.node.endswith("watch/detect_slip")
     assert "3.0 mm apart" in cause.message

@@ -47,7 +47,7 @@ def test_what_never_comes_to_rest_fails_at_the_time_limit(stage: Stage) -> None:
     stage.perception.frames = lambda t: frame(t, moving=True)
     assert stage.run(stage.tree(WAIT), 10.0) is Status.FAILURE
     assert stage.clock.t == pytest.approx(6.0, abs=0.25)
-    assert stage.belief.causes[-1].code is CableCause.NOT_STILL
+    assert stage.causes[-1].code is CableCause.NOT_STILL
 
 
 def test_a_frame_from_before_does_not_count(stage: Stage) -> None:
@@ -74,8 +74,8 @@ def test_room_is_made_with_the_eye_open_the_jaw_open_first_and_straight_back(sta
 def test_a_way_that_cannot_be_found_is_the_leaf_s_cause(stage: Stage) -> None:
     stage.motion.error = PlanningError(CauseCode.PLANNING_FAILED, "no way within 4000 draws")
     assert stage.run(stage.tree(ROOM), 5.0) is Status.FAILURE
-    assert stage.belief.causes[-1].code is CauseCode.PLANNING_FAILED
-    assert "4000 draws" in stage.belief.causes[-1].message
+    assert stage.causes[-1].code is CauseCode.PLANNING_FAILED
+    assert "4000 draws" in stage.causes[-1].message
 
 
 def test_a_leaf_stopped_midway_stops_its_arm_and_one_that_ended_does_not(stage: Stage) -> None:

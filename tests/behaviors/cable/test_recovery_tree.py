@@ -11,7 +11,7 @@ from typing import Any, cast
 import numpy as np
 import py_trees
 import pytest
-from fake_services import Clock, FakeGripper, FakeMotion, FakePerception, Stage, seen
+from fake_services import Causes, Clock, FakeGripper, FakeMotion, FakePerception, Stage, seen
 from numpy.typing import NDArray
 from py_trees.blackboard import Blackboard
 from py_trees.common import Status
@@ -181,7 +181,7 @@ def test_every_failed_leaf_names_a_cause(play: Make, monkeypatch: pytest.MonkeyP
         raise ServiceError("broke off")
 
     whole = play(2, trouble == "not found")
-    attempts = Attempts(whole.root, whole.services.belief.causes, whole.clock.now)
+    attempts = Attempts(whole.root, Causes(), whole.clock.now)
     if trouble == "no hand":
         monkeypatch.setattr(whole.motion, "pick", lambda *_, **__: MotionTask(iter([None]), lambda: None))
         monkeypatch.setattr(whole.hand, "close", lambda force: setattr(whole.hand, "gap", 0.0))

@@ -102,7 +102,7 @@ def test_stops_out_of_reach_are_skipped_and_counted(stage: Stage) -> None:
     [line] = stage.log.of("not found")
     assert 1 in line["skipped"]
     assert all(np.linalg.norm((eye(stage, i) - second)[1:]) > 0.1 for i in range(line["looked"]))
-    assert "out of reach" in stage.belief.causes[-1].message
+    assert "out of reach" in stage.causes[-1].message
 
 
 def test_a_stop_out_of_reach_is_looked_at_from_nearer(stage: Stage) -> None:
@@ -126,7 +126,7 @@ def test_it_ends_at_its_time_limit_with_the_arm_asleep(stage: Stage) -> None:
     arm, goals = stage.motion.moves[-1]
     assert arm == "left"
     assert goals == pytest.approx(np.array([stage.known.arm("left").sleep]))
-    [cause] = stage.belief.causes
+    [cause] = stage.causes
     assert cause.code is CableCause.SEARCH_EXHAUSTED
     assert stage.belief.connector is None
 

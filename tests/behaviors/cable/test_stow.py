@@ -44,7 +44,7 @@ def test_an_end_that_is_not_there_is_noticed_once(stage: Stage, shows: object) -
     [notice] = stage.belief.notices
     assert notice.by == "place"
     assert notice.at == pytest.approx(stage.clock.t)
-    assert [cause.code for cause in stage.belief.causes] == [CableCause.NOT_STOWED]
+    assert [cause.code for cause in stage.causes] == [CableCause.NOT_STOWED]
 
 
 def test_letting_go_opens_the_jaw_and_believes_nothing_held(stage: Stage) -> None:

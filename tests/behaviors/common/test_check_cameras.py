@@ -49,7 +49,7 @@ def test_an_end_that_is_not_there_not_fresh_or_not_live_must_be_searched(stage: 
     stage.perception.shows = shows  # type: ignore[assignment]
     stage.clock.t = 2.0
     assert stage.run(stage.tree(CHECK), 5.0) is Status.FAILURE
-    [cause] = stage.belief.causes
+    [cause] = stage.causes
     assert cause.code is CableCause.CONNECTOR_NOT_FOUND
     assert why in cause.message
     assert stage.belief.connector is None

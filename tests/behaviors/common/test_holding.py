@@ -15,7 +15,7 @@ def test_an_empty_hand_says_how_often_and_when_it_lost_what_it_held(known: Cable
     assert stage.run(tree, 0.0) is Status.FAILURE
     stage.belief.notices += [LossNotice(3.0, "distance"), LossNotice(9.3, "gap")]
     assert stage.run(tree, 0.0) is Status.FAILURE
-    assert stage.belief.causes == [
+    assert [*stage.causes] == [
         Cause(CauseCode.NOTHING_HELD, "the hand holds nothing; no loss was noticed", "holding"),
         Cause(CauseCode.NOTHING_HELD, "the hand holds nothing; 2 losses noticed, the last at 9.30 s by gap", "holding"),
     ]

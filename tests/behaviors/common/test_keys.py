@@ -21,7 +21,7 @@ BOTH = (
 def test_a_key_is_what_was_set(known: CableKnown, tmp_path: Path, text: str, status: Status) -> None:
     stage = Stage(known, tmp_path)
     assert stage.run(stage.tree(BOTH.replace("EQUALS", text)), 1.0) is status
-    told = [(cause.code, cause.message, cause.node) for cause in stage.belief.causes]
+    told = [(cause.code, cause.message, cause.node) for cause in stage.causes]
     why = (CauseCode.KEY_DIFFERS, "the key holds 'careful', not 'quick'", "s/check")
     assert told == ([] if status is Status.SUCCESS else [why])
 

@@ -26,18 +26,18 @@ def test_wait_succeeds_after_so_many_simulated_seconds(known: CableKnown, tmp_pa
 def test_a_child_within_its_limit_keeps_its_status(known: CableKnown, tmp_path: Path) -> None:
     stage = Stage(known, tmp_path)
     assert stage.run(stage.tree(LIMITED.format(limit=0.5, wait=0.45)), 2.0) is Status.SUCCESS
-    assert stage.belief.causes == []
+    assert not stage.causes
 
 
 def test_a_child_past_its_limit_is_stopped_and_the_limit_is_the_cause(known: CableKnown, tmp_path: Path) -> None:
     stage = Stage(known, tmp_path)
     tree = stage.tree(LIMITED.format(limit=0.5, wait=5.0))
-    attempts = Attempts(tree.root, stage.belief.causes, stage.clock.now, {"limit": "TimeLimit"})
+    attempts = Attempts(tree.root, stage.causes, stage.clock.now, {"limit": "TimeLimit"})
     tree.visitors.append(attempts)
     assert stage.run(tree, 2.0) is Status.FAILURE
     assert stage.clock.t == pytest.approx(0.5)
     assert tree.root.decorated.status is Status.INVALID
-    [cause] = stage.belief.causes
+    [cause] = stage.causes
     assert (cause.code, cause.node) == (CauseCode.TIMED_OUT, "limit")
     assert cause.message == "wait still ran after 0.5 simulated seconds"
     assert attempts.cause() is cause
@@ -50,7 +50,7 @@ def test_the_limit_counts_anew_when_it_is_entered_anew(known: CableKnown, tmp_pa
     body = LIMITED.format(limit=0.5, wait=5.0)
     assert stage.run(stage.tree(f'<Retry name="again" num_failures="3">{body}</Retry>'), 9.0) is Status.FAILURE
     assert stage.clock.t == pytest.approx(1.6, abs=0.06)
-    assert len(stage.belief.causes) == 3
+    assert len(stage.causes) == 3
 
 
 def test_the_check_knows_that_a_limit_ends_what_runs_for_ever(tmp_path: Path) -> None:
