@@ -35,13 +35,17 @@ class _Failure:
 class Attempts(py_trees.visitors.VisitorBase):
     """A visitor of a tree; `made` are the attempts so far, in the order of their beginning.
 
-    The attempts must be noted tick by tick: a node with memory resets what failed before at the next tick. `causes` is
-    the list to which failing leaves append. `types` holds the tree file's element name of each node by path; a node
-    without one is named by its class. After a stop outside a tick call `finalise()`.
+    The attempts must be noted tick by tick: a node with memory resets what failed before at the next tick. `causes`
+    gives those of the leaves that have failed so far, the latest last. `types` holds the tree file's element name of each
+    node by path; a node without one is named by its class. After a stop outside a tick call `finalise()`.
     """
 
     def __init__(
-        self, root: Behaviour, causes: Sequence[Cause], now: Callable[[], float], types: Mapping[str, str] | None = None
+        self,
+        root: Behaviour,
+        causes: Callable[[], Sequence[Cause]],
+        now: Callable[[], float],
+        types: Mapping[str, str] | None = None,
     ) -> None:
         super().__init__(full=False)
         self.made: list[Attempt] = []
@@ -117,7 +121,8 @@ class Attempts(py_trees.visitors.VisitorBase):
 
         It is the last one that came since the visit of the failed leaf before.
         """
-        old, new, self._told = self._causes[: self._told], self._causes[self._told :], len(self._causes)
+        causes = self._causes()
+        old, new, self._told = causes[: self._told], causes[self._told :], len(causes)
         return (new[-1], any(cause is new[-1] for cause in old)) if new else (None, False)
 
     def _visit_leaf(self, leaf: Behaviour, cause: Cause | None) -> None:

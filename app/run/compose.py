@@ -13,7 +13,8 @@ from regrasp.app.scenario.load import Scenario
 from regrasp.app.scenario.sampling import draw_faults, draw_obstacles
 from regrasp.app.task.judge import Judge
 from regrasp.app.task.task import Task
-from regrasp.behaviors import LEAVES
+from regrasp.behaviors.keys import causes
+from regrasp.behaviors.registry import leaves_of
 from regrasp.behaviors.services import Services
 from regrasp.interfaces.cell import Cell
 from regrasp.interfaces.scene import SceneSetup
@@ -74,9 +75,10 @@ def assemble(scenario: Scenario, world: World[Any], seed: int, log: Any) -> Epis
     py_trees.blackboard.Blackboard.clear()
     services = task.services()(world, seed, log)
     break_services(services, world.faults, world.now)
-    tree = py_trees.trees.BehaviourTree(load_tree(scenario.tree, LEAVES, scenario.inputs))
-    graph = read_graph(scenario.tree, LEAVES, scenario.inputs)
+    leaves = leaves_of(task.name)
+    tree = py_trees.trees.BehaviourTree(load_tree(scenario.tree, leaves, scenario.inputs))
+    graph = read_graph(scenario.tree, leaves, scenario.inputs)
     types = {node.path: node.type for node in graph.walk() if node.kind != "subtree"}
-    attempts = Attempts(tree.root, services.belief.causes, world.now, types)
+    attempts = Attempts(tree.root, causes, world.now, types)
     judge = task.judge()(world, services, scenario.file.expect)
     return Episode(task, world, services, tree, judge, attempts)

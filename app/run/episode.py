@@ -21,6 +21,7 @@ from regrasp.app.run.observers import Observers
 from regrasp.app.run.tick_log import TickLog, active_leaf, note_leaf_at_work, running_leaf
 from regrasp.app.scenario.copies import copies
 from regrasp.app.scenario.load import Scenario
+from regrasp.behaviors.keys import causes
 from regrasp.interfaces.cause import Cause, CauseCode
 from regrasp.interfaces.devices import TICK
 from regrasp.interfaces.wall_time import WallTime, measured
@@ -129,7 +130,7 @@ def _run(episode: Episode, scenario: Scenario, film: Film, on_tick: Progress, lo
 
 def _loop(episode: Episode, scenario: Scenario, film: Film, on_tick: Progress, wall: WallTime) -> Ending:
     world, root, attempts = episode.world, episode.tree.root, episode.attempts
-    belief, limit = episode.services.belief, scenario.file.limits.sim_seconds
+    limit = scenario.file.limits.sim_seconds
     episode.tree.setup(services=episode.services)
     wall.lap(counts=False)
     while world.now() < limit:
@@ -142,7 +143,7 @@ def _loop(episode: Episode, scenario: Scenario, film: Film, on_tick: Progress, w
         if root.status is Status.SUCCESS:
             return Ending("success")
         if root.status is Status.FAILURE:
-            cause = attempts.cause() or (belief.causes[-1] if belief.causes else None)
+            cause = attempts.cause() or next(reversed(causes()), None)
             return Ending("failure", cause, attempts.failed_chain())
         world.advance(TICK)
         wall.lap()

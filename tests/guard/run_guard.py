@@ -61,8 +61,8 @@ class StateTrace:
         for arm in world.arms.values():
             reading = arm.reading()
             yield from (reading.positions, reading.velocities, reading.efforts, [arm.gripper.reading().gap])
-        yield from world.cable.connector_state()[2:]
-        yield world.connector_pose().as_matrix()
+        yield from world.objects.cable.connector_state()[2:]
+        yield world.objects.connector_pose().as_matrix()
         if (last := services.perception.track.last) is not None:
             yield from (last.position, [last.stamp])
         for pose in (services.belief.held, services.belief.connector):

@@ -124,7 +124,7 @@ def test_the_software_renderer_carries_the_run_as_far_as_the_slip(tmp_path: Path
     assert slip.detected_at - slip.released_at < 1.0
 
 
-class WatchedWorld(World):
+class WatchedWorld(World[Any]):
     """A world that a test can look at while `run_episode` has it."""
 
     made: "list[WatchedWorld]" = []  # noqa: RUF012

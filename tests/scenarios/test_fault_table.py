@@ -11,7 +11,8 @@ import pytest
 from regrasp.app.files.resources import shipped
 from regrasp.app.run.episode import run_episode
 from regrasp.app.scenario.load import load_scenario
-from regrasp.app.scenario.schema import FAULT_TYPES
+from regrasp.app.scenario.schema import fault_types
+from regrasp.app.tasks.cable import TASK
 from regrasp.sim.world import World
 
 FOLDER = "faults/"
@@ -28,8 +29,8 @@ def rows() -> dict[str, list[str]]:
 
 def test_the_table_has_every_scenario_and_every_fault() -> None:
     assert sorted(rows()) == sorted(SCENARIOS)
-    assert {fault for row in rows().values() for fault in row[0].split(", ")} == set(FAULT_TYPES)
-    assert {name.removesuffix("_for_good") for name in SCENARIOS} == set(FAULT_TYPES)
+    assert {fault for row in rows().values() for fault in row[0].split(", ")} == set(fault_types(TASK))
+    assert {name.removesuffix("_for_good") for name in SCENARIOS} == set(fault_types(TASK))
 
 
 @pytest.mark.parametrize("name", SCENARIOS)
@@ -47,7 +48,7 @@ def test_it_ends_as_its_row_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     speeds: list[float] = []
     close = World.close
 
-    def watched(world: World) -> None:
+    def watched(world: World[Any]) -> None:
         speeds.extend(float(np.abs(arm.reading().velocities).max()) for arm in world.arms.values())
         close(world)
 

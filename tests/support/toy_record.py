@@ -56,7 +56,7 @@ def write_record(folder: Path, seed: int = 7, gap: float = 0.0443, **changes: An
     tree = py_trees.trees.BehaviourTree(Selector("root", memory=True, children=[mission, *stop]))
     clock = [0.0]
     record = Record(folder, "toy", seed, copies={"tree.xml": TREE})
-    attempts = Attempts(tree.root, causes, lambda: clock[0], {"root": "Fallback"})
+    attempts = Attempts(tree.root, lambda: causes, lambda: clock[0], {"root": "Fallback"})
     tree.visitors += [TickLog(tree.root, record.ticks, lambda: clock[0]), attempts]
     log = record.logger(lambda: clock[0])
     log.info("begin", scenario="toy", seed=seed, gravity="zero", overrides=["limits.tries=2"])

@@ -25,7 +25,7 @@ def ticked(root: py_trees.behaviour.Behaviour, ticks: int) -> tuple[Attempts, li
     """What the watcher saw, and the lines of the log."""
     clock = [0.0]
     stream = io.StringIO()
-    log, attempts = TickLog(root, stream, lambda: clock[0]), Attempts(root, [], lambda: clock[0])
+    log, attempts = TickLog(root, stream, lambda: clock[0]), Attempts(root, tuple, lambda: clock[0])
     tree = py_trees.trees.BehaviourTree(root)
     tree.visitors += [log, attempts]
     for _ in range(ticks):

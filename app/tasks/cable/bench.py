@@ -37,6 +37,7 @@ from regrasp.perception.pose.rgbd import Rgbd
 from regrasp.perception.pose.segmentation import SegmentationParameters, color_mask
 from regrasp.perception.pose.technique import make_technique
 from regrasp.sim.cable.cable import spring_torques
+from regrasp.sim.cable.objects import cable_world
 from regrasp.sim.render.renderer import make_renderer
 from regrasp.sim.world import World
 from regrasp.trees import check_tree
@@ -49,19 +50,21 @@ def print_bench() -> None:
     """Print a table: milliseconds of our call and of the other, and their ratio."""
     cv2.setNumThreads(1)  # as on a robot, whose other cores have other work
     scenario = load_scenario("no_obstacle")
-    world = World(scenario.cell, "zero", 0)
+    cell = scenario.cell
+    assert isinstance(cell, CableCell)
+    world = cable_world(cell, "zero", 0)
     try:
         rows = {
             "shipped trees checked / parsed by py_trees": tree_checks(),
             "tick of the recovery tree with logs / bare": tree_ticks(),
-            "cable torques by numba / numpy and scipy": cable_torques(scenario.cell.hidden.cable.links),
+            "cable torques by numba / numpy and scipy": cable_torques(cell.hidden.cable.links),
             "848x480 picture by our renderer / OpenGL": rendering_speed(world),
-            **color_techniques(scenario.cell, 848),
-            **color_techniques(scenario.cell, 640),
+            **color_techniques(cell, 848),
+            **color_techniques(cell, 640),
             "848x480 tag to pose / bare OpenCV calls": tag_techniques(848),
             "640x480 tag to pose / bare OpenCV calls": tag_techniques(640),
-            **detector_stages(scenario.cell, 848),
-            **detector_stages(scenario.cell, 640),
+            **detector_stages(cell, 848),
+            **detector_stages(cell, 640),
         }
         print_table(
             ("pair", "ours ms", "other ms", "ratio"), [_line(name, *pair) for name, pair in rows.items() if pair]
@@ -112,7 +115,7 @@ def tree_ticks() -> tuple[Call, Call]:
 
     logged, bare = tree(), tree()
     logged.add_visitor(TickLog(logged.root, io.StringIO(), lambda: 0.0))
-    logged.add_visitor(Attempts(logged.root, [], lambda: 0.0))
+    logged.add_visitor(Attempts(logged.root, tuple, lambda: 0.0))
     return logged.tick, bare.tick
 
 
@@ -143,7 +146,7 @@ def cable_torques(links: int) -> tuple[Call, Call]:
     return lambda: spring_torques(states, stiffness, damping), plain
 
 
-def rendering_speed(world: World) -> tuple[Call, Call] | None:
+def rendering_speed(world: World[Any]) -> tuple[Call, Call] | None:
     """The rear camera's picture by the software renderer and by OpenGL; None without EGL."""
     try:
         opengl = make_renderer(world.visuals, "moderngl")
@@ -162,7 +165,8 @@ def rear_frame(cell: CableCell, width: int) -> tuple[RgbdFrame, RigidTransform]:
     """The rear camera's first frame with `width` x 480 pixels, and its nominal pose."""
     spec = cell.known.camera("rear").model_copy(update={"width": width})
     cameras = (spec, cell.known.camera("wrist"))
-    world = World(cell.model_copy(update={"known": cell.known.model_copy(update={"cameras": cameras})}), "zero", 0)
+    wide = cell.known.model_copy(update={"cameras": cameras})
+    world = cable_world(cell.model_copy(update={"known": wide}), "zero", 0)
     frame = world.cameras["rear"].latest()
     while frame is None:
         world.advance(0.05)

@@ -29,7 +29,7 @@ class Bench:
     def run(self, root: Behaviour, ticks: int = 50, types: Mapping[str, str] | None = None) -> Attempts:
         """Tick until the root ends, or so often, then stop what is left."""
         tree = py_trees.trees.BehaviourTree(root)
-        attempts = Attempts(root, self.causes, lambda: self.now, types)
+        attempts = Attempts(root, lambda: self.causes, lambda: self.now, types)
         tree.visitors.append(attempts)
         for _ in range(ticks):
             self.now += 1.0
@@ -191,7 +191,7 @@ def test_a_leaf_that_raised_before_its_visit_has_an_attempt_with_the_cause() -> 
     bench = Bench()
     cause = Cause(CauseCode.INTERNAL_ERROR, "RuntimeError: broken", "root/broken")
     root = Sequence("root", memory=True, children=[Script("first", S), broken])
-    attempts = Attempts(root, bench.causes, lambda: 4.0)
+    attempts = Attempts(root, lambda: bench.causes, lambda: 4.0)
     tree = py_trees.trees.BehaviourTree(root)
     tree.visitors.append(attempts)
     try:

@@ -94,7 +94,7 @@ def ends(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[tuple[bool, float]]]:
     found: list[tuple[bool, float]] = []
     close = World.close
 
-    def watched(world: World) -> None:
+    def watched(world: World[Any]) -> None:
         speeds = [np.abs(arm.reading().velocities).max() for arm in world.arms.values()]
         found.append((any(arm.is_moving() for arm in world.arms.values()), float(max(speeds))))
         close(world)

@@ -60,7 +60,7 @@ def green(path: Path) -> list[float]:
 
 def test_two_seconds_give_frames_at_the_films_rate_in_their_order(tmp_path: Path) -> None:
     world = a_world()
-    with Film(tmp_path / "video.mp4", cast(World, world)) as film:
+    with Film(tmp_path / "video.mp4", cast(World[Any], world)) as film:
         for i in range(round(2.0 / TICK)):
             world.t = i * TICK
             film.show("carry")
@@ -73,7 +73,7 @@ def test_two_seconds_give_frames_at_the_films_rate_in_their_order(tmp_path: Path
 
 def test_a_film_cut_short_by_an_error_can_be_seen(tmp_path: Path) -> None:
     world = a_world()
-    film = Film(tmp_path / "video.mp4", cast(World, world)).__enter__()
+    film = Film(tmp_path / "video.mp4", cast(World[Any], world)).__enter__()
     film.show("carry")
     film.__exit__(ZeroDivisionError, ZeroDivisionError(), None)
     assert len(green(tmp_path / "video.mp4")) == 1
@@ -83,7 +83,7 @@ def test_without_a_path_nothing_is_drawn(tmp_path: Path) -> None:
     world = a_world()
     del world.renderer
     threads = threading.active_count()
-    with Film(None, cast(World, world)) as film:
+    with Film(None, cast(World[Any], world)) as film:
         film.show("carry")
         assert threading.active_count() == threads
     assert list(tmp_path.iterdir()) == []
@@ -91,7 +91,7 @@ def test_without_a_path_nothing_is_drawn(tmp_path: Path) -> None:
 
 def test_an_error_while_drawing_is_raised_once_and_leaves_nothing_behind(tmp_path: Path) -> None:
     world, threads, interval = a_world(), threading.active_count(), sys.getswitchinterval()
-    film = Film(tmp_path / "video.mp4", cast(World, world)).__enter__()
+    film = Film(tmp_path / "video.mp4", cast(World[Any], world)).__enter__()
     film.show("carry")
     world.t = 101.0
     film.show("carry")

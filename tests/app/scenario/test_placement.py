@@ -5,7 +5,8 @@ from numpy.typing import NDArray
 from scipy.optimize import linprog
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from regrasp.app.scenario.placement import JitteredBox, overlaps, penetration_depth
+from regrasp.app.scenario.placement import overlaps
+from regrasp.app.scenario.shapes import JitteredBox, penetration_depth
 from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.motion.robots.kinematics import ArmKinematics
 from regrasp.motion.robots.spheres import SPHERE_LINKS, SPHERES

@@ -23,7 +23,7 @@ class Birrt:
     Raises ImportError if the package is not installed, and ValueError if the world is another client.
     """
 
-    def __init__(self, world: World, queries: Sequence[Query]) -> None:
+    def __init__(self, world: World[Any], queries: Sequence[Query]) -> None:
         import pybullet_planning
 
         if world.client != pybullet_planning.CLIENT:
@@ -66,7 +66,7 @@ class Birrt:
             body,
             joints,
             tuple((JOINT_SIGNS * query.goal).tolist()),
-            obstacles=[*self._world.boxes.values(), *others],
+            obstacles=[*self._world.fixed_bodies.values(), *others],
             disabled_collisions=self._touching[query.arm],
             max_distance=query.margin,
             custom_limits=limits,

@@ -6,11 +6,9 @@ import pytest
 from numpy.typing import NDArray
 
 from regrasp.app.tasks.cable.expectations import Expect, PoseError
-from regrasp.app.tasks.cable.judge import Judge
 from regrasp.behaviors.services import Belief, LossNotice
 from regrasp.interfaces.cause import CauseCode
 from regrasp.sim.cable.phase import PhaseParameters
-from regrasp.sim.ground_truth import GroundTruth
 
 TICK = 0.05
 

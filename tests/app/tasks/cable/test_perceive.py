@@ -25,7 +25,7 @@ from regrasp.app.frames.snapshot import write_frame
 from regrasp.app.run.compose import build_world
 from regrasp.app.scenario.load import load_scenario
 from regrasp.perception.pose.technique import TECHNIQUES
-from regrasp.sim.ground_truth import GroundTruth
+from regrasp.sim.cable.ground_truth import CableTruth
 
 K = yaml.safe_dump({"width": 64, "height": 48, "fx": 60.0, "fy": 60.0, "cx": 31.5, "cy": 23.5})
 
@@ -48,7 +48,7 @@ def shots(tmp_path_factory: pytest.TempPathFactory) -> Shots:
         write_frame(folder, frame, f"_{i}")
         np.save(folder / f"depth_{i}.npy", np.where(frame.depth > 0, frame.depth, np.nan))
     write_camera_pose(folder / "pose.yaml", scenario.cell.known.camera("rear").mount.world_from_camera)  # type: ignore[union-attr]
-    truth = GroundTruth(world).connector_pose()
+    truth = CableTruth(world).connector_pose()
     world.close()
     return Shots(folder, truth)
 

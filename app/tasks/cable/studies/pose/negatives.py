@@ -14,8 +14,8 @@ from regrasp.interfaces.fields import Color
 from regrasp.interfaces.frame import RgbdFrame
 from regrasp.interfaces.scene import Prop, SceneSetup
 from regrasp.perception.pose.estimate import Estimate
+from regrasp.sim.cable.objects import cable_world
 from regrasp.sim.render.renderer import RendererName
-from regrasp.sim.world import World
 
 OTHER_COLORS: tuple[Color, ...] = ((0.05, 0.45, 0.10), (0.08, 0.15, 0.70), (0.85, 0.70, 0.05), (0.80, 0.35, 0.02))
 STICKER = 0  # the index of the look-alike that lies on the panel
@@ -67,7 +67,7 @@ def negative_frames(
     black = cell.known.cable.connector.model_copy(update={"color": cell.hidden.cable.color, "tag": None})
     props = look_alikes(cell, rng)
     without = cell.model_copy(update={"known": cell.known.with_cable(connector=black)})
-    world = World(without, "zero", seed, SceneSetup(props=props), renderer)
+    world = cable_world(without, "zero", seed, SceneSetup(props=props), renderer=renderer)
     try:
         panel = next(box for box in cell.known.boxes if box.name == "back_panel")
         face = panel.center[0] - 0.5 * panel.size[0]

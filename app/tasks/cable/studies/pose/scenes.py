@@ -22,9 +22,9 @@ from regrasp.interfaces.cable.cell import CableCell
 from regrasp.interfaces.cell import Box, FixedMount
 from regrasp.interfaces.frame import RgbdFrame
 from regrasp.interfaces.scene import Obstacle, SceneSetup
-from regrasp.sim.ground_truth import GroundTruth
+from regrasp.sim.cable.ground_truth import CableTruth
+from regrasp.sim.cable.objects import cable_world
 from regrasp.sim.render.renderer import RendererName
-from regrasp.sim.world import World
 
 CAMERA = "rear"
 FOAM_COLOR = (0.45, 0.20, 0.60)
@@ -120,8 +120,8 @@ class StudyScene:
         self.world_from_camera = mount.world_from_camera
         pose = connector_pose(self.configuration, self.world_from_camera.translation, seed, parameters)
         pieces = (_foam_piece(pose, parameters),) if self.configuration.hidden else ()
-        self.world = World(cell, "zero", seed, SceneSetup(pieces, connector_at=pose), renderer)
-        self.truth = GroundTruth(self.world)
+        self.world = cable_world(cell, "zero", seed, SceneSetup(pieces), connector_at=pose, renderer=renderer)
+        self.truth = CableTruth(self.world)
         if self.configuration.hidden:
             self._hide()
 

@@ -1,5 +1,6 @@
 import sys
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pytest
@@ -26,19 +27,19 @@ SCENARIO = load_scenario("tall_obstacle")
 
 
 @pytest.fixture(scope="module")
-def world() -> Iterator[World]:
+def world() -> Iterator[World[Any]]:
     made = build_world(SCENARIO, 0, "software")
     yield made
     made.close()
 
 
-def drawn(world: World, seed: int, count: int) -> list[Query]:
+def drawn(world: World[Any], seed: int, count: int) -> list[Query]:
     scene = PlanningScene(world.cell.known, world.arms, {name: arm.gripper for name, arm in world.arms.items()})
     obstacles = draw_obstacles(SCENARIO.file, np.random.default_rng([0, 0]))
     return draw_queries(scene, obstacles, np.random.default_rng(seed), count)
 
 
-def test_queries_lead_from_one_free_place_to_another(world: World) -> None:
+def test_queries_lead_from_one_free_place_to_another(world: World[Any]) -> None:
     queries = drawn(world, 3, 24)
     assert [query.arm for query in queries] == ["left", "right"] * 12
     for query in queries:
@@ -48,13 +49,13 @@ def test_queries_lead_from_one_free_place_to_another(world: World) -> None:
     assert any(not q.model.edge_free(q.start, q.goal, q.margin) for q in queries), "nothing stands in the way"
 
 
-def test_a_seed_draws_its_own_queries(world: World) -> None:
+def test_a_seed_draws_its_own_queries(world: World[Any]) -> None:
     first, again, other = ([(q.start, q.goal) for q in drawn(world, seed, 6)] for seed in (1, 1, 2))
     assert np.array_equal(first, again)
     assert not np.array_equal(first, other)
 
 
-def test_planners_are_asked_the_same_in_turn(world: World, capsys: pytest.CaptureFixture[str]) -> None:
+def test_planners_are_asked_the_same_in_turn(world: World[Any], capsys: pytest.CaptureFixture[str]) -> None:
     queries, asked = drawn(world, 0, 2), []
 
     def fake(query: Query, seed: int) -> FloatArray | None:
@@ -98,7 +99,7 @@ def test_without_the_package_one_line_says_how_to_get_it(
     assert "pip install -e '.[bench]'" in out
 
 
-def test_birrt_answers_with_free_paths_by_either_check(world: World) -> None:
+def test_birrt_answers_with_free_paths_by_either_check(world: World[Any]) -> None:
     package = pytest.importorskip("pybullet_planning")
     if world.client != package.CLIENT:
         pytest.skip("pybullet-planning plans in the first client only, and another test holds it")

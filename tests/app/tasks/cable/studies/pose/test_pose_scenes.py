@@ -94,7 +94,7 @@ def test_so_much_is_hidden_by_the_true_mask(small: CableCell, name: str) -> None
         fine = scene.world.cameras["rear"].spec.model_copy(update={"width": 1696, "height": 960}).intrinsics
         shown = scene.world.visuals.snapshot()
         gone = shown.copy()
-        gone[[item.body == scene.world.boxes["obstacle tall"] for item in scene.world.visuals.items], :, 3] = 5.0
+        gone[[item.body == scene.world.fixed_bodies["obstacle tall"] for item in scene.world.visuals.items], :, 3] = 5.0
         seen, free = (_red(scene, poses, fine) for poses in (shown, gone))
         assert 1 - seen.size / free.size == pytest.approx(wanted, abs=0.02)  # in another count of pixels
         left_stays = seen.min() - free.min() < free.max() - seen.max()
@@ -104,7 +104,7 @@ def test_so_much_is_hidden_by_the_true_mask(small: CableCell, name: str) -> None
 def _red(scene: StudyScene, poses: np.ndarray, camera: object) -> np.ndarray:
     """The columns of the connector's pixels."""
     ids = scene.world.cameras["rear"].segmentation(poses, camera)  # type: ignore[arg-type]
-    cable = scene.world.cable
+    cable = scene.world.objects.cable
     item = next(i.id for i in scene.world.visuals.items if (i.body, i.link) == (cable.body, cable.connector_link))
     return np.nonzero(ids == item)[1]
 
