@@ -4,13 +4,12 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from regrasp.interfaces.devices import Clock
+from regrasp.interfaces.services import MotionService, PerceptionService
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import RigidTransform
 
-    from regrasp.interfaces.cable.cell import CableKnown
-    from regrasp.motion.service import Motion
-    from regrasp.perception.service import Perception
+    from regrasp.interfaces.cell import KnownCell
 
 
 @dataclass
@@ -25,7 +24,7 @@ class LossNotice:
 class Belief:
     """What the robot believes. Leaves write it, the run's record reads it; its names are those of the record."""
 
-    held: "RigidTransform | None" = None  # tool_from_connector of the right hand, None when it holds nothing
+    held: "RigidTransform | None" = None  # tool_from_connector of the hand, None when it holds nothing
     connector: "RigidTransform | None" = None  # world_from_connector as last found for a grasp
     sure: bool = False  # whether the whole of the connector was seen there
     found_by: str | None = None  # the camera that found it last
@@ -35,11 +34,15 @@ class Belief:
 
 @dataclass
 class Services:
-    """The services of one run."""
+    """The services of one run. A task's leaves know more of its own."""
 
-    known: "CableKnown"
+    known: "KnownCell"
     clock: Clock
-    motion: "Motion"
-    perception: "Perception"
+    motion: MotionService
+    perception: PerceptionService
     log: Any  # structlog's bound logger
     belief: Belief = field(default_factory=Belief)
+
+    def take_over_map(self) -> None:
+        """Let the arms keep clear of the obstacles that are mapped."""
+        self.motion.set_obstacles(*self.perception.obstacles())

@@ -9,20 +9,33 @@ from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.devices import Arm, Clock, Gripper
 from regrasp.interfaces.trajectory import Trajectory
-from regrasp.motion.failure import PlanningError
+from regrasp.motion.failure import GraspEmptyError, PlanningError
+from regrasp.motion.grasping.gap_test import GapParameters, GripWatch
 from regrasp.motion.planning.timing import TimingParameters, time_path
 from regrasp.motion.robots.arm_watch import ArmWatch, ArmWatchParameters, remaining_waypoints
 from regrasp.motion.task import MotionTask
 
 
 @dataclass(frozen=True)
+class GripParameters:
+    """How a jaw closes on a thing."""
+
+    force: float = 40.0  # N a finger; choice
+    time: float = 1.0  # s; the jaw closes from 60 mm at 0.1 m/s a finger, and the readings settle
+    attempts: int = 3  # times that a jaw which does not move is told to close; choice
+    moved: float = 0.003  # m that a jaw must move to count as moved: three times the encoder's backlash
+    gap: GapParameters = field(default_factory=GapParameters)
+
+
+@dataclass(frozen=True)
 class JawParameters:
-    """How a jaw opens."""
+    """How a jaw opens and closes."""
 
     open_gap: float = 0.05  # m between the pads: 15 mm to each side of the connector; poses err by about 8 mm
     slack: float = 0.005  # m short of its gap that a jaw counts as open; choice
     attempts: int = 3  # times that a jaw is told to open; choice
     timeout: float = 1.0  # s that it has each time; choice
+    grip: GripParameters = field(default_factory=GripParameters)
 
 
 @dataclass(frozen=True)
@@ -35,7 +48,7 @@ class ExecutionParameters:
     attempts: int = 3  # times that an arm which does not follow is led on; choice
     slowdown: float = 0.5  # factor on the speed for every attempt after the first; choice
     retry_pause: float = 1.0  # s before the next attempt; what jams may come free
-    jaw: JawParameters = JawParameters()
+    jaw: JawParameters = field(default_factory=JawParameters)
     watch: ArmWatchParameters = field(default_factory=ArmWatchParameters)
     timing: TimingParameters = field(default_factory=TimingParameters)
 
@@ -121,6 +134,30 @@ class Execution:
                 yield
         message = f"the {arm} jaw stands {1e3 * gripper.reading().gap:.1f} mm open, told {jaw.attempts} times to open"
         raise self.give_up(arm, CauseCode.GRIPPER_FAILED, f"{message} to {1e3 * jaw.open_gap:.0f} mm")
+
+    def close_jaw(self, arm: str, thickness: float) -> Generator[None, None, float]:
+        """Steps that close a jaw on a thing of `thickness` m; returns the gap (m) at which it holds.
+
+        Raises GraspEmptyError when it closes on nothing, and PlanningError GRIPPER_FAILED when it does not move.
+        """
+        gripper, grip = self._grippers[arm], self.parameters.jaw.grip
+        before = gripper.reading().gap
+        for _ in range(grip.attempts):
+            gripper.close(grip.force)
+            watch = GripWatch(gripper, thickness, grip.gap)
+            end = self._clock.now() + grip.time
+            while self._clock.now() < end - 1e-9:
+                evidence = watch.evidence()
+                yield
+            stood = evidence.detected and evidence.value > before - grip.moved
+            if not stood:
+                break
+        if stood:
+            message = f"the {arm} jaw stands {1e3 * evidence.value:.1f} mm open, told {grip.attempts} times to close"
+            raise self.give_up(arm, CauseCode.GRIPPER_FAILED, message)
+        if evidence.detected:
+            raise GraspEmptyError(f"the jaw closed on nothing: {evidence.sentence}")
+        return evidence.value
 
     def _run(self, arm: str, trajectory: Trajectory) -> Generator[None, None, tuple[str | None, float]]:
         """Let the arm follow; why it was found off the trajectory, if it was, and after how many seconds."""

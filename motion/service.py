@@ -1,28 +1,27 @@
-"""What the leaves ask of the arms: plan, wait for the plan's latency, follow, stop.
+"""What the leaves of every task ask of the arms: plan, wait for the plan's latency, follow, stop.
 
 A request returns a `MotionTask` at once; `poll` it every tick. Nothing here reads a wall clock: a plan costs its stated
 latency on the simulated clock.
 """
 
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Collection, Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import FloatArray
-from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.cause import CauseCode
+from regrasp.interfaces.cell import Box, KnownCell
 from regrasp.interfaces.devices import Arm, Clock, Gripper
-from regrasp.motion.cable.carry_paths import CarryPathParameters, can_continue, carry_paths, first_free
+from regrasp.interfaces.task import Task
 from regrasp.motion.execution import Execution, ExecutionParameters
 from regrasp.motion.failure import PlanningError
-from regrasp.motion.grasping.approach import PickParameters, find_approaches, pick_candidates, points_beyond
+from regrasp.motion.grasping.approach import Cylinder, PickParameters, find_approaches, pick_candidates, points_beyond
+from regrasp.motion.grasping.grasps import Grasp
 from regrasp.motion.planning.planner import PlannerParameters, plan
 from regrasp.motion.planning.straight import straight_line
 from regrasp.motion.robots.arm_offsets import JointOffsetParameters, joint_offsets
-from regrasp.motion.robots.spheres import JAW_OPENING
 from regrasp.motion.scene.collision import Clearances, CollisionModel
 from regrasp.motion.scene.planning_scene import NO_POINTS, PlanningScene, PlanningSceneParameters
 from regrasp.motion.task import MotionTask
@@ -40,18 +39,17 @@ class MotionParameters:
     clearances: Clearances = field(default_factory=Clearances)
     execution: ExecutionParameters = field(default_factory=ExecutionParameters)
     pick: PickParameters = field(default_factory=PickParameters)
-    carry: CarryPathParameters = field(default_factory=CarryPathParameters)
     planner: PlannerParameters = field(default_factory=PlannerParameters)
     joint_offsets: JointOffsetParameters = field(default_factory=JointOffsetParameters)
     scene: PlanningSceneParameters = field(default_factory=PlanningSceneParameters)
 
 
 class Motion(PlanningScene):
-    """Requests to the two arms. `seed` makes the planner's draws repeatable; `on_anomaly`: see `Execution`."""
+    """Requests to the arms. `seed` makes the planner's draws repeatable; `on_anomaly`: see `Execution`."""
 
     def __init__(
         self,
-        known: CableKnown,
+        known: KnownCell,
         arms: Mapping[str, Arm],
         grippers: Mapping[str, Gripper],
         clock: Clock,
@@ -65,17 +63,6 @@ class Motion(PlanningScene):
         self.execution = Execution(arms, grippers, clock, known.latencies.plan, parameters.execution, on_anomaly)
         self._clock, self._seed = clock, seed
 
-    def warm_up(self) -> None:
-        """Look for a grasp of the plugged connector and drop it.
-
-        The compiled functions of a pick are then loaded now, and no tick waits for it.
-        """
-        known = self.known
-        plugged = known.cable.socket(known.cable.plugged_into).world_from_plug(known.cable.connector.length)
-        for arm in self.arms:
-            with suppress(PlanningError):
-                self._approaches(arm, self.model(arm), plugged, 0.0)
-
     def move(self, arm: str, goals: FloatArray, *, margin: float | None = None, tight: bool = True) -> MotionTask:
         """Plan a path to one of the goals (n, 6) rad and follow it, `margin` m from everything (default: as set).
 
@@ -88,36 +75,9 @@ class Motion(PlanningScene):
 
         return self.execution.task(arm, steps())
 
-    def carry(
-        self,
-        arm: str,
-        goals: Sequence[RigidTransform],
-        held: RigidTransform,
-        *,
-        onward: Sequence[RigidTransform] = (),
-        speed: float,
-    ) -> MotionTask:
-        """Bring what `arm` holds (tool_from_connector) to one of the goals (world_from_tool), the first preferred.
-
-        Along the shapes that the cable takes by itself where that is free, else straight or in a flat arch, else along
-        any free path. Where possible there is room for a jaw that opens on the way, as after a slip. From the goal the
-        tool must also reach the poses `onward` (goal_from_tool) in straight lines.
-        """
-
-        def steps() -> Iterator[None]:
-            model, q, kin = self.start_model(arm, held), self.joints(arm), self.kinematics[arm]
-            clearances, carry = self.parameters.clearances, self.parameters.carry
-            candidates = carry_paths(self.known, kin, q, goals, held, carry)
-            paths = (path for path in candidates if can_continue(kin, path[-1], onward, carry.step))
-            wide = self.model(arm, held=held, opening=JAW_OPENING)
-            path = first_free((wide, model), clearances.near_margins, paths)
-            if path is None:
-                solutions = [end for goal in goals for end in kin.ik(goal)]
-                ends = [end for end in solutions if can_continue(kin, end, onward, carry.step)]
-                path = self._plan(model, q, np.array(ends).reshape(-1, 6))
-            yield from self.execution.follow(arm, path, speed)
-
-        return self.execution.task(arm, steps())
+    def sleep(self, arm: str) -> MotionTask:
+        """Bring an arm to its sleep pose, out of the cameras' and the other arms' way."""
+        return self.move(arm, np.array([self.known.arm(arm).sleep]))
 
     def straight(self, arm: str, goal: RigidTransform, *, speed: float | None = None) -> MotionTask:
         """Move the tool in a straight line to `goal` (world_from_tool). Whether the way is free is not checked.
@@ -131,10 +91,18 @@ class Motion(PlanningScene):
 
         return self.execution.task(arm, steps())
 
-    def shift(self, arm: str, displacement: Sequence[float] | FloatArray, *, checked: bool = True) -> MotionTask:
+    def shift(
+        self,
+        arm: str,
+        displacement: Sequence[float] | FloatArray,
+        *,
+        checked: bool = True,
+        without: Collection[Box] = (),
+    ) -> MotionTask:
         """Move the tool straight by `displacement` (3,) m in the world, without turning it.
 
-        `checked`: only if the arm meets nothing but the clip. A motion that begins in a socket's box cannot be checked.
+        `checked`: only if the arm meets nothing but the boxes `without`. A motion that begins in a box cannot be
+        checked.
         """
 
         def steps() -> Iterator[None]:
@@ -142,7 +110,7 @@ class Motion(PlanningScene):
             tool = kin.tool(q)
             goal = RigidTransform.from_components(tool.translation + displacement, tool.rotation)
             path = straight_line(kin, q, goal)
-            model = self.start_model(arm, clip=False)
+            model = self.start_model(arm, without=without)
             if checked:
                 self._check_shift(model, path, float(np.linalg.norm(displacement)))
             yield from self.execution.follow(arm, path, self.parameters.approach_speed)
@@ -152,24 +120,28 @@ class Motion(PlanningScene):
     def pick(
         self,
         arm: str,
-        world_from_connector: RigidTransform,
+        world_from_cylinder: RigidTransform,
+        cylinder: Cylinder,
         *,
         shallow: float = 0.0,
-        cable: FloatArray | None = None,
+        clear_of: FloatArray | None = None,
+        without: Collection[Box] = (),
         point_cloud: PointCloudSource | None = None,
     ) -> MotionTask:
-        """Open the jaw and bring it round the connector near its cable side; the jaw stays open.
+        """Open the jaw and bring it round a cylinder; the jaw stays open.
 
-        The connector lies `shallow` metres nearer to the finger tips than the pads' middle. The arm keeps clear of the
-        `cable`'s points (n, 3) m, except where the jaw takes hold: pushing the cable moves the connector. Before the
-        last straight way the arm is corrected by the `point_cloud` that a camera sees of it.
+        The cylinder lies `shallow` metres nearer to the finger tips than the pads' middle. The arm keeps clear of the
+        points `clear_of` (n, 3) m, except where the jaw takes hold: pushing a cable moves the connector. On the last
+        straight way it may touch the boxes `without`. Before that it is corrected by the `point_cloud` that a camera
+        sees of it.
         """
 
         def steps() -> Iterator[None]:
             q, jaw = self.joints(arm), self.parameters.execution.jaw
-            self._keep_clear_of_cable(cable, world_from_connector.translation)
+            self._keep_clear_but_near(clear_of, world_from_cylinder.translation)
             model = self.start_model(arm, opening=jaw.open_gap)
-            approaches = self._approaches(arm, model, world_from_connector, shallow)
+            candidates = pick_candidates(world_from_cylinder, cylinder, shallow, self.parameters.pick)
+            approaches = self._approaches(arm, model, candidates, without)
             self.grippers[arm].open(jaw.open_gap)
             path = self._plan(model, q, np.array([approach[0] for approach in approaches]))
             approach = min(approaches, key=lambda approach: float(np.abs(approach[0] - path[-1]).max()))
@@ -184,13 +156,24 @@ class Motion(PlanningScene):
 
         return self.execution.task(arm, steps())
 
-    def release(self, arm: str) -> MotionTask:
-        """Open the jaw; done once it stands wider than a connector."""
-        gap = 2 * self.known.cable.connector.radius + self.parameters.execution.jaw.slack
+    def close(self, arm: str, thickness: float) -> Task[float]:
+        """Close the jaw on a thing of `thickness` m; the answer is the gap (m) between the pads that hold it.
+
+        It fails with GraspEmptyError when it closes on nothing, with GRIPPER_FAILED when it does not move. When it is
+        cancelled the jaw keeps its force.
+        """
+        return Task(self.execution.close_jaw(arm, thickness))
+
+    def open_jaw(self, arm: str) -> None:
+        """Tell the jaw to open, without waiting for it."""
+        self.grippers[arm].open(self.parameters.execution.jaw.open_gap)
+
+    def release(self, arm: str, gap: float) -> MotionTask:
+        """Open the jaw; done once it stands `gap` m open."""
         return self.execution.task(arm, self.execution.open_jaw(arm, gap))
 
     def stop(self) -> None:
-        """Stop both arms."""
+        """Stop all arms."""
         for arm in self.arms:
             self.execution.halt(arm)
 
@@ -206,9 +189,9 @@ class Motion(PlanningScene):
         message = f"{length:.2f} m straight on the arm is {-1e3 * distance:.0f} mm in {what}"
         raise PlanningError(CauseCode.MOTION_BLOCKED, message)
 
-    def _keep_clear_of_cable(self, cable: FloatArray | None, connector: FloatArray) -> None:
-        """Keep clear of the cable's points (n, 3) m, except those in the jaw's reach of the connector (3,) m."""
-        self.keep_clear(NO_POINTS if cable is None else points_beyond(cable, connector, self.parameters.pick.jaw_reach))
+    def _keep_clear_but_near(self, points: FloatArray | None, place: FloatArray) -> None:
+        """Keep clear of the points (n, 3) m, except those in the jaw's reach of a place (3,) m."""
+        self.keep_clear(NO_POINTS if points is None else points_beyond(points, place, self.parameters.pick.jaw_reach))
 
     def _measure_offsets(self, arm: str, point_cloud: PointCloudSource | None) -> Generator[None, None, FloatArray]:
         """The encoders' offsets (6,) rad of an arm at rest, by a picture taken from now on; zeros if none comes."""
@@ -222,13 +205,12 @@ class Motion(PlanningScene):
         return np.zeros(6)
 
     def _approaches(
-        self, arm: str, model: CollisionModel, world_from_connector: RigidTransform, shallow: float
+        self, arm: str, model: CollisionModel, candidates: Sequence[Grasp], without: Collection[Box]
     ) -> list[FloatArray]:
-        """Joint paths (k, 6) rad from standoff to grasp; `model` counts away from the connector."""
-        pick = self.parameters.pick
-        near = self.model(arm, clip=False, opening=self.parameters.execution.jaw.open_gap)
-        candidates = pick_candidates(world_from_connector, self.known.cable.connector, shallow, pick)
-        return find_approaches(model, near, self.joints(arm), candidates, self.parameters.clearances, pick)
+        """Joint paths (k, 6) rad from standoff to grasp; `model` counts away from what is grasped."""
+        near = self.model(arm, without=without, opening=self.parameters.execution.jaw.open_gap)
+        clearances, pick = self.parameters.clearances, self.parameters.pick
+        return find_approaches(model, near, self.joints(arm), candidates, clearances, pick)
 
     def _plan(
         self,

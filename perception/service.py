@@ -1,4 +1,4 @@
-"""Answers what the leaves ask about the scene, from the newest frames: the connector's pose, its track, obstacles."""
+"""Answers what the leaves of every task ask about the scene, from the newest frames: obstacles, surfaces, motion."""
 
 from collections.abc import Callable, Mapping
 from copy import deepcopy
@@ -9,25 +9,22 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import FloatArray
-from regrasp.interfaces.cable.cell import CableKnown
+from regrasp.interfaces.cell import FixedMount, KnownCell
 from regrasp.interfaces.devices import Camera, Clock
 from regrasp.interfaces.frame import RgbdFrame
 from regrasp.interfaces.wall_time import counts_as
 from regrasp.perception.camera.health import CameraHealth, CameraHealthParameters
 from regrasp.perception.camera.model import NEAREST_DEPTH, pixel_rays
 from regrasp.perception.camera.registration import Registration, RegistrationParameters, expected_errors, register
-from regrasp.perception.mapping.occupancy import Occupancy, OccupancyParameters, Spheres
-from regrasp.perception.pose.estimate import Estimate, NoEstimate
-from regrasp.perception.pose.segmentation import NotSeen
-from regrasp.perception.pose.technique import TechniqueName, make_technique
-from regrasp.perception.tracking.track import ConnectorTrack, TrackParameters
+from regrasp.perception.mapping.occupancy import Occupancy, OccupancyParameters, Spared, Spheres
+from regrasp.perception.tracking.stillness import Stillness, StillnessParameters
 
 
 @dataclass(frozen=True)
 class PerceptionParameters:
     """The mapped region, what counts as a new obstacle, and the parameters of the parts."""
 
-    # World frame, m. Where obstacles may matter: the space that the arms share with the cable.
+    # World frame, m. Where obstacles may matter: in the thesis's cell the space that the arms share with the cable.
     region_lower: tuple[float, float, float] = (0.16, -0.44, 0.01)
     region_upper: tuple[float, float, float] = (0.50, 0.44, 0.62)
     min_new_voxels: int = 80  # of a new obstacle: the front of a piece of 9 cm
@@ -37,7 +34,20 @@ class PerceptionParameters:
     health: CameraHealthParameters = field(default_factory=CameraHealthParameters)
     registration: RegistrationParameters = field(default_factory=RegistrationParameters)
     occupancy: OccupancyParameters = field(default_factory=OccupancyParameters)
-    track: TrackParameters = field(default_factory=TrackParameters)
+    stillness: StillnessParameters = field(default_factory=StillnessParameters)
+
+
+class StillnessWatch:
+    """Whether anything moves before a camera at rest; only frames from the time `since` (s) on count."""
+
+    def __init__(self, camera: Camera, since: float, parameters: StillnessParameters) -> None:
+        self._camera, self._since, self._stillness = camera, since, Stillness(parameters)
+
+    @counts_as("perception")
+    def still(self) -> bool | None:
+        """Whether nothing moved of late, the newest frame included; None until there are enough frames to tell."""
+        frame = self._camera.latest()
+        return None if frame is None or frame.stamp < self._since else self._stillness.feed(frame)
 
 
 class Perception:
@@ -49,62 +59,28 @@ class Perception:
 
     def __init__(
         self,
-        known: CableKnown,
+        known: KnownCell,
         cameras: Mapping[str, Camera],
         clock: Clock,
         pose_of: Callable[[RgbdFrame], RigidTransform],
         arm_spheres: Callable[[], list[Spheres]],
         parameters: PerceptionParameters = PerceptionParameters(),
     ) -> None:
-        self._parameters = parameters
+        self.parameters = parameters
         self._known, self._cameras, self._clock = known, cameras, clock
         self._pose_of, self._arm_spheres = pose_of, arm_spheres
-        self._technique = make_technique("fused", known)
         self._health = {name: CameraHealth(name, parameters.health) for name in cameras}
-        self._results: dict[str, tuple[int, Estimate | NoEstimate]] = {}
-        self.track = ConnectorTrack(parameters.track)
-        self._axis: FloatArray | None = None  # see `expect_in_hand`
         region = np.array(parameters.region_lower), np.array(parameters.region_upper)
-        self.occupancy = Occupancy(*region, known.solids(), known.cable.connector, parameters.occupancy)
+        self.occupancy = Occupancy(*region, known.solids(), self._spared(), parameters.occupancy)
+
+    @property
+    def fixed_cameras(self) -> tuple[str, ...]:
+        """The names of the cameras that no arm carries, in the cell's order."""
+        return tuple(camera.name for camera in self._known.cameras if isinstance(camera.mount, FixedMount))
 
     def frame(self, camera: str) -> RgbdFrame | None:
         """The newest frame; None before the first."""
         return self._cameras[camera].latest()
-
-    @counts_as("perception")
-    def look(self, camera: str) -> Estimate | NoEstimate | None:
-        """The connector's pose by the newest frame, or why there is none; None before the first frame.
-
-        A new result enters the track. A camera in `trouble` gives no pose.
-        """
-        newest = self._cameras[camera].latest()
-        if newest is None:
-            return None
-        trouble = self.trouble(camera)
-        if trouble is not None:
-            untrusted = NoEstimate(newest.stamp, camera, NotSeen.NO_CAMERA, trouble)
-            self.track.feed(untrusted)
-            return untrusted
-        if camera in self._results and self._results[camera][0] == newest.number:
-            return self._results[camera][1]
-        near = self.track.position(self._clock.now())
-        result = self._technique.estimate(newest, self._pose_of(newest), axis=self._axis, near=near)
-        self._results[camera] = (newest.number, result)
-        self.track.feed(result)
-        return result
-
-    def expect_in_hand(self, position: FloatArray | None, axis: FloatArray | None) -> None:
-        """From now on, a connector that is not seen may be hidden by the hand, which is at `position` (3,) m.
-
-        `axis` (3,) is the connector's from cable to tip in the world, where the robot knows it; see `Technique`. None
-        ends either.
-        """
-        self.track.set_holding_tool(position)
-        self._axis = axis
-
-    def use(self, technique: TechniqueName) -> None:
-        """Look by this technique from now on. Raises ValueError if the cell lacks what it needs."""
-        self._technique, self._results = make_technique(technique, self._known), {}
 
     @counts_as("perception")
     def trouble(self, camera: str) -> str | None:
@@ -125,23 +101,30 @@ class Perception:
         frame = self.frame(camera)
         if frame is None or frame.stamp < since:
             return None
-        registered, step = self._register(frame), self._parameters.surface_step
+        registered, step = self._register(frame), self.parameters.surface_step
         depth, rays = frame.depth[::step, ::step] * registered.scale, pixel_rays(frame.intrinsics)[::step, ::step]
-        seen = (depth > NEAREST_DEPTH) & (depth < self._parameters.surface_range)  # NaN compares false
+        seen = (depth > NEAREST_DEPTH) & (depth < self.parameters.surface_range)  # NaN compares false
         return np.asarray(registered.world_from_camera.apply(rays[seen] * depth[seen, None]))
+
+    def look_around(self) -> int:
+        """Map what every fixed camera sees; the number of full voxels."""
+        for camera in self.fixed_cameras:
+            self.map_obstacles(camera)
+        return len(self.occupancy.occupied_points())
 
     @counts_as("perception")
     def map_obstacles(self, camera: str) -> int:
         """Take the newest frame into the occupancy map, by the registered camera; the number of full voxels.
 
-        Only the rear camera guesses what lies behind a surface: from the side the guess would lie beside the obstacle.
+        Only a fixed camera guesses what lies behind a surface: from the side, as an arm's camera looks, the guess would
+        lie beside the obstacle.
         """
         frame = self.frame(camera)
         if frame is not None:
             registered = self._register(frame)
             scaled = replace(frame, depth=frame.depth * np.float32(registered.scale))
             pose, arms = registered.world_from_camera, self._arm_spheres()
-            self.occupancy.integrate(scaled, pose, arms, guess_behind=camera == "rear")
+            self.occupancy.integrate(scaled, pose, arms, guess_behind=camera in self.fixed_cameras)
         return len(self.occupancy.occupied_points())
 
     @counts_as("perception")
@@ -154,15 +137,27 @@ class Perception:
         self.map_obstacles(camera)
         points, mapped = self.occupancy.occupied_points(guessed=False), before.occupied_points()
         if len(mapped) and len(points):
-            near = self._parameters.mapped_distance
+            near = self.parameters.mapped_distance
             points = points[cKDTree(mapped).query(points, distance_upper_bound=near)[0] > near]
         filled = len(points)
-        if filled < self._parameters.min_new_voxels:
+        if filled < self.parameters.min_new_voxels:
             self.occupancy = before
             return 0
         return filled
 
+    def obstacles(self) -> tuple[FloatArray, float]:
+        """The mapped obstacles: centres (n, 3) m, world, of full voxels, and their edge in m."""
+        return self.occupancy.occupied_points(), self.occupancy.voxel_size
+
+    def watch_stillness(self, camera: str) -> StillnessWatch:
+        """Begin to watch whether anything moves before a fixed camera."""
+        return StillnessWatch(self._cameras[camera], self._clock.now(), self.parameters.stillness)
+
+    def _spared(self) -> Spared | None:
+        """What the task takes hold of, which is no obstacle."""
+        return None
+
     def _register(self, frame: RgbdFrame) -> Registration:
         """A frame's camera, corrected by the known boxes."""
-        errors = expected_errors(self._known, frame.camera, self._parameters.registration)
-        return register(frame, self._pose_of(frame), self._known.boxes, errors, self._parameters.registration)
+        errors = expected_errors(self._known, frame.camera, self.parameters.registration)
+        return register(frame, self._pose_of(frame), self._known.boxes, errors, self.parameters.registration)

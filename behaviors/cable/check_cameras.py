@@ -1,14 +1,13 @@
-"""Ask the rear camera for the connector before any search."""
+"""Ask the overview camera for the connector before any search."""
 
 from typing import Any, ClassVar
 
-from regrasp.behaviors.leaf import LeafFailed, LeafPort, LeafSteps, StepsLeaf
+from regrasp.behaviors.cable.hand import CableLeaf
+from regrasp.behaviors.leaf import LeafFailed, LeafPort, LeafSteps
 from regrasp.interfaces.cable.cause import CableCause
-from regrasp.perception.pose.estimate import Estimate
-from regrasp.perception.pose.fusion import fuse
 
 
-class CheckCameras(StepsLeaf):
+class CheckCameras(CableLeaf):
     """Looks for `seconds` through the rear camera, then asks the track the thesis's three questions.
 
     SUCCESS when the connector's frame exists, is fresh and is live; its mean pose is then in the belief. Else FAILURE:
@@ -21,18 +20,12 @@ class CheckCameras(StepsLeaf):
 
     def steps(self) -> LeafSteps:
         """See the class."""
-        clock, perception = self.services.clock, self.services.perception
-        begin = clock.now()
-        seen: dict[float, Estimate] = {}
-        while clock.now() < begin + self.get_input("seconds") - 1e-9:
-            yield None
-            result = perception.look("rear")
-            if isinstance(result, Estimate) and result.stamp >= begin:
-                seen[result.stamp] = result
-        health = perception.track.check(clock.now())
-        if not (health.ok and seen):
+        perception, belief = self.services.perception, self.services.belief
+        looked = yield from self.ask(perception.watch(self.overview, self.get_input("seconds")))
+        health = perception.check()
+        if not (health.ok and looked.estimates):
             raise LeafFailed(CableCause.CONNECTOR_NOT_FOUND, health.reason)
-        found, belief = fuse(list(seen.values())), self.services.belief
+        found = perception.fuse(looked.estimates)
         belief.connector, belief.sure = found.world_from_connector, found.whole
-        belief.found_by, belief.vain_searches = "rear", 0
-        self.say("found", camera="rear", position=found.position.round(4).tolist())
+        belief.found_by, belief.vain_searches = self.overview, 0
+        self.say("found", camera=self.overview, position=found.position.round(4).tolist())

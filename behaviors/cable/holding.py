@@ -4,6 +4,7 @@ from typing import Any, ClassVar
 
 from py_trees.common import Status
 
+from regrasp.behaviors.cable.services import CableServices
 from regrasp.behaviors.leaf import Leaf
 from regrasp.interfaces.cause import CauseCode
 
@@ -14,6 +15,7 @@ class Holding(Leaf):
     INPUT_PORTS: ClassVar[dict[str, Any]] = {}
     OUTPUT_PORTS: ClassVar[dict[str, Any]] = {}
     RETURNS = frozenset({Status.SUCCESS, Status.FAILURE})
+    services: CableServices
 
     def work(self) -> Status:
         """See the class."""

@@ -3,15 +3,11 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-
-from regrasp.behaviors.cable.hand import CAMERA_ARM
 from regrasp.behaviors.cable.look import LookLeaf
 from regrasp.behaviors.leaf import LeafSteps
+from regrasp.interfaces.arrays import FloatArray
+from regrasp.interfaces.cable.sight import Estimate
 from regrasp.motion.failure import PlanningError
-from regrasp.perception.pose.estimate import Estimate
-from regrasp.perception.pose.fusion import fuse
 
 
 @dataclass(frozen=True)
@@ -33,25 +29,24 @@ class LookCloser(LookLeaf):
 
     def steps(self) -> LeafSteps:
         """See the class."""
-        belief = self.services.belief
-        if belief.found_by == "rear" and belief.sure:
+        belief, motion = self.services.belief, self.services.motion
+        if belief.found_by == self.overview and belief.sure:
             return
-        taken: list[NDArray[np.float64]] = []
+        taken: list[FloatArray] = []
         whole: list[Estimate] = []
         for _ in range(self.parameters.looks):
-            seen: list[Estimate] = []
             try:
                 assert belief.connector is not None
-                view, goals = self.best_view(belief.connector, taken)
-                taken.append(view.rotation.apply([0.0, 0.0, 1.0]))
-                yield from self.go_and_look(goals, self.parameters.look_time, seen)
+                view = motion.best_view(belief.connector, taken)
+                taken.append(view.sight)
+                looked = yield from self.go_and_look(view, self.parameters.look_time)
             except PlanningError as error:
                 self.say("no closer look", why=str(error))
                 continue
-            whole += [e for e in seen if e.whole]
-            if seen:
-                found = fuse(whole or seen)
+            whole += [e for e in looked.estimates if e.whole]
+            if looked.estimates:
+                found = self.services.perception.fuse(whole or looked.estimates)
                 belief.connector, belief.sure = found.world_from_connector, found.whole
-                belief.found_by = "wrist"
+                belief.found_by = self.search
                 self.say("looked closer", position=belief.connector.translation.round(4).tolist(), sure=belief.sure)
-        yield from self.go_to_sleep(CAMERA_ARM)
+        yield from self.go_to_sleep(self.search_arm)

@@ -4,7 +4,7 @@ from typing import Any, ClassVar
 
 from py_trees.common import Status
 
-from regrasp.behaviors.cable.hand import HANDLING_ARM
+from regrasp.behaviors.cable.services import CableServices
 from regrasp.behaviors.leaf import Leaf, LeafPort
 
 
@@ -19,30 +19,30 @@ class Monitor(Leaf):
     }
     OUTPUT_PORTS: ClassVar[dict[str, Any]] = {}
     RETURNS = frozenset({Status.SUCCESS})
+    services: CableServices
     _due = 0.0
     _trouble = False
 
     def work(self) -> Status:
         """See the class."""
-        perception, now = self.services.perception, self.services.clock.now()
-        tool, held = self.services.motion.tool(HANDLING_ARM), self.services.belief.held
-        axis = None if held is None else (tool * held).rotation.apply([1.0, 0.0, 0.0])
-        perception.expect_in_hand(tool.translation, axis)
+        perception, now, cable = self.services.perception, self.services.clock.now(), self.services.known.cable
+        perception.expect_in_hand(self.services.motion.tool(cable.hand), self.services.belief.held)
         if now >= self._due - 1e-9:
-            perception.look("rear")
+            perception.look(cable.overview)
             self._due = now + self.get_input("period")
-            self._tell_trouble(perception.trouble("rear"))
-        state, sentence = perception.track.state(now)
+            self._tell_trouble(cable.overview)
+        state, sentence = perception.state()
         self.feedback_message = f"{state.value}: {sentence}"
         return Status.SUCCESS
 
-    def _tell_trouble(self, trouble: str | None) -> None:
+    def _tell_trouble(self, camera: str) -> None:
+        trouble = self.services.perception.trouble(camera)
         if (trouble is not None) != self._trouble:
             self._trouble = trouble is not None
-            self.say("camera", camera="rear", trusted=not self._trouble, why=trouble or "its frames are sound again")
+            self.say("camera", camera=camera, trusted=not self._trouble, why=trouble or "its frames are sound again")
 
     def terminate(self, new_status: Status) -> None:
         """When the tree stops the leaf, forget the hand: the carrying is over."""
         if new_status is Status.INVALID:
-            self.services.perception.expect_in_hand(None, None)
+            self.services.perception.expect_in_hand(None)
             self._due = 0.0

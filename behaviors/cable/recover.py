@@ -4,11 +4,10 @@ from dataclasses import dataclass
 from itertools import chain
 from typing import Any, ClassVar
 
-from regrasp.behaviors.cable.hand import HANDLING_ARM, HandLeaf
+from regrasp.behaviors.cable.hand import HandLeaf
 from regrasp.behaviors.leaf import LeafFailed, LeafPort, LeafSteps
 from regrasp.interfaces.cable.cause import CableCause
 from regrasp.interfaces.cause import CauseCode
-from regrasp.perception.tracking.stillness import Stillness, StillnessParameters
 
 
 @dataclass(frozen=True)
@@ -20,9 +19,8 @@ class MakeRoomParameters:
 
 @dataclass(frozen=True)
 class WaitUntilStillParameters:
-    """When a cable counts as still."""
+    """How often it is looked, and what is done without a camera."""
 
-    threshold: float = 0.25  # of the mean brightness: a cable that moves by about 1 mm; the jaw allows for 20 mm
     blind_time: float = 15.0  # s of waiting without a camera; with one it took 7 to 13 s
     frame_period: float = 0.2  # s between the frames that are compared; choice
 
@@ -39,9 +37,9 @@ class MakeRoom(HandLeaf):
     def steps(self) -> LeafSteps:
         """See the class."""
         self.services.belief.connector = self.services.belief.found_by = None
-        self.open_jaw()
-        for step in chain(self.wait(self.parameters.leave_time), self.draw_back(), self.go_to_sleep(HANDLING_ARM)):
-            self.services.perception.look("rear")  # the search starts where the end was seen last
+        self.services.motion.open_jaw(self.hand)
+        for step in chain(self.wait(self.parameters.leave_time), self.draw_back(), self.go_to_sleep(self.hand)):
+            self.services.perception.look(self.overview)  # the search starts where the end was seen last
             yield step
 
 
@@ -60,32 +58,27 @@ class WaitUntilStill(HandLeaf):
 
     def steps(self) -> LeafSteps:
         """See the class."""
-        stillness = Stillness(StillnessParameters(threshold=self.parameters.threshold))
-        begin = self.services.clock.now()
-        limit = self.get_input("time_limit")
-        perception = self.services.perception
+        perception, begin = self.services.perception, self.services.clock.now()
+        watch, limit = perception.watch_stillness(self.overview), self.get_input("time_limit")
         while self.services.clock.now() < begin + limit:
-            trouble = perception.trouble("rear")
+            trouble = perception.trouble(self.overview)
             if trouble is not None:
                 yield from self._wait_blind(trouble)
                 return
-            perception.look("rear")
-            frame = perception.frame("rear")
-            if frame is not None and frame.stamp >= begin and stillness.feed(frame):
+            perception.look(self.overview)
+            if watch.still():
                 self.say("still", waited=round(self.services.clock.now() - begin, 2))
-                if voxels := perception.map_new_obstacle("rear"):
+                if voxels := perception.map_new_obstacle(self.overview):
                     self.say("a new thing stands in the cell", voxels=voxels)
-                    self.services.motion.set_obstacles(
-                        perception.occupancy.occupied_points(), perception.occupancy.voxel_size
-                    )
+                    self.services.take_over_map()
                 return
             yield from self.wait(self.parameters.frame_period)
         raise LeafFailed(CableCause.NOT_STILL, f"the scene still moved after {limit:.0f} s")
 
     def _wait_blind(self, trouble: str) -> LeafSteps:
-        other = self.services.perception.trouble("wrist")
+        other = self.services.perception.trouble(self.search)
         if other is not None:
             raise LeafFailed(CauseCode.CAMERA_FAILED, f"{trouble}; {other}")
         seconds = self.parameters.blind_time
-        self.say("waiting without the rear camera", seconds=seconds, why=trouble)
+        self.say(f"waiting without the {self.overview} camera", seconds=seconds, why=trouble)
         yield from self.wait(seconds)

@@ -1,29 +1,14 @@
 """Take the connector out of its socket; where sockets are is known."""
 
-from dataclasses import dataclass
 from typing import Any, ClassVar
 
-import numpy as np
-
-from regrasp.behaviors.cable.hand import HANDLING_ARM, HandLeaf
+from regrasp.behaviors.cable.hand import HandLeaf
 from regrasp.behaviors.leaf import LeafPort, LeafSteps
-
-
-@dataclass(frozen=True)
-class UnplugParameters:
-    """How the plug is gripped and drawn out."""
-
-    draw_out: float = 0.05  # m along the plug's axis; the plug sits 0.015 m deep
-    # m by which the plug lies nearer to the finger tips than the pads' middle: they end 12 mm past it, and the panel is
-    # 20 mm behind the plug
-    shallow: float = 0.008
-    retreat: float = 0.06  # m away from the panel then; choice
 
 
 class Unplug(HandLeaf):
     """Grips the connector in the `socket` of that name, draws it out along its axis, and away from the panel."""
 
-    parameters: ClassVar[UnplugParameters] = UnplugParameters()
     INPUT_PORTS: ClassVar[dict[str, Any]] = {
         "socket": LeafPort(
             data_type=str,
@@ -34,10 +19,8 @@ class Unplug(HandLeaf):
 
     def steps(self) -> LeafSteps:
         """See the class."""
-        known, motion = self.services.known, self.services.motion
-        plug = known.cable.socket(self.get_input("socket")).world_from_plug(known.cable.connector.length)
-        yield motion.pick(HANDLING_ARM, plug, shallow=self.parameters.shallow, point_cloud=self.rear_point_cloud)
+        cable, motion = self.services.known.cable, self.services.motion
+        plug = cable.socket(self.get_input("socket")).world_from_plug(cable.connector.length)
+        yield motion.pick_plug(plug, point_cloud=self.overview_points)
         yield from self.grip(plug)
-        axis = plug.rotation.apply([1.0, 0.0, 0.0])
-        yield motion.shift(HANDLING_ARM, -self.parameters.draw_out * axis, checked=False)
-        yield motion.shift(HANDLING_ARM, np.array([-self.parameters.retreat, 0.0, 0.0]), checked=False)
+        yield motion.pull_out(plug)

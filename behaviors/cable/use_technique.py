@@ -4,6 +4,7 @@ from typing import Any, ClassVar
 
 from py_trees.common import Status
 
+from regrasp.behaviors.cable.services import CableServices
 from regrasp.behaviors.leaf import Leaf, LeafPort
 
 
@@ -19,6 +20,7 @@ class UseTechnique(Leaf):
     }
     OUTPUT_PORTS: ClassVar[dict[str, Any]] = {}
     RETURNS = frozenset({Status.SUCCESS})
+    services: CableServices
 
     def work(self) -> Status:
         """See the class."""

@@ -18,7 +18,7 @@ class SafeStopParameters:
 
 
 class SafeStop(StepsLeaf):
-    """Stops both arms and holds them; the jaws keep their force. FAILURE once the arms rest: the mission has failed.
+    """Stops the arms and holds them; the jaws keep their force. FAILURE once the arms rest: the mission has failed.
 
     Its cause is that of the leaf that failed last. It has a cause of its own only when no leaf has named one.
     """

@@ -9,28 +9,28 @@ from regrasp.interfaces.cause import CauseCode
 
 @dataclass(frozen=True)
 class StartUpParameters:
-    """How long the leaf waits for the camera."""
+    """How long the leaf waits for the cameras."""
 
-    camera_timeout: float = 2.0  # s that the camera has to give sound frames; choice
+    camera_timeout: float = 2.0  # s that the cameras have to give sound frames; choice
 
 
 class StartUp(StepsLeaf):
-    """Waits for the rear camera, and maps the obstacles that it sees.
+    """Waits for every camera that is fixed in the cell, looks around, and maps the obstacles that they see.
 
-    FAILURE when the camera is not to be trusted: the obstacles would be unknown.
+    FAILURE when a camera is not to be trusted: the obstacles would be unknown.
     """
 
     parameters: ClassVar[StartUpParameters] = StartUpParameters()
 
     def steps(self) -> LeafSteps:
         """See the class."""
-        perception, motion = self.services.perception, self.services.motion
+        perception = self.services.perception
         end = self.services.clock.now() + self.parameters.camera_timeout
-        while perception.frame("rear") is None or perception.trouble("rear") is not None:
-            if self.services.clock.now() > end:
-                raise LeafFailed(CauseCode.CAMERA_FAILED, f"{perception.trouble('rear')}; nothing was mapped")
-            yield None
-        perception.look("rear")  # the plugged end, while no hand hides it
-        voxels = perception.map_obstacles("rear")
-        motion.set_obstacles(perception.occupancy.occupied_points(), perception.occupancy.voxel_size)
+        for camera in perception.fixed_cameras:
+            while perception.frame(camera) is None or perception.trouble(camera) is not None:
+                if self.services.clock.now() > end:
+                    raise LeafFailed(CauseCode.CAMERA_FAILED, f"{perception.trouble(camera)}; nothing was mapped")
+                yield None
+        voxels = perception.look_around()
+        self.services.take_over_map()
         self.say("looked around", occupied_voxels=voxels)

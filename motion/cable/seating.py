@@ -1,5 +1,7 @@
 """How a hand brings the connector that it holds into a clip."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
@@ -11,30 +13,48 @@ from regrasp.motion.planning.straight import straight_line
 from regrasp.motion.robots.kinematics import ArmKinematics
 from regrasp.motion.robots.poses import angle_between
 from regrasp.motion.scene.collision import CollisionModel
-from regrasp.motion.scene.planning_scene import PlanningScene
+
+
+@dataclass(frozen=True)
+class SeatingParameters:
+    """Where the hand stops in front of the clip, and how it goes in."""
+
+    # m in front of the clip along the hand's own axis, from where it goes straight in; more would press the cable
+    distance: float = 0.025
+    margin: float = 0.0  # m of clearance in front of the clip and on the straight path in; choice
+    rolls: int = 36  # angles about the connector's axis that are tried; choice: every 10 degrees
+    line_step: float = 0.01  # m between the waypoints of the straight path in that is checked; choice
+    fine_rolls: int = 361  # angles about the axis from which the roll in the clip is chosen; choice: every degree
+    speed_to: float = 0.5  # share of the joints' speed on the way there; choice
+    speed_in: float = 0.2  # share of the joints' speed on the way in; choice
 
 
 @counts_as("planning")
 def poses_before(
-    scene: PlanningScene, arm: str, held: RigidTransform, *, distance: float, rolls: int, margin: float, step: float
+    models: tuple[CollisionModel, CollisionModel],
+    q: FloatArray,
+    clip: Clip,
+    held: RigidTransform,
+    parameters: SeatingParameters = SeatingParameters(),
 ) -> list[RigidTransform]:
-    """Hand poses (world_from_tool) `distance` m in front of the clip from which a straight path in is free.
+    """Hand poses (world_from_tool) in front of the clip from which a straight path in is free, the best first.
 
-    `held` is tool_from_connector. So many `rolls` about the connector's axis are tried; those that turn the hand least
-    come first. `margin` m of clearance is kept, at waypoints of the straight path every `step` m.
+    `models` are the hand's collision models on the way there, with what it holds, and on the way in. It stands at
+    joints `q` (6,) rad and holds the connector so (`held`: tool_from_connector). Those poses come first that turn it
+    least.
     """
-    model, near = scene.model(arm, held=held), scene.model(arm, clip=False)
-    kin = scene.kinematics[arm]
+    model, near = models
+    kin, margin = model.kinematics, parameters.margin
     goals = []
-    for seated in _seated_poses(scene.known.cable.clip, held, np.linspace(-np.pi, np.pi, rolls, endpoint=False)):
+    for seated in _seated_poses(clip, held, np.linspace(-np.pi, np.pi, parameters.rolls, endpoint=False)):
         before = seated.copy()
-        before[:3, 3] -= distance * seated[:3, 0]
-        starts = (q for q in kin.ik(before) if model.free(q, margin))
-        if any(_straight_in(kin, near, q, seated, margin, step) for q in starts):
+        before[:3, 3] -= parameters.distance * seated[:3, 0]
+        starts = (start for start in kin.ik(before) if model.free(start, margin))
+        if any(_straight_in(kin, near, start, seated, margin, parameters.line_step) for start in starts):
             goals.append(before)
     if not goals:
         return []
-    now = kin.tool_matrix(scene.joints(arm))
+    now = kin.tool_matrix(q)
     goals.sort(key=lambda pose: angle_between(now, pose))
     return [RigidTransform.from_matrix(pose) for pose in goals]
 
@@ -66,27 +86,3 @@ def _seated_poses(clip: Clip, held: RigidTransform, rolls: FloatArray) -> FloatA
     turns[:, :3, :3] = Rotation.from_euler("x", rolls[:, None]).as_matrix()
     turns[:, 3, 3] = 1.0
     return np.asarray(clip.world_from_seat.as_matrix() @ turns @ held.inv().as_matrix())
-
-
-def pose_in_hand(seen: RigidTransform, held: RigidTransform, *, whole: bool) -> RigidTransform:
-    """tool_from_connector of a connector that was `held` so and is now `seen` so, the `whole` of it or a part."""
-    if connector_axis(seen) @ connector_axis(held) < 0:  # a finger was taken for the cable: none turns round in a jaw
-        seen = seen * RigidTransform.from_rotation(Rotation.from_euler("z", 180, degrees=True))
-    return seen if whole else _turned_in_the_jaw(held, seen)
-
-
-def _turned_in_the_jaw(held: RigidTransform, seen: RigidTransform) -> RigidTransform:
-    """tool_from_connector when only a part of the connector is `seen`: its axis is known, its centre on it is not.
-
-    A cable turns the connector between the pads and does not draw it through. So the pads stay at the place along the
-    connector where they are by `held`.
-    """
-    axis = connector_axis(seen)
-    nearest = seen.translation - (seen.translation @ axis) * axis
-    pads_at = -float(held.translation @ connector_axis(held))
-    return RigidTransform.from_components(nearest - pads_at * axis, seen.rotation)
-
-
-def connector_axis(pose: RigidTransform) -> FloatArray:
-    """The connector's axis (3,), from cable to tip, in the pose's target frame."""
-    return np.asarray(pose.rotation.apply([1.0, 0.0, 0.0]))

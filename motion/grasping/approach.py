@@ -1,13 +1,13 @@
-"""Approaches to a connector: the grasps that may be taken, and how near to things each comes."""
+"""Approaches to a cylinder: the grasps that may be taken, and how near to things each comes."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import FloatArray
-from regrasp.interfaces.cable.cell import Connector
 from regrasp.motion.grasping.grasps import (
     ApproachParameters,
     Grasp,
@@ -20,21 +20,35 @@ from regrasp.motion.grasping.grasps import (
 from regrasp.motion.scene.collision import Clearances, CollisionModel
 
 
+class Cylinder(Protocol):
+    """A thing that jaws can take hold of. Its frame is at its centre, with x along its axis."""
+
+    @property
+    def length(self) -> float:
+        """Its length, m."""
+        ...
+
+    @property
+    def radius(self) -> float:
+        """Its radius, m."""
+        ...
+
+
 @dataclass(frozen=True)
 class PickParameters:
     """Which grasps are tried, and how many of them the planner may choose from."""
 
-    # m along the connector from its centre, tried in turn: near the cable the tip stays in sight
+    # m along the cylinder from its centre, tried in turn: near a connector's cable its tip stays in sight
     grip_offsets: tuple[float, ...] = (-0.02, -0.03, 0.0)
     max_approaches: int = 12  # choice: each is a goal of the planner
     standoff: float = 0.08  # m back along the tool, where the straight approach begins; choice
-    jaw_reach: float = 0.13  # m round a connector's centre where a jaw may be: half its length, a finger, 5 cm of palm
+    jaw_reach: float = 0.13  # m round a cylinder's centre where a jaw may be: half a length, a finger, 5 cm of palm
     grasp: GraspParameters = field(default_factory=GraspParameters)
 
 
 def pick_candidates(
-    world_from_connector: RigidTransform,
-    connector: Connector,
+    world_from_cylinder: RigidTransform,
+    cylinder: Cylinder,
     shallow: float,
     parameters: PickParameters = PickParameters(),
 ) -> list[Grasp]:
@@ -43,7 +57,7 @@ def pick_candidates(
         grasp
         for offset in parameters.grip_offsets
         for grasp in grasp_candidates(
-            world_from_connector, connector.length, connector.radius, offset, shallow, parameters.grasp
+            world_from_cylinder, cylinder.length, cylinder.radius, offset, shallow, parameters.grasp
         )
     ]
 

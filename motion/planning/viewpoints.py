@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from regrasp.interfaces.arrays import FloatArray
+from regrasp.interfaces.cable.motion import Viewpoint as Viewpoint
 from regrasp.interfaces.frame import Intrinsics
 
 if TYPE_CHECKING:
@@ -40,16 +41,6 @@ class CloseViewParameters:
     yaws_deg: tuple[float, ...] = tuple(np.arange(-75.0, 76.0, 15.0).tolist())  # to the left of world x
     pitches_deg: tuple[float, ...] = tuple(np.arange(-15.0, 76.0, 15.0).tolist())  # downwards
     distance_cost: float = 0.2  # 1/m off the preferred distance, against the cosine of the angle to the axis; choice
-
-
-@dataclass(frozen=True, eq=False)
-class Viewpoint:
-    """One place to look from: `index` counts viewpoints, `main` main points; `sub` is 0 for the flat view, then 1-8."""
-
-    index: int
-    main: int
-    sub: int
-    world_from_camera: "RigidTransform"
 
 
 def spiral(

@@ -1,14 +1,13 @@
 """The planning scene: where the arms are, and what they must not touch."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import FloatArray
-from regrasp.interfaces.cable.cell import CableKnown, Connector
-from regrasp.interfaces.cell import WristMount
+from regrasp.interfaces.cell import Box, KnownCell, WristMount
 from regrasp.interfaces.devices import Arm, Gripper
 from regrasp.interfaces.frame import RgbdFrame
 from regrasp.interfaces.wall_time import counts_as
@@ -28,7 +27,6 @@ class PlanningSceneParameters:
     arm_margin: float = 0.025
     touching: float = 0.005  # m; a seen point so near to a standing arm is no obstacle
     grid_border: float = 0.2  # m round the voxels; no sphere of an arm is thicker
-    connector_padding: float = 1.2  # radii of the spheres that cover a carried connector, in its own radii; choice
     sight_samples: int = 24  # points on a line of sight that must be free; choice
     sight_range: tuple[float, float] = (0.15, 0.85)  # shares of a line of sight that are checked: not its ends; choice
     collision: CollisionParameters = field(default_factory=CollisionParameters)
@@ -36,11 +34,11 @@ class PlanningSceneParameters:
 
 
 class PlanningScene:
-    """The two arms as read, the cell as known, and the voxels and the cable as seen."""
+    """The arms as read, the cell as known, and the voxels and other points as seen."""
 
     def __init__(
         self,
-        known: CableKnown,
+        known: KnownCell,
         arms: Mapping[str, Arm],
         grippers: Mapping[str, Gripper],
         parameters: PlanningSceneParameters = PlanningSceneParameters(),
@@ -56,7 +54,7 @@ class PlanningScene:
         }
         self._boxes = known.solids()
         self._grid: DistanceGrid | None = None
-        self._points = self._cable = NO_POINTS
+        self._points = self._more = NO_POINTS
         self._spacing = 0.01  # m, until the first voxels come
 
     @counts_as("planning")
@@ -74,12 +72,12 @@ class PlanningScene:
 
     @counts_as("planning")
     def keep_clear(self, points: FloatArray) -> None:
-        """Keep clear of these points (n, 3) m too, a cable or a stowed connector; they replace an earlier call's."""
-        self._cable = points
+        """Keep clear of these points (n, 3) m too, such as a cable's; they replace an earlier call's."""
+        self._more = points
         self._rebuild_grid()
 
     def _rebuild_grid(self) -> None:
-        points = np.vstack([self._points, self._cable])
+        points = np.vstack([self._points, self._more])
         if not len(points):
             self._grid = None
             return
@@ -89,21 +87,26 @@ class PlanningScene:
 
     @counts_as("planning")
     def start_model(
-        self, arm: str, held: RigidTransform | None = None, *, clip: bool = True, opening: float | None = None
+        self,
+        arm: str,
+        *,
+        held: FloatArray | None = None,
+        without: Collection[Box] = (),
+        opening: float | None = None,
     ) -> CollisionModel:
         """`model` for a motion that begins now; seen points that the arm touches where it stands are forgotten.
 
         Voxels are coarse and cameras err by millimetres: a hand that came in beside an obstacle must get out again.
         """
-        model = self.model(arm, held=held, clip=clip, opening=opening)
+        model = self.model(arm, held=held, without=without, opening=opening)
         distance, what = model.nearest(self.joints(arm))
         touching = self._scene_parameters.touching
         if what == "seen surface" and distance < touching:
             spheres = model.spheres(self.joints(arm))
             self._points = _points_beyond(self._points, spheres, touching + 2 * self._spacing)
-            self._cable = _points_beyond(self._cable, spheres, touching + 2 * self._spacing)
+            self._more = _points_beyond(self._more, spheres, touching + 2 * self._spacing)
             self._rebuild_grid()
-            model = self.model(arm, held=held, clip=clip, opening=opening)
+            model = self.model(arm, held=held, without=without, opening=opening)
         return model
 
     def joints(self, arm: str) -> FloatArray:
@@ -125,37 +128,36 @@ class PlanningScene:
     @counts_as("planning")
     def spheres(self) -> list[tuple[FloatArray, FloatArray]]:
         """The arms' bodies now: centres (n, 3) m and radii (n,) m of each."""
-        both = [self.model(name, others=False).spheres(self.joints(name)) for name in self.arms]
-        return [(s[:, :3], s[:, 3]) for s in both]
+        bodies = [self.model(name, others=False).spheres(self.joints(name)) for name in self.arms]
+        return [(s[:, :3], s[:, 3]) for s in bodies]
 
     @counts_as("planning")
     def model(
         self,
         arm: str,
         *,
-        held: RigidTransform | None = None,
+        held: FloatArray | None = None,
         others: bool = True,
-        clip: bool = True,
+        without: Collection[Box] = (),
         opening: float | None = None,
     ) -> CollisionModel:
         """What `arm` must not touch now.
 
-        `held` is tool_from_connector while the arm carries the connector. Without `others` the other arm and the seen
-        surfaces do not count; without `clip` the clip's bracket may be touched. The jaw stands as the fingers read, or
-        `opening` m wide.
+        `held` (m, 4) m are spheres in the tool frame that stand for what the hand carries. Without `others` the other
+        arms and the seen surfaces do not count; the boxes `without` may be touched. The jaw stands as the fingers read,
+        or `opening` m wide.
         """
-        other = None
-        if others:
-            name = next(n for n in self.arms if n != arm)
-            other = self.model(name, others=False).spheres(self.joints(name))
-        boxes = self._boxes if clip else [b for b in self._boxes if b not in self.known.cable.clip.bracket]
+        bodies = [
+            self.model(name, others=False).spheres(self.joints(name)) for name in self.arms if others and name != arm
+        ]
+        boxes = [box for box in self._boxes if box not in without]
         camera = self._cameras.get(arm)
-        padding = self._scene_parameters.connector_padding
         body = ArmBody(
             camera.offset if camera else None,
-            None if held is None else _connector_spheres(held, self.known.cable.connector, padding),
+            held,
             self.grippers[arm].reading().gap if opening is None else opening,
         )
+        other = np.vstack(bodies) if bodies else None
         grid = self._grid if others else None
         return CollisionModel(self.kinematics[arm], boxes, body, other, grid, self._scene_parameters.collision)
 
@@ -170,13 +172,6 @@ class PlanningScene:
             if np.any(np.all(np.abs(rays - box.center) < 0.5 * np.array(box.size), axis=1)):
                 return False
         return self._grid is None or bool(np.min(self._grid.at(rays)) > 0.0)
-
-
-def _connector_spheres(held: RigidTransform, connector: Connector, padding: float) -> FloatArray:
-    """Spheres (3, 4) m that cover a carried connector, in the tool frame; their radius is `padding` times its own."""
-    along = (0.5 * connector.length - connector.radius) * np.array([-1.0, 0.0, 1.0])
-    centers = held.apply(np.column_stack([along, np.zeros(3), np.zeros(3)]))
-    return np.column_stack([centers, np.full(3, padding * connector.radius)])
 
 
 def _points_beyond(points: FloatArray, spheres: FloatArray, margin: float) -> FloatArray:

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import ColorImage, DepthImage, FloatArray, Mask
-from regrasp.interfaces.cable.cell import Connector
 from regrasp.interfaces.cell import Box
+from regrasp.interfaces.fields import Color
 from regrasp.interfaces.frame import Intrinsics, RgbdFrame
 from regrasp.perception.camera.model import pixel_rays, project, subsampled
 from regrasp.perception.pose.segmentation import SegmentationParameters, color_mask
@@ -37,6 +37,17 @@ class OccupancyParameters:
     overrule_range: float = 1.1  # choice: a look from up to this many times the range overrules the one before
 
 
+@dataclass(frozen=True)
+class Spared:
+    """A thing that is no obstacle, as it is what a hand shall take: its RGB colour, each 0 to 1, and `thickness` m.
+
+    With it what is thin and black is its cable, and no obstacle either.
+    """
+
+    color: Color
+    thickness: float
+
+
 class Voxel(IntEnum):
     """What is known of a voxel."""
 
@@ -54,10 +65,10 @@ class Occupancy:
         lower: FloatArray,
         upper: FloatArray,
         known: Sequence[Box],
-        connector: Connector,
+        spared: Spared | None = None,
         parameters: OccupancyParameters = OccupancyParameters(),
     ) -> None:
-        """The region is from `lower` to `upper` (3,) m, world frame. `known` boxes and `connector` do not count."""
+        """The region is from `lower` to `upper` (3,) m, world frame. `known` boxes and the `spared` do not count."""
         size = parameters.voxel_size
         counts = np.ceil((upper - lower) / size - 1e-9).astype(int)
         grid = np.moveaxis(np.indices(tuple(counts)), 0, -1).reshape(-1, 3)
@@ -67,8 +78,8 @@ class Occupancy:
         self._centers = np.ascontiguousarray(centers[~near_boxes(centers, known, parameters.known_margin)])
         self._state = np.zeros(len(self._centers), np.uint8)
         self._range = np.full(len(self._centers), np.inf, np.float32)  # m, of the look that decided the state
-        self._color = SegmentationParameters.for_color(connector.color)
-        self._thickness = 2 * connector.radius
+        self._color = None if spared is None else SegmentationParameters.for_color(spared.color)
+        self._thickness = 0.0 if spared is None else spared.thickness
 
     def occupied_points(self, *, guessed: bool = True) -> FloatArray:
         """Centres (n, 3) m, world frame, of the voxels seen to be full, and with `guessed` of those assumed to be."""
@@ -91,9 +102,9 @@ class Occupancy:
         step = self._parameters.pixel_step
         k = subsampled(frame.intrinsics, step)
         depth = cv2.medianBlur(np.where(np.isfinite(frame.depth), frame.depth, 0), 3)[::step, ::step]
-        red = color_mask(frame.rgb, self._color)
+        red = self._spared(frame.rgb)
         free_depth = np.where(depth > 0, _min_filter(depth) - self.voxel_size, 0)
-        # Where the connector is, no obstacle is: a guess that covers it must not keep the hand away.
+        # Where the spared thing is, no obstacle is: a guess that covers it must not keep the hand away.
         found = _min_filter(np.where(red[::step, ::step] > 0, depth, np.float32(0)))
         beside = (found < NO_READING) & (depth > found - self._thickness)
         free_depth = np.where(beside, np.maximum(free_depth, found + self._thickness), free_depth)
@@ -131,8 +142,14 @@ class Occupancy:
             self._range[chosen] = z[shown & may_change]
         self._state[seen[behind & (state == Voxel.UNSEEN)]] = Voxel.BEHIND
 
+    def _spared(self, rgb: ColorImage) -> NDArray[np.uint8]:
+        """255 where the colour is that of the spared thing, else 0; (H, W)."""
+        return np.zeros(rgb.shape[:2], np.uint8) if self._color is None else color_mask(rgb, self._color)
+
     def _cable(self, rgb: ColorImage, depth: DepthImage, k: Intrinsics) -> Mask:
-        """Dark pixels near to lighter ones, as the cable's are; a dark obstacle loses only its rim by this."""
+        """Dark pixels near to lighter ones, as a cable's are; a dark obstacle loses only its rim by this."""
+        if self._color is None:
+            return np.zeros(depth.shape, np.bool_)
         step, dark_limit = self._parameters.pixel_step, self._parameters.max_cable_brightness
         dark = np.ascontiguousarray(rgb[::step, ::step]).max(axis=2) < dark_limit
         inside = cv2.distanceTransform(dark.astype(np.uint8), cv2.DIST_L2, 3) - 0.5

@@ -2,28 +2,15 @@
 
 import colorsys
 from dataclasses import dataclass
-from enum import StrEnum
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from regrasp.interfaces.arrays import ColorImage, Mask
+from regrasp.interfaces.cable.sight import NotSeen as NotSeen
 
 HUE_STEPS, BLUE_HUE = 180, 120  # OpenCV's 8-bit hue counts half degrees
-
-
-class NotSeen(StrEnum):
-    """Why an image gave no connector."""
-
-    NO_COLOR = "no_color"  # no pixel of its colour
-    TOO_SMALL = "too_small"  # too few pixels of it are in sight
-    NO_CAMERA = "no_camera"  # the camera is not to be trusted
-    NO_DEPTH = "no_depth"  # its pixels have too few depth readings
-    NOT_ITS_SHAPE = "not_its_shape"  # its colour, but not a cylinder of its size
-    NO_TAG = "no_tag"  # its tag is not in sight
-    WRONG_SIZE = "wrong_size"  # its tag's size in the image and the depth there disagree
-    LOW_SCORE = "low_score"  # the network is not sure enough of any box
 
 
 @dataclass(frozen=True)

@@ -35,7 +35,7 @@ class Technique(Protocol):
         ...
 
 
-def make_technique(name: TechniqueName, known: "CableKnown") -> Technique:
+def make_technique(name: str, known: "CableKnown") -> Technique:
     """The technique of that name. Raises ValueError if the cell lacks what it needs."""
     match name:  # each imports what it needs: the compiler, or OpenCV alone
         case "rgbd":

@@ -2,12 +2,11 @@
 
 from collections import deque
 from dataclasses import dataclass
-from enum import StrEnum
 
 import numpy as np
 
 from regrasp.interfaces.arrays import FloatArray
-from regrasp.perception.pose.estimate import Estimate, NoEstimate
+from regrasp.interfaces.cable.sight import Estimate, NoEstimate, TrackHealth, TrackState
 
 
 @dataclass(frozen=True)
@@ -18,30 +17,6 @@ class TrackParameters:
     live_interval: float = 1.0  # s; choice: the thesis shows two poses one second apart
     min_change: float = 1e-6  # m; choice: a mean of noisy depth never repeats to the micrometre, a frozen image does
     hiding_radius: float = 0.10  # m; choice: a hand hides what was last seen within a connector's length of its centre
-
-
-class TrackState(StrEnum):
-    """What the track says of the connector."""
-
-    VISIBLE = "visible"
-    HIDDEN_BY_HAND = "hidden_by_hand"
-    LOST = "lost"
-    UNKNOWN = "unknown"  # never seen
-
-
-@dataclass(frozen=True)
-class TrackHealth:
-    """The thesis's three checks: a pose exists, it is fresh, and it is live (it changes from frame to frame)."""
-
-    exists: bool
-    fresh: bool
-    live: bool
-    reason: str
-
-    @property
-    def ok(self) -> bool:
-        """Whether all three hold, so that no search is needed."""
-        return self.exists and self.fresh and self.live
 
 
 class ConnectorTrack:

@@ -7,10 +7,10 @@ import pytest
 from fake_services import Stage, seen
 from py_trees.common import Status
 
-from regrasp.behaviors.cable.hand import HandParameters
 from regrasp.behaviors.cable.recover import WaitUntilStill, WaitUntilStillParameters
 from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.cause import CauseCode, ServiceError
+from regrasp.motion.execution import GripParameters
 
 LEAF = '<{} name="leaf"/>'
 REAR, WRIST = "the rear camera is dark", "the wrist camera is frozen"
@@ -99,8 +99,7 @@ def test_the_monitor_says_once_that_a_camera_is_not_trusted_and_once_that_it_is_
 def test_a_jaw_that_does_not_close_is_told_three_times(stage: Stage) -> None:
     """The fake jaw reads 50 mm whatever it is told."""
     stage.motion.grippers["right"].gap = 0.05
-    stage.motion.pick = lambda *_, **__: stage.motion.move("right", np.zeros((1, 6)))  # type: ignore[attr-defined]
     assert stage.run(stage.tree('<Unplug name="unplug" socket="back_4"/>'), 9.0) is Status.FAILURE
     assert stage.causes[-1].code is CauseCode.GRIPPER_FAILED
     assert [what for what, _ in stage.motion.grippers["right"].told] == ["close"] * 3
-    assert stage.clock.t > 3 * HandParameters().close_time
+    assert stage.clock.t > 3 * GripParameters().time

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from arm_surface import surface
 from fake_devices import TICK, FakeGripper, Rig
-from natural import natural_pose
 from numpy.typing import NDArray
-from scipy.spatial.transform import RigidTransform, Rotation
+from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.cause import CauseCode
@@ -23,7 +22,6 @@ OPEN_GAP = PARAMETERS.execution.jaw.open_gap
 TIGHT_MARGIN = PARAMETERS.clearances.tight_margin
 READY = np.array([0.4, -0.6, 0.6, 0.0, 0.3, 0.0])
 ASIDE = np.array([-0.5, -0.6, 0.6, 0.0, 0.3, 0.0])
-HELD = RigidTransform.from_components([0.0, 0.0, 0.0], Rotation.from_euler("y", -90, degrees=True))
 
 
 @pytest.fixture
@@ -128,7 +126,7 @@ class Deaf(FakeGripper):
 def test_a_jaw_that_does_not_open_is_told_three_times_and_then_given_up(rig: Rig) -> None:
     rig.grippers["right"] = rig.motion.grippers["right"] = Deaf(rig.clock, gap=0.02)  # type: ignore[index]
     with pytest.raises(PlanningError, match=r"right jaw stands 20.0 mm open, told 3 times to open to 50 mm") as error:
-        rig.run(rig.motion.release("right"))
+        rig.run(rig.motion.release("right", 0.025))
     assert error.value.code is CauseCode.GRIPPER_FAILED
     assert len(rig.grippers["right"].told) == 3
 
@@ -139,7 +137,7 @@ def test_parameters_of_every_part_come_through_the_service(rig: Rig) -> None:
     deaf = {"left": rig.grippers["left"], "right": Deaf(rig.clock, gap=0.02)}
     motion = Motion(rig.known, rig.arms, deaf, rig.clock, 0, parameters)
     with pytest.raises(PlanningError, match="told 2 times to open to 60 mm"):
-        rig.run(motion.release("right"))
+        rig.run(motion.release("right", 0.025))
 
 
 def test_cancel_stops_the_arm_where_it_is(rig: Rig) -> None:
@@ -234,7 +232,7 @@ def test_nothing_is_seen_through_a_panel(rig: Rig) -> None:
 @pytest.mark.parametrize("shallow", [0.0, 0.008])
 def test_a_pick_brings_the_open_jaw_round_the_connector(rig: Rig, shallow: float) -> None:
     plug = rig.known.cable.socket("back_4").world_from_plug(rig.known.cable.connector.length)
-    rig.run(rig.motion.pick("right", plug, shallow=shallow))
+    rig.run(rig.motion.pick("right", plug, rig.known.cable.connector, shallow=shallow))
     assert rig.grippers["right"].gap == OPEN_GAP
     opened_at = rig.grippers["right"].told[0][0]
     assert opened_at <= rig.arms["right"].followed[0][0]
@@ -256,10 +254,10 @@ def test_an_arm_seen_to_be_off_takes_hold_where_the_connector_is(rig: Rig) -> No
         asked.append(since)
         return surface(kin, rig.motion.joints("right") + off, OPEN_GAP) if rig.clock.t > since + 0.2 else None
 
-    rig.run(rig.motion.pick("right", plug, point_cloud=seen))
+    rig.run(rig.motion.pick("right", plug, rig.known.cable.connector, point_cloud=seen))
     assert min(asked) == max(asked) > rig.arms["right"].followed[0][0]
     blind = Rig(rig.known)
-    blind.run(blind.motion.pick("right", plug))
+    blind.run(blind.motion.pick("right", plug, rig.known.cable.connector))
     there, wanted = kin.tool(rig.motion.joints("right") + off), kin.tool(blind.motion.joints("right"))
     missed = kin.tool(blind.motion.joints("right") + off)
     assert np.linalg.norm(missed.translation - wanted.translation) > 0.010
@@ -269,16 +267,16 @@ def test_an_arm_seen_to_be_off_takes_hold_where_the_connector_is(rig: Rig) -> No
 @pytest.mark.parametrize("points", [None, np.empty((0, 3))])
 def test_a_camera_that_shows_no_arm_changes_nothing(rig: Rig, points: Points | None) -> None:
     plug = rig.known.cable.socket("back_4").world_from_plug(rig.known.cable.connector.length)
-    rig.run(rig.motion.pick("right", plug, point_cloud=lambda _since: points))
+    rig.run(rig.motion.pick("right", plug, rig.known.cable.connector, point_cloud=lambda _since: points))
     blind = Rig(rig.known)
-    blind.run(blind.motion.pick("right", plug))
+    blind.run(blind.motion.pick("right", plug, rig.known.cable.connector))
     assert rig.motion.joints("right") == pytest.approx(blind.motion.joints("right"))
 
 
 def test_the_way_to_a_pick_keeps_off_the_cable_and_the_cable_is_forgotten(rig: Rig) -> None:
     connector = pose_along((0.30, 0.02, 0.25), (0.0, 1.0, 0.0))
     cable = connector.translation + np.linspace(0.045, 0.40, 40)[:, None] * np.array([0.0, -1.0, 0.0])
-    rig.run(rig.motion.pick("right", connector, cable=cable))
+    rig.run(rig.motion.pick("right", connector, rig.known.cable.connector, clear_of=cable))
     body = rig.motion.model("right", others=False)
     counted = cable[np.linalg.norm(cable - connector.translation, axis=1) > 0.13]
     for q in flown(rig, "right"):
@@ -290,74 +288,9 @@ def test_the_way_to_a_pick_keeps_off_the_cable_and_the_cable_is_forgotten(rig: R
 
 def test_a_connector_out_of_reach_cannot_be_picked(rig: Rig) -> None:
     with pytest.raises(PlanningError, match="grasp candidates") as error:
-        rig.motion.pick("right", pose_along((0.2, 1.2, 0.3), (0.0, 1.0, 0.0))).poll()
+        rig.motion.pick("right", pose_along((0.2, 1.2, 0.3), (0.0, 1.0, 0.0)), rig.known.cable.connector).poll()
     assert error.value.code is CauseCode.OUT_OF_REACH
     assert not rig.grippers["right"].told
-
-
-def in_hand(rig: Rig, off: list[float]) -> RigidTransform:
-    """The right hand takes a connector where its cable, bent `off` m, holds it: tool_from_connector."""
-    connector = natural_pose(rig.known, np.array(off))
-    rig.run(rig.motion.pick("right", connector))
-    return rig.motion.tool("right").inv() * connector
-
-
-def test_a_carry_takes_the_way_that_the_cable_goes_to_the_first_goal(rig: Rig) -> None:
-    held = in_hand(rig, [0.02, 0.0, 0.10])
-    start = rig.motion.tool("right")
-    goals = [natural_pose(rig.known, np.array([x, 0.0, 0.17])) * held.inv() for x in (-0.04, 0.0)]
-    rig.run(rig.motion.carry("right", goals, held, speed=0.5))
-    end = rig.motion.tool("right")
-    assert end.translation == pytest.approx(goals[0].translation, abs=1e-3)
-    assert (end.rotation.inv() * goals[0].rotation).magnitude() < 0.01
-    carried = [rig.motion.kinematics["right"].tool(q) * held for q in flown(rig, "right")]
-    anchor, course = rig.known.cable.anchor
-    for pose in carried:
-        place = pose.apply([-0.5 * rig.known.cable.connector.length, 0.0, 0.0]) - anchor
-        natural = natural_pose(rig.known, place - (place @ course) * course)
-        assert np.linalg.norm(pose.translation - natural.translation) < 0.005
-    length = np.linalg.norm(np.diff([pose.translation for pose in carried], axis=0), axis=1).sum()
-    assert length < 1.2 * np.linalg.norm((goals[0] * held).translation - (start * held).translation)
-
-
-def test_a_goal_from_which_the_tool_cannot_go_on_is_no_goal(rig: Rig) -> None:
-    held = in_hand(rig, [0.02, 0.0, 0.10])
-    goals = [natural_pose(rig.known, np.array([-0.04, 0.0, 0.17])) * held.inv()]
-    near, far = (RigidTransform.from_translation([-x, 0.0, 0.0]) for x in (0.03, 2.0))
-    with pytest.raises(PlanningError) as error:
-        rig.run(rig.motion.carry("right", goals, held, onward=[near, far], speed=0.5))
-    assert error.value.code is CauseCode.OUT_OF_REACH
-    rig.run(rig.motion.carry("right", goals, held, onward=[near], speed=0.5))
-    assert rig.motion.tool("right").translation == pytest.approx(goals[0].translation, abs=1e-3)
-
-
-def test_a_carry_leaves_room_for_a_jaw_that_opens(rig: Rig) -> None:
-    upright = ASIDE + np.array([0.0, 0.0, 0.0, 0.0, 0.0, np.pi / 2])  # one finger above the other
-    rig.arms["right"].at = upright
-    goal = moved(rig, 0.0, 0.18, 0.0)
-    bar = [moved(rig, 0.0, y, -0.077).apply([0.02, 0.0, 0.0]) for y in np.linspace(0.03, 0.15, 7)]
-    rig.motion.set_obstacles(np.vstack([cube(place, 0.04) for place in bar]), 0.01)
-    rig.run(rig.motion.carry("right", [goal], HELD, speed=0.5))
-    open_jaw = rig.motion.model("right", held=HELD, opening=0.075)
-    assert all(open_jaw.free(q, 0.0) for q in flown(rig, "right"))
-    assert rig.motion.tool("right").translation == pytest.approx(goal.translation, abs=1e-3)
-
-
-def test_a_carry_leaves_out_a_goal_in_the_panel(rig: Rig) -> None:
-    rig.arms["right"].at = ASIDE
-    tool = rig.motion.tool("right")
-    blocked = RigidTransform.from_components([0.505, -0.15, 0.3], tool.rotation)
-    free = moved(rig, 0.0, 0.10, 0.0)
-    rig.run(rig.motion.carry("right", [blocked, free], HELD, speed=0.5))
-    assert rig.motion.tool("right").translation == pytest.approx(free.translation, abs=1e-3)
-
-
-def test_the_carried_connector_counts_as_body(rig: Rig) -> None:
-    q = READY
-    tip = (rig.motion.kinematics["right"].tool(q) * HELD).apply([0.035, 0.0, 0.0])
-    rig.motion.set_obstacles(tip[None], 0.01)
-    assert rig.motion.model("right", held=HELD).nearest(q)[0] < rig.motion.model("right").nearest(q)[0]
-    assert not rig.motion.model("right", held=HELD).free(q, TIGHT_MARGIN)
 
 
 def test_a_wrist_frame_is_placed_by_the_joints_at_its_exposure(rig: Rig) -> None:

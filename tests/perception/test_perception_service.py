@@ -7,9 +7,9 @@ from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.frame import Intrinsics, RgbdFrame
+from regrasp.perception.cable.service import CablePerception
 from regrasp.perception.mapping.occupancy import Spheres
 from regrasp.perception.pose.estimate import Estimate, NoEstimate
-from regrasp.perception.service import Perception
 
 PLACE = np.array([0.36, 0.02, 0.30])
 AXIS = np.array([0.1, 1.0, 0.1]) / np.sqrt(1.02)
@@ -49,8 +49,8 @@ def believed(_frame: RgbdFrame) -> RigidTransform:
     return REAR_POSE
 
 
-def perception(known: CableKnown, eye: Eye, arm: list[Spheres] | None = None) -> Perception:
-    return Perception(known, {"rear": eye}, Clock(), believed, lambda: arm or [])
+def perception(known: CableKnown, eye: Eye, arm: list[Spheres] | None = None) -> CablePerception:
+    return CablePerception(known, {"rear": eye}, Clock(), believed, lambda: arm or [])
 
 
 def test_there_is_nothing_to_say_before_the_first_frame(known: CableKnown) -> None:

@@ -1,17 +1,17 @@
 """Arms and grippers that do exactly what they are told, on a clock that is turned by hand."""
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from regrasp.interfaces.cable.cell import CableKnown
+from regrasp.interfaces.devices import TICK as TICK
 from regrasp.interfaces.reading import GripperReading, JointReading
+from regrasp.interfaces.task import Task
 from regrasp.interfaces.trajectory import Trajectory
-from regrasp.motion.service import Motion
-from regrasp.motion.task import MotionTask
-
-TICK = 0.05
+from regrasp.motion.cable.service import CableMotion
 
 
 @dataclass
@@ -100,9 +100,11 @@ class Rig:
         }
         self.grippers: dict[str, FakeGripper] = {s.name: FakeGripper(self.clock) for s in self.known.arms}
         self.remarks: list[str] = []  # of what does not follow
-        self.motion = Motion(self.known, self.arms, self.grippers, self.clock, seed=0, on_anomaly=self.remarks.append)
+        self.motion = CableMotion(
+            self.known, self.arms, self.grippers, self.clock, seed=0, on_anomaly=self.remarks.append
+        )
 
-    def run(self, task: MotionTask, seconds: float = 60.0) -> None:
+    def run(self, task: Task[Any], seconds: float = 60.0) -> None:
         """Poll a task at every tick until it is done."""
         end = self.clock.t + seconds
         while not task.poll():

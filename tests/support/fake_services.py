@@ -1,9 +1,8 @@
 """Services that do what a test tells them, on a clock that is turned by hand."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Generator, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
@@ -13,23 +12,37 @@ from py_trees.common import Status
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.behaviors import LEAVES, keys
-from regrasp.behaviors.services import Belief, Services
+from regrasp.behaviors.cable.services import CableServices
+from regrasp.behaviors.services import Belief
 from regrasp.interfaces.cable.cell import CableKnown
-from regrasp.interfaces.cause import Cause
+from regrasp.interfaces.cable.motion import Grip, View, Viewpoint
+from regrasp.interfaces.cable.sight import Estimate, InHand, NoEstimate, NotSeen, Sightings, TrackHealth, TrackState
+from regrasp.interfaces.cause import Cause, CauseCode
+from regrasp.interfaces.cell import Box, FixedMount
+from regrasp.interfaces.devices import TICK
+from regrasp.interfaces.evidence import Evidence
 from regrasp.interfaces.frame import RgbdFrame
 from regrasp.interfaces.reading import GripperReading
+from regrasp.interfaces.task import Task
+from regrasp.motion.cable.viewing import ViewingParameters, approached, views_of
+from regrasp.motion.execution import Execution
 from regrasp.motion.failure import PlanningError
-from regrasp.motion.service import MotionParameters
-from regrasp.motion.task import MotionTask
-from regrasp.perception.pose.estimate import Estimate, NoEstimate, pose_covariance
-from regrasp.perception.pose.segmentation import NotSeen
+from regrasp.motion.grasping.gap_test import GripWatch
+from regrasp.motion.planning.viewpoints import spiral
+from regrasp.perception.cable.in_hand import connector_axis, connector_in_hand
+from regrasp.perception.cable.watching import FrameRule, watched
+from regrasp.perception.pose.estimate import pose_covariance
+from regrasp.perception.pose.fusion import fuse
+from regrasp.perception.tracking.slip import distance_slip, seen_at
+from regrasp.perception.tracking.stillness import Stillness
 from regrasp.perception.tracking.track import ConnectorTrack
 from regrasp.trees import load_tree
 
-TICK = 0.05
+VIEWING = ViewingParameters()
 LEFT = np.array([0.0, 1.0, 0.0])
 Seen = Estimate | NoEstimate | None
 Vector = NDArray[np.float64]
+PointCloud = Callable[[float], Vector | None]
 
 
 @dataclass
@@ -74,57 +87,140 @@ class FakeGripper:
 class FakeMotion:
     """A motion takes `seconds`, after which its `error` is raised if there is one."""
 
-    def __init__(self, clock: Clock) -> None:
-        self.clock = clock
-        self.parameters = MotionParameters()
+    def __init__(self, clock: Clock, known: CableKnown) -> None:
+        self.clock, self.known = clock, known
         self.seconds = 0.2
         self.error: Exception | None = None
         self.hand = RigidTransform.from_translation([0.3, 0.0, 0.4])
-        self.grippers = {"left": FakeGripper(clock), "right": FakeGripper(clock)}
+        self.grippers = {arm.name: FakeGripper(clock) for arm in known.arms}
+        self.execution = Execution({}, self.grippers, clock, 0.0)  # for its jaws
         self.moves: list[tuple[str, Vector]] = []
         self.shifts: list[tuple[str, Vector]] = []
         self.cancelled: list[str] = []
         self.stopped = 0
+        self.kept_clear: list[Vector] = []
         self.reachable: Callable[[RigidTransform], bool] = lambda pose: True
-        view = SimpleNamespace(ik_view=self._views)
-        self.kinematics = {"left": view, "right": view}
 
-    def move(self, arm: str, goals: Vector, *, margin: float = 0.0, tight: bool = True) -> MotionTask:
+    def work(self, arm: str) -> Task[None]:
+        """Any motion of an arm."""
+        return Task(self._steps(), lambda: self.cancelled.append(arm))
+
+    def move(self, arm: str, goals: Vector, *, margin: float | None = None, tight: bool = True) -> Task[None]:
         self.moves.append((arm, goals))
-        return MotionTask(self._steps(), lambda: self.cancelled.append(arm))
+        return self.work(arm)
 
-    def shift(self, arm: str, way: Vector) -> MotionTask:
-        self.shifts.append((arm, way))
-        return MotionTask(self._steps(), lambda: self.cancelled.append(arm))
+    def sleep(self, arm: str) -> Task[None]:
+        return self.move(arm, np.array([self.known.arm(arm).sleep]))
 
-    def straight(self, arm: str, goal: RigidTransform, *, speed: float = 1.0) -> MotionTask:
-        return MotionTask(self._steps(), lambda: self.cancelled.append(arm))
+    def shift(
+        self,
+        arm: str,
+        displacement: Sequence[float] | Vector,
+        *,
+        checked: bool = True,
+        without: Collection[Box] = (),
+    ) -> Task[None]:
+        self.shifts.append((arm, np.asarray(displacement)))
+        return self.work(arm)
 
-    def sees(self, world_from_camera: RigidTransform, points: Vector) -> bool:
-        return True
+    def straight(self, arm: str, goal: RigidTransform, *, speed: float | None = None) -> Task[None]:
+        return self.work(arm)
 
-    def release(self, arm: str) -> MotionTask:
+    def close(self, arm: str, thickness: float) -> Task[float]:
+        return Task(self.execution.close_jaw(arm, thickness))
+
+    def open_jaw(self, arm: str) -> None:
         self.grippers[arm].open(0.05)
-        return MotionTask(self._steps(), lambda: self.cancelled.append(arm))
 
-    def give_up(self, arm: str, code: str, message: str) -> PlanningError:
-        return PlanningError(code, message)
-
-    def tool(self, arm: str) -> RigidTransform:
-        return self.hand
-
-    def model(self, arm: str) -> Any:
-        return SimpleNamespace(free=lambda q, margin: True)
-
-    def set_obstacles(self, points: Vector, spacing: float) -> None:
-        pass
+    def release(self, arm: str, gap: float) -> Task[None]:
+        self.grippers[arm].open(0.05)
+        return self.work(arm)
 
     def stop(self) -> None:
         self.stopped += 1
 
-    def _views(self, pose: RigidTransform, mount: RigidTransform) -> Vector:
+    def joints(self, arm: str) -> Vector:
+        return np.zeros(6)
+
+    def tool(self, arm: str) -> RigidTransform:
+        return self.hand
+
+    def set_obstacles(self, points: Vector, spacing: float) -> None:
+        pass
+
+    def keep_clear(self, points: Vector) -> None:
+        self.kept_clear.append(points)
+
+    def pick_plug(self, plug: RigidTransform, *, point_cloud: PointCloud | None = None) -> Task[None]:
+        return self.work(self.known.cable.hand)
+
+    def pick_loose(self, world_from_connector: RigidTransform, *, point_cloud: PointCloud | None = None) -> Task[None]:
+        return self.work(self.known.cable.hand)
+
+    def grip(self, world_from_connector: RigidTransform) -> Task[Grip]:
+        def steps() -> Generator[None, None, Grip]:
+            closing = self.close(self.known.cable.hand, 2 * self.known.cable.connector.radius)
+            while not closing.poll():
+                yield
+            return Grip(closing.answer, self.hand.inv() * world_from_connector)
+
+        return Task(steps())
+
+    def watch_grip(self) -> GripWatch:
+        return GripWatch(self.grippers[self.known.cable.hand], 2 * self.known.cable.connector.radius)
+
+    def pull_out(self, plug: RigidTransform) -> Task[None]:
+        return self.work(self.known.cable.hand)
+
+    def carry_to_clip(self, held: RigidTransform) -> Task[None]:
+        return self.work(self.known.cable.hand)
+
+    def insert(self, held: RigidTransform) -> Task[None]:
+        return self.work(self.known.cable.hand)
+
+    def let_go(self) -> Task[None]:
+        return self.release(self.known.cable.hand, 0.025)
+
+    def draw_back(self) -> Task[str]:
+        back = self.shift(self.known.cable.hand, [-0.1, 0.0, 0.0])
+
+        def steps() -> Generator[None, None, str]:
+            try:
+                while not back.poll():
+                    yield
+            except PlanningError as error:
+                return str(error)
+            return ""
+
+        return Task(steps(), back.cancel)
+
+    def leave_clip(self) -> Task[None]:
+        return self.sleep(self.known.cable.hand)
+
+    def search_views(self, last_seen: Vector | None) -> tuple[Vector, Iterator[Viewpoint]]:
+        panel = next(box for box in self.known.boxes if box.name == "back_panel")
+        start, overview = np.array(panel.center) if last_seen is None else last_seen, self.known.camera("rear")
+        assert isinstance(overview.mount, FixedMount)
+        return start, spiral(start, overview.mount.world_from_camera, overview.intrinsics, VIEWING.spiral)
+
+    def view(self, world_from_camera: RigidTransform) -> View:
+        return self._first_view([world_from_camera])
+
+    def view_of(self, place: Vector, world_from_camera: RigidTransform) -> View:
+        return self._first_view(views_of(place, world_from_camera, VIEWING.spiral.distance))
+
+    def best_view(self, world_from_connector: RigidTransform, taken: Sequence[Vector] = ()) -> View:
+        return self._first_view([world_from_connector])
+
+    def go_to_view(self, view: View) -> Task[None]:
+        return self.move(self.known.search_mount.arm, view.joints)
+
+    def _first_view(self, views: Sequence[RigidTransform]) -> View:
         """Not real joints: the camera's place and zeros, so that a test sees where the eye goes."""
-        return np.append(pose.translation, np.zeros(3))[None] if self.reachable(pose) else np.empty((0, 6))
+        for pose in approached(views, VIEWING.approaches):
+            if self.reachable(pose):
+                return View(pose, np.append(pose.translation, np.zeros(3))[None])
+        raise PlanningError(CauseCode.OUT_OF_REACH, "no free place to look from")
 
     def _steps(self) -> Iterator[None]:
         end = self.clock.t + self.seconds
@@ -134,25 +230,61 @@ class FakeMotion:
             raise self.error
 
 
+@dataclass
+class FakeStillness:
+    """Whether frames from its beginning on stand still."""
+
+    frame: Callable[[], RgbdFrame | None]
+    since: float
+    stillness: Stillness = field(default_factory=Stillness)
+
+    def still(self) -> bool | None:
+        frame = self.frame()
+        return None if frame is None or frame.stamp < self.since else self.stillness.feed(frame)
+
+
 class FakePerception:
     """`shows` says what a camera sees at a second; a result is new fifteen times a second."""
 
-    def __init__(self, clock: Clock) -> None:
-        self.clock = clock
+    fixed_cameras: tuple[str, ...] = ("rear",)
+
+    def __init__(self, clock: Clock, known: CableKnown) -> None:
+        self.clock, self.known = clock, known
         self.shows: Callable[[str, float], Seen] = lambda camera, stamp: None
         self.frames: Callable[[float], RgbdFrame | None] = lambda stamp: None
         self.track = ConnectorTrack()
         self.axis: Vector | None = None
         self.looks: list[float] = []
         self.troubles: dict[str, str] = {}
-        self.occupancy = SimpleNamespace(occupied_points=lambda: np.empty((0, 3)), voxel_size=0.01)
 
-    def expect_in_hand(self, position: Vector | None, axis: Vector | None) -> None:
-        self.track.set_holding_tool(position)
-        self.axis = axis
+    @property
+    def last(self) -> Estimate | None:
+        return self.track.last
 
-    def use(self, technique: str) -> None:
-        """One technique is like the other."""
+    def frame(self, camera: str) -> RgbdFrame | None:
+        return self.frames(np.floor(self.clock.t * 15 + 1e-6) / 15)
+
+    def trouble(self, camera: str) -> str | None:
+        return self.troubles.get(camera)
+
+    def surface(self, camera: str, since: float) -> Vector | None:
+        return np.empty((0, 3))
+
+    def look_around(self) -> int:
+        self.look("rear")
+        return 0
+
+    def map_obstacles(self, camera: str) -> int:
+        return 0
+
+    def map_new_obstacle(self, camera: str) -> int:
+        return 0
+
+    def obstacles(self) -> tuple[Vector, float]:
+        return np.empty((0, 3)), 0.01
+
+    def watch_stillness(self, camera: str) -> FakeStillness:
+        return FakeStillness(lambda: self.frame(camera), self.clock.t)
 
     def look(self, camera: str) -> Seen:
         self.looks.append(self.clock.t)
@@ -161,27 +293,46 @@ class FakePerception:
             self.track.feed(result)
         return result
 
-    def frame(self, camera: str) -> RgbdFrame | None:
-        return self.frames(np.floor(self.clock.t * 15 + 1e-6) / 15)
+    def watch(
+        self,
+        camera: str,
+        seconds: float,
+        *,
+        settle: float = 0.0,
+        later: bool = False,
+        on_mapped: Callable[[], None] | None = None,
+    ) -> Task[Sightings]:
+        return watched(self, self.clock, camera, FrameRule(self.clock.t, seconds, settle, later), on_mapped)
 
-    def trouble(self, camera: str) -> str | None:
-        return self.troubles.get(camera)
+    def fuse(self, estimates: Sequence[Estimate]) -> Estimate:
+        return fuse(estimates)
 
-    def map_new_obstacle(self, camera: str) -> int:
-        return 0
+    def expect_in_hand(self, tool: RigidTransform | None, held: RigidTransform | None = None) -> None:
+        self.track.set_holding_tool(None if tool is None else tool.translation)
+        self.axis = None if tool is None or held is None else connector_axis(tool * held)
 
-    def map_obstacles(self, camera: str) -> int:
-        return 0
+    def use(self, technique: str) -> None:
+        """One technique is like the other."""
 
+    def check(self) -> TrackHealth:
+        return self.track.check(self.clock.t)
 
-class Causes(Sequence[Cause]):
-    """The causes so far, at any time."""
+    def state(self) -> tuple[TrackState, str]:
+        return self.track.state(self.clock.t)
 
-    def __getitem__(self, index: Any) -> Any:
-        return keys.causes()[index]
+    def slipped(self, tool: RigidTransform) -> Evidence | None:
+        if self.track.last is None or self.state()[0] is not TrackState.VISIBLE:
+            return None
+        return distance_slip(tool.translation, self.track.last.position)
 
-    def __len__(self) -> int:
-        return len(keys.causes())
+    def stowed(self, estimate: Estimate) -> Evidence:
+        return seen_at(estimate.position, np.array(self.known.cable.clip.seat), 0.04)
+
+    def in_hand(self, seen: Sequence[Estimate], tool: RigidTransform, held: RigidTransform) -> InHand | None:
+        return connector_in_hand(seen, self.known.cable.connector.length, tool, held)
+
+    def obstacles_beside(self, world_from_connector: RigidTransform) -> tuple[Vector, float]:
+        return self.obstacles()
 
 
 @dataclass
@@ -193,15 +344,17 @@ class Stage:
     clock: Clock = field(default_factory=Clock)
     log: Log = field(default_factory=Log)
     belief: Belief = field(default_factory=Belief)
-    causes: Causes = field(default_factory=Causes)
 
     def __post_init__(self) -> None:
         py_trees.blackboard.Blackboard.clear()
-        self.motion = FakeMotion(self.clock)
-        self.perception = FakePerception(self.clock)
-        self.services = Services(
-            self.known, self.clock, cast(Any, self.motion), cast(Any, self.perception), self.log, self.belief
-        )
+        self.motion = FakeMotion(self.clock, self.known)
+        self.perception = FakePerception(self.clock, self.known)
+        self.services = CableServices(self.known, self.clock, self.motion, self.perception, self.log, self.belief)
+
+    @property
+    def causes(self) -> tuple[Cause, ...]:
+        """The causes so far."""
+        return keys.causes()
 
     def tree(self, body: str) -> py_trees.trees.BehaviourTree:
         """The tree of this XML element, set up."""

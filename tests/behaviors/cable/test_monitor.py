@@ -7,7 +7,7 @@ from py_trees.common import Status
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from regrasp.interfaces.cable.cell import CableKnown
-from regrasp.perception.tracking.track import TrackState
+from regrasp.interfaces.cable.sight import TrackState
 
 MONITOR = '<Monitor name="monitor" period="0.2"/>'
 

@@ -5,14 +5,12 @@ import threading
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import py_trees
 import pytest
-from fake_services import Causes, Clock, FakeGripper, FakeMotion, FakePerception, Stage, seen
-from numpy.typing import NDArray
+from fake_services import Clock, FakeGripper, FakeMotion, FakePerception, Stage, seen
 from py_trees.blackboard import Blackboard
 from py_trees.common import Status
 from scipy.spatial.transform import RigidTransform
@@ -20,10 +18,11 @@ from scipy.spatial.transform import RigidTransform
 from regrasp.app.files.resources import shipped
 from regrasp.app.run.attempts import Attempts
 from regrasp.behaviors import LEAVES, Leaf
+from regrasp.behaviors.keys import causes
 from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.cause import Cause, ServiceError
 from regrasp.interfaces.frame import Intrinsics, RgbdFrame
-from regrasp.motion.task import MotionTask
+from regrasp.interfaces.task import Task
 from regrasp.trees import in_tree_order, load_tree
 
 Make = Callable[..., "Play"]
@@ -34,25 +33,17 @@ K = Intrinsics(64, 48, 50.0, 50.0, 31.5, 23.5)
 class BusyMotion(FakeMotion):
     """Knows which motions began and neither ended nor were stopped."""
 
-    def __init__(self, clock: Clock) -> None:
-        super().__init__(clock)
+    def __init__(self, clock: Clock, known: CableKnown) -> None:
+        super().__init__(clock, known)
         self.at_work: list[str] = []
 
-    def move(self, arm: str, *_goal: Any, **_options: Any) -> MotionTask:
+    def work(self, arm: str) -> Task[None]:
         def steps() -> Iterator[None]:
             self.at_work.append(arm)
             yield from self._steps()
             self.at_work.remove(arm)
 
-        return MotionTask(steps(), lambda: self.at_work.remove(arm) if arm in self.at_work else None)
-
-    carry = straight = pick = shift = release = move
-
-    def model(self, arm: str, **_options: Any) -> Any:
-        return super().model(arm)
-
-    def keep_clear(self, points: Any) -> None:
-        pass
+        return Task(steps(), lambda: self.at_work.remove(arm) if arm in self.at_work else None)
 
     def stop(self) -> None:
         super().stop()
@@ -70,14 +61,14 @@ class Hand(FakeGripper):
 class Eyes(FakePerception):
     """See the connector at the clip; while it is `hidden` only the wrist does, and none where it is `gone` then."""
 
-    def __init__(self, clock: Clock, place: NDArray[np.float64], gone: bool) -> None:
-        super().__init__(clock)
+    def __init__(self, clock: Clock, known: CableKnown, gone: bool) -> None:
+        super().__init__(clock, known)
+        place = np.array(known.cable.clip.seat)
         self.hidden = False
         self.troubles["rear"] = "no picture yet"
         self.shows = lambda camera, t: None if self.hidden and (gone or camera == "rear") else seen(t, place, camera)
         still = np.full((48, 64, 3), 160, np.uint8)
         self.frames = lambda t: RgbdFrame("rear", 1, t, still, np.zeros((48, 64), np.float32), K)
-        self.occupancy = SimpleNamespace(occupied_points=lambda guessed=True: np.empty((0, 3)), voxel_size=0.01)
 
 
 class Play:
@@ -90,11 +81,11 @@ class Play:
         Blackboard.clear()
         stage = Stage(known, folder)
         self.clock, self.slip = stage.clock, slip
-        self.motion = BusyMotion(stage.clock)
+        self.motion = BusyMotion(stage.clock, known)
         self.motion.hand = RigidTransform.from_translation(known.cable.clip.seat)
         self.hand = self.motion.grippers["right"] = Hand(stage.clock)
-        self.eyes = Eyes(stage.clock, np.array(known.cable.clip.seat), gone)
-        services = replace(stage.services, motion=cast(Any, self.motion), perception=cast(Any, self.eyes))
+        self.eyes = Eyes(stage.clock, known, gone)
+        services = replace(stage.services, motion=self.motion, perception=self.eyes)
         self.root = load_tree(shipped("tree")["recovery"], LEAVES, {"tries": "2"})
         self.leaves = {n.name.rsplit(".", 1)[1]: n for n in in_tree_order(self.root) if isinstance(n, Leaf)}
         self.seen: set[str] = set()
@@ -121,11 +112,7 @@ class Play:
 
 
 @pytest.fixture
-def play(known: CableKnown, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Make]:
-    # Geometry that takes long and that no motion here looks at.
-    monkeypatch.setattr("regrasp.behaviors.cable.carry.Carry._goals", lambda *_arguments: [])
-    monkeypatch.setattr("regrasp.behaviors.cable.carry.Insert._seated", lambda *_arguments: None)
-    monkeypatch.setattr("regrasp.behaviors.cable.look.closer_views", lambda connector, _: [connector] * 2)
+def play(known: CableKnown, tmp_path: Path) -> Iterator[Make]:
     yield lambda slip, gone=False: Play(known, tmp_path, slip, gone)
     Blackboard.clear()
 
@@ -181,9 +168,9 @@ def test_every_failed_leaf_names_a_cause(play: Make, monkeypatch: pytest.MonkeyP
         raise ServiceError("broke off")
 
     whole = play(2, trouble == "not found")
-    attempts = Attempts(whole.root, Causes(), whole.clock.now)
+    attempts = Attempts(whole.root, causes, whole.clock.now)
     if trouble == "no hand":
-        monkeypatch.setattr(whole.motion, "pick", lambda *_, **__: MotionTask(iter([None]), lambda: None))
+        monkeypatch.setattr(whole.motion, "pick_plug", lambda *_, **__: Task(iter([None])))
         monkeypatch.setattr(whole.hand, "close", lambda force: setattr(whole.hand, "gap", 0.0))
     elif trouble == "dark cameras":
         monkeypatch.setattr(whole.eyes, "trouble", lambda camera: f"the {camera} camera is dark")

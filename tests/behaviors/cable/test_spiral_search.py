@@ -7,17 +7,17 @@ import pytest
 from fake_services import Stage, seen, unseen
 from py_trees.common import Status
 
-from regrasp.behaviors.cable.spiral_search import SpiralSearchParameters
 from regrasp.interfaces.cable.cause import CableCause
 from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.cell import FixedMount
+from regrasp.motion.cable.viewing import ViewingParameters
 from regrasp.motion.failure import PlanningError
 from regrasp.motion.planning.viewpoints import spiral
 from regrasp.perception.pose.estimate import Estimate, NoEstimate
 from regrasp.perception.pose.segmentation import NotSeen
 
-SPIRAL = SpiralSearchParameters().spiral
+SPIRAL = ViewingParameters().spiral
 PLACE = np.array([0.40, 0.10, 0.25])
 
 

@@ -6,6 +6,7 @@ from py_trees.common import Status
 
 from regrasp.app.run.attempts import Attempts
 from regrasp.behaviors import LEAVES
+from regrasp.behaviors.keys import causes
 from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.cause import CauseCode
 from regrasp.trees.check import check_tree
@@ -32,7 +33,7 @@ def test_a_child_within_its_limit_keeps_its_status(known: CableKnown, tmp_path: 
 def test_a_child_past_its_limit_is_stopped_and_the_limit_is_the_cause(known: CableKnown, tmp_path: Path) -> None:
     stage = Stage(known, tmp_path)
     tree = stage.tree(LIMITED.format(limit=0.5, wait=5.0))
-    attempts = Attempts(tree.root, stage.causes, stage.clock.now, {"limit": "TimeLimit"})
+    attempts = Attempts(tree.root, causes, stage.clock.now, {"limit": "TimeLimit"})
     tree.visitors.append(attempts)
     assert stage.run(tree, 2.0) is Status.FAILURE
     assert stage.clock.t == pytest.approx(0.5)

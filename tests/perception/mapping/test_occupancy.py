@@ -10,7 +10,7 @@ from scipy.spatial.transform import RigidTransform
 from regrasp.interfaces.cable.cell import Connector
 from regrasp.interfaces.cell import OPTICAL, Box, pose_along
 from regrasp.interfaces.frame import Intrinsics
-from regrasp.perception.mapping.occupancy import Occupancy, OccupancyParameters, near_boxes
+from regrasp.perception.mapping.occupancy import Occupancy, OccupancyParameters, Spared, near_boxes
 
 Points = NDArray[np.float64]
 REAR = Intrinsics.from_fov(848, 480, np.deg2rad(65.0))
@@ -29,7 +29,13 @@ HIDDEN_END = Cylinder(np.array([0.43, 0.0, 0.25]), np.array([0.0, 1.0, 0.1]), co
 
 
 def empty(connector: Connector) -> Occupancy:
-    return Occupancy(np.array([0.0, -0.45, 0.0]), np.array([0.52, 0.45, 0.65]), KNOWN, connector, PARAMETERS)
+    return Occupancy(
+        np.array([0.0, -0.45, 0.0]),
+        np.array([0.52, 0.45, 0.65]),
+        KNOWN,
+        Spared(connector.color, 2 * connector.radius),
+        PARAMETERS,
+    )
 
 
 def looking(position: tuple[float, float, float], direction: tuple[float, float, float]) -> RigidTransform:

@@ -1,9 +1,10 @@
 import numpy as np
 from scipy.spatial.transform import RigidTransform
 
+from regrasp.interfaces.cable.sight import TrackState
 from regrasp.perception.pose.estimate import Estimate, NoEstimate
 from regrasp.perception.pose.segmentation import NotSeen
-from regrasp.perception.tracking.track import ConnectorTrack, TrackState
+from regrasp.perception.tracking.track import ConnectorTrack
 
 PLACE = np.array([0.4, 0.0, 0.3])
 RATE = 15

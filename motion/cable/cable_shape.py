@@ -25,3 +25,9 @@ def cable_course(known: "CableKnown", world_from_connector: "RigidTransform", sp
     chord = float(np.linalg.norm(end - start))
     curve = CubicHermiteSpline([0.0, chord], np.stack([start, end]), np.stack([start_direction, direction]))
     return np.asarray(curve(np.linspace(0.0, chord, max(2, round(chord / spacing)))))
+
+
+def connector_points(world_from_connector: "RigidTransform", length: float, count: int = 10) -> FloatArray:
+    """Points (count, 3) m, world, along the axis of a connector of `length` m from end to end."""
+    along = np.linspace(-0.5, 0.5, count)[:, None] * length
+    return np.asarray(world_from_connector.apply(along * [1.0, 0.0, 0.0]))

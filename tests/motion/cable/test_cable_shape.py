@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.cell import pose_along
-from regrasp.perception.cable.cable_shape import cable_course
+from regrasp.motion.cable.cable_shape import cable_course
 
 
 def test_the_plugged_cable_is_about_as_long_as_it_is(known: CableKnown) -> None:

@@ -1,0 +1,164 @@
+"""What the cable's leaves ask of the robot's services, besides what those of every task do."""
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import TYPE_CHECKING, Protocol
+
+from regrasp.interfaces.arrays import FloatArray
+from regrasp.interfaces.cable.motion import Grip, View, Viewpoint
+from regrasp.interfaces.cable.sight import Estimate, InHand, NoEstimate, Sightings, TrackHealth, TrackState
+from regrasp.interfaces.evidence import Evidence
+from regrasp.interfaces.services import MotionService, PerceptionService
+from regrasp.interfaces.task import Task
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import RigidTransform
+
+
+class GripService(Protocol):
+    """A watch of the pads of a jaw that holds something."""
+
+    def evidence(self) -> Evidence:
+        """Whether it was lost, the newest reading included; ask every tick."""
+        ...
+
+
+class CableMotionService(MotionService, Protocol):
+    """Motions of the hand, the arm that handles the cable, and of the arm that carries the camera that searches.
+
+    `held` is tool_from_connector, `plug` world_from_connector.
+    """
+
+    def pick_plug(
+        self, plug: "RigidTransform", *, point_cloud: Callable[[float], FloatArray | None] | None = None
+    ) -> Task[None]:
+        """Bring the open jaw round the plugged connector, corrected by points (n, 3) m that a camera sees of the arm.
+
+        `point_cloud` gives those of a picture from that second on, None while there is none.
+        """
+        ...
+
+    def pick_loose(
+        self, world_from_connector: "RigidTransform", *, point_cloud: Callable[[float], FloatArray | None] | None = None
+    ) -> Task[None]:
+        """As `pick_plug`, where the connector hangs at its cable, of which the arm keeps clear."""
+        ...
+
+    def grip(self, world_from_connector: "RigidTransform") -> Task[Grip]:
+        """Close the jaw on the connector; fails with GraspEmptyError when it closes on nothing."""
+        ...
+
+    def watch_grip(self) -> GripService:
+        """Begin to watch by the pads whether the hand holds the connector."""
+        ...
+
+    def pull_out(self, plug: "RigidTransform") -> Task[None]:
+        """Draw the gripped plug out of its socket, and away from the panel."""
+        ...
+
+    def carry_to_clip(self, held: "RigidTransform") -> Task[None]:
+        """Bring the held connector before the clip."""
+        ...
+
+    def insert(self, held: "RigidTransform") -> Task[None]:
+        """Bring the held connector straight into the clip."""
+        ...
+
+    def let_go(self) -> Task[None]:
+        """Open the jaw; done once it stands wider than a connector."""
+        ...
+
+    def draw_back(self) -> Task[str]:
+        """Draw the hand straight back as far as is free. The answer is '', or why no distance was."""
+        ...
+
+    def leave_clip(self) -> Task[None]:
+        """Bring the hand to its sleep pose without sweeping the stowed end out of its clip."""
+        ...
+
+    def search_views(self, last_seen: FloatArray | None) -> tuple[FloatArray, Iterator[Viewpoint]]:
+        """Where a search begins, (3,) m in the world, and its viewpoints; None: the connector was never seen."""
+        ...
+
+    def view(self, world_from_camera: "RigidTransform") -> View:
+        """The viewpoint, or one near, if the camera can be brought there. Raises PlanningError if not."""
+        ...
+
+    def view_of(self, place: FloatArray, world_from_camera: "RigidTransform") -> View:
+        """A view of a `place` (3,) m that was glimpsed from a camera. Raises PlanningError when there is none."""
+        ...
+
+    def best_view(self, world_from_connector: "RigidTransform", taken: Sequence[FloatArray] = ()) -> View:
+        """A view of the whole connector from a side that is not among the lines of sight `taken` (3,).
+
+        Raises PlanningError when there is none.
+        """
+        ...
+
+    def go_to_view(self, view: View) -> Task[None]:
+        """Bring the camera to a view."""
+        ...
+
+
+class CablePerceptionService(PerceptionService, Protocol):
+    """Where the connector is, how it lies in the hand, whether it got lost."""
+
+    @property
+    def last(self) -> Estimate | None:
+        """The newest estimate of any camera, however old."""
+        ...
+
+    def look(self, camera: str) -> Estimate | NoEstimate | None:
+        """The connector's pose by the newest frame, or why there is none; None before the first frame."""
+        ...
+
+    def watch(
+        self,
+        camera: str,
+        seconds: float,
+        *,
+        settle: float = 0.0,
+        later: bool = False,
+        on_mapped: Callable[[], None] | None = None,
+    ) -> Task[Sightings]:
+        """Look every tick for `seconds` after `settle` seconds; the answer holds one result a frame.
+
+        A frame of the very first moment counts unless only `later` ones shall. With `on_mapped` the obstacles in view
+        are mapped on the way, and this is called then.
+        """
+        ...
+
+    def fuse(self, estimates: Sequence[Estimate]) -> Estimate:
+        """One estimate from several of a connector at rest. Raises ValueError without any."""
+        ...
+
+    def expect_in_hand(self, tool: "RigidTransform | None", held: "RigidTransform | None" = None) -> None:
+        """From now on the hand at `tool` (world_from_tool) may hide the connector, which it holds so; None ends it."""
+        ...
+
+    def use(self, technique: str) -> None:
+        """Look by this technique from now on. Raises ValueError if the cell lacks what it needs."""
+        ...
+
+    def check(self) -> TrackHealth:
+        """The thesis's three questions: is there a pose, is it fresh, is it live?"""
+        ...
+
+    def state(self) -> tuple[TrackState, str]:
+        """What is known of the connector now, and a sentence."""
+        ...
+
+    def slipped(self, tool: "RigidTransform") -> Evidence | None:
+        """Whether the connector is seen far from the hand at `tool` (world_from_tool); None while it is not seen."""
+        ...
+
+    def stowed(self, estimate: Estimate) -> Evidence:
+        """Whether a connector seen so lies in the clip."""
+        ...
+
+    def in_hand(self, seen: Sequence[Estimate], tool: "RigidTransform", held: "RigidTransform") -> InHand | None:
+        """How the connector lies in the hand at `tool` that was believed to hold it so; None where too little shows."""
+        ...
+
+    def obstacles_beside(self, world_from_connector: "RigidTransform") -> tuple[FloatArray, float]:
+        """`obstacles` without guesses near the connector."""
+        ...

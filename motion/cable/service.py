@@ -1,0 +1,325 @@
+"""What the cable's leaves ask of the arms: unplug, carry, insert, let go, and look for a lost end."""
+
+from collections.abc import Callable, Collection, Generator, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from typing import TypeVar
+
+import numpy as np
+from scipy.spatial.transform import RigidTransform
+
+from regrasp.interfaces.arrays import FloatArray
+from regrasp.interfaces.cable.cell import CableKnown
+from regrasp.interfaces.cable.motion import Grip, View, Viewpoint
+from regrasp.interfaces.cause import CauseCode
+from regrasp.interfaces.cell import Box, FixedMount
+from regrasp.interfaces.devices import Arm, Clock, Gripper
+from regrasp.interfaces.task import Task
+from regrasp.interfaces.wall_time import counts_as
+from regrasp.motion.cable.cable_shape import cable_course, connector_points
+from regrasp.motion.cable.carry_paths import CarryPathParameters, can_continue, carry_paths, first_free
+from regrasp.motion.cable.held import connector_spheres
+from regrasp.motion.cable.seating import SeatingParameters, poses_before, seated_pose
+from regrasp.motion.cable.viewing import ViewingParameters, approached, outline, views_of
+from regrasp.motion.failure import PlanningError
+from regrasp.motion.grasping.approach import pick_candidates
+from regrasp.motion.grasping.gap_test import GripWatch
+from regrasp.motion.planning.viewpoints import closer_views, spiral
+from regrasp.motion.robots.spheres import JAW_OPENING
+from regrasp.motion.scene.collision import CollisionModel
+from regrasp.motion.scene.planning_scene import NO_POINTS
+from regrasp.motion.service import Motion, MotionParameters, PointCloudSource
+from regrasp.motion.task import MotionTask
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class UnplugParameters:
+    """How the plug is gripped and drawn out."""
+
+    draw_out: float = 0.05  # m along the plug's axis; the plug sits 0.015 m deep
+    # m by which the plug lies nearer to the finger tips than the pads' middle: they end 12 mm past it, and the panel is
+    # 20 mm behind the plug
+    shallow: float = 0.008
+    retreat: float = 0.06  # m away from the panel then; choice
+
+
+@dataclass(frozen=True)
+class CableMotionParameters(MotionParameters):
+    """Those of every task, and of what is done with the cable."""
+
+    connector_padding: float = 1.2  # radii of the spheres that cover a carried connector, in its own radii; choice
+    # m straight back from where something was held; the first that is free; choice
+    retreats: tuple[float, ...] = (0.10, 0.08, 0.06, 0.05, 0.04, 0.03)
+    unplug: UnplugParameters = field(default_factory=UnplugParameters)
+    carry: CarryPathParameters = field(default_factory=CarryPathParameters)
+    seating: SeatingParameters = field(default_factory=SeatingParameters)
+    viewing: ViewingParameters = field(default_factory=ViewingParameters)
+
+
+class CableMotion(Motion):
+    """Requests to the arm that handles the cable, the hand, and to the one that carries the camera that searches."""
+
+    known: CableKnown
+    parameters: CableMotionParameters
+
+    def __init__(
+        self,
+        known: CableKnown,
+        arms: Mapping[str, Arm],
+        grippers: Mapping[str, Gripper],
+        clock: Clock,
+        seed: int,
+        parameters: CableMotionParameters = CableMotionParameters(),
+        on_anomaly: Callable[[str], None] = lambda sentence: None,
+    ) -> None:
+        super().__init__(known, arms, grippers, clock, seed, parameters, on_anomaly)
+        self.hand, self.search_arm = known.cable.hand, known.search_mount.arm
+
+    def warm_up(self) -> None:
+        """Look for a grasp of the plugged connector and drop it.
+
+        The compiled functions of a pick are then loaded now, and no tick waits for it.
+        """
+        cable = self.known.cable
+        plugged = cable.socket(cable.plugged_into).world_from_plug(cable.connector.length)
+        candidates = pick_candidates(plugged, cable.connector, 0.0, self.parameters.pick)
+        for arm in self.arms:
+            with suppress(PlanningError):
+                self._approaches(arm, self.model(arm), candidates, cable.clip.bracket)
+
+    def shift(
+        self,
+        arm: str,
+        displacement: Sequence[float] | FloatArray,
+        *,
+        checked: bool = True,
+        without: Collection[Box] = (),
+    ) -> MotionTask:
+        """As in every task; the clip's bracket may be touched, too."""
+        return super().shift(arm, displacement, checked=checked, without=[*without, *self.known.cable.clip.bracket])
+
+    def pick_plug(self, plug: RigidTransform, *, point_cloud: PointCloudSource | None = None) -> MotionTask:
+        """`pick` the connector where it is plugged in, world_from_connector: a panel is near."""
+        return self._pick_connector(plug, self.parameters.unplug.shallow, None, point_cloud)
+
+    def pick_loose(
+        self, world_from_connector: RigidTransform, *, point_cloud: PointCloudSource | None = None
+    ) -> MotionTask:
+        """`pick` the connector where it hangs at the end of its cable, of which the arm keeps clear."""
+        cable = cable_course(self.known, world_from_connector)
+        return self._pick_connector(world_from_connector, 0.0, cable, point_cloud)
+
+    def grip(self, world_from_connector: RigidTransform) -> Task[Grip]:
+        """Close the hand's jaw on the connector; the answer is what it holds then. It fails as `close` does."""
+
+        def steps() -> Generator[None, None, Grip]:
+            gap = yield from self._done(self.close(self.hand, 2 * self.known.cable.connector.radius))
+            return Grip(gap, self.tool(self.hand).inv() * world_from_connector)
+
+        return Task(steps())
+
+    def watch_grip(self) -> GripWatch:
+        """Begin to watch by the hand's pads whether it holds the connector."""
+        return GripWatch(
+            self.grippers[self.hand], 2 * self.known.cable.connector.radius, self.parameters.execution.jaw.grip.gap
+        )
+
+    def pull_out(self, plug: RigidTransform) -> MotionTask:
+        """Draw the gripped plug (world_from_connector) out along its axis, and then away from the panel, to -x."""
+        values = self.parameters.unplug
+
+        def steps() -> Iterator[None]:
+            axis = plug.rotation.apply([1.0, 0.0, 0.0])
+            yield from self._done(self.shift(self.hand, -values.draw_out * axis, checked=False))
+            yield from self._done(self.shift(self.hand, np.array([-values.retreat, 0.0, 0.0]), checked=False))
+
+        return self._task(self.hand, steps())
+
+    def carry(
+        self,
+        arm: str,
+        goals: Sequence[RigidTransform],
+        held: RigidTransform,
+        *,
+        onward: Sequence[RigidTransform] = (),
+        speed: float,
+    ) -> MotionTask:
+        """Bring what `arm` holds (tool_from_connector) to one of the goals (world_from_tool), the first preferred.
+
+        Along the shapes that the cable takes by itself where that is free, else straight or in a flat arch, else along
+        any free path. Where possible there is room for a jaw that opens on the way, as after a slip. From the goal the
+        tool must also reach the poses `onward` (goal_from_tool) in straight lines.
+        """
+
+        def steps() -> Iterator[None]:
+            spheres = self.held_spheres(held)
+            model, q, kin = self.start_model(arm, held=spheres), self.joints(arm), self.kinematics[arm]
+            clearances, carry = self.parameters.clearances, self.parameters.carry
+            candidates = carry_paths(self.known, kin, q, goals, held, carry)
+            paths = (path for path in candidates if can_continue(kin, path[-1], onward, carry.step))
+            wide = self.model(arm, held=spheres, opening=JAW_OPENING)
+            path = first_free((wide, model), clearances.near_margins, paths)
+            if path is None:
+                solutions = [end for goal in goals for end in kin.ik(goal)]
+                ends = [end for end in solutions if can_continue(kin, end, onward, carry.step)]
+                path = self._plan(model, q, np.array(ends).reshape(-1, 6))
+            yield from self.execution.follow(arm, path, speed)
+
+        return self.execution.task(arm, steps())
+
+    def carry_to_clip(self, held: RigidTransform) -> MotionTask:
+        """Bring the held connector (tool_from_connector) before the clip, from where the hand can go in and back out.
+
+        It fails with OUT_OF_REACH when no hand pose there is free.
+        """
+        seating = self.parameters.seating
+
+        def steps() -> Iterator[None]:
+            models = self.model(self.hand, held=self.held_spheres(held)), self._model_without_clip()
+            goals = poses_before(models, self.joints(self.hand), self.known.cable.clip, held, seating)
+            if not goals:
+                message = "no free hand pose brings the held connector into the clip"
+                raise PlanningError(CauseCode.OUT_OF_REACH, message)
+            in_and_out = (seating.distance, seating.distance - self.parameters.retreats[0])
+            onward = [RigidTransform.from_translation([x, 0.0, 0.0]) for x in in_and_out]
+            yield from self._done(self.carry(self.hand, goals, held, onward=onward, speed=seating.speed_to))
+
+        return self._task(self.hand, steps())
+
+    def insert(self, held: RigidTransform) -> MotionTask:
+        """Bring the held connector (tool_from_connector) straight into the clip, with the roll that turns it least."""
+        seating = self.parameters.seating
+
+        def steps() -> Iterator[None]:
+            goal = seated_pose(self.tool(self.hand), self.known.cable.clip, held, seating.fine_rolls)
+            yield from self._done(self.straight(self.hand, goal, speed=seating.speed_in))
+
+        return self._task(self.hand, steps())
+
+    def let_go(self) -> MotionTask:
+        """Open the hand's jaw; done once it stands wider than a connector."""
+        gap = 2 * self.known.cable.connector.radius + self.parameters.execution.jaw.slack
+        return self.release(self.hand, gap)
+
+    def draw_back(self) -> Task[str]:
+        """Draw the hand straight back as far as is free. The answer is '', or why no distance was."""
+
+        def steps() -> Generator[None, None, str]:
+            why = ""
+            for distance in self.parameters.retreats:
+                back = self.tool(self.hand).rotation.apply([-distance, 0.0, 0.0])
+                try:
+                    yield from self._done(self.shift(self.hand, back))
+                except PlanningError as error:
+                    why = str(error)
+                else:
+                    return ""
+            return why
+
+        return self._task(self.hand, steps())
+
+    def leave_clip(self) -> MotionTask:
+        """Bring the hand to its sleep pose without sweeping the stowed end out of its clip."""
+        seat, cable = self.known.cable.clip.world_from_seat, self.known.cable
+
+        def steps() -> Iterator[None]:
+            connector = connector_points(seat, cable.connector.length)
+            self.keep_clear(np.vstack([connector, cable_course(self.known, seat)]))
+            yield from self._done(self.sleep(self.hand))
+            self.keep_clear(NO_POINTS)
+
+        return self._task(self.hand, steps())
+
+    def search_views(self, last_seen: FloatArray | None) -> tuple[FloatArray, Iterator[Viewpoint]]:
+        """Where a search begins, (3,) m in the world, and its viewpoints, the first first.
+
+        It begins where the connector was `last_seen` (3,) m; None: at the middle of a panel.
+        """
+        start, viewing = last_seen, self.parameters.viewing
+        if start is None:
+            start = np.array(next(box.center for box in self.known.boxes if box.name == viewing.start_at))
+        overview = self.known.camera(self.known.cable.overview)
+        assert isinstance(overview.mount, FixedMount)  # the cell's check
+        return start, spiral(start, overview.mount.world_from_camera, overview.intrinsics, viewing.spiral)
+
+    def view(self, world_from_camera: RigidTransform) -> View:
+        """The viewpoint, or one a little nearer or further, to which the camera that searches can be brought.
+
+        Raises PlanningError when there is none.
+        """
+        return self._first_view([world_from_camera])
+
+    def view_of(self, place: FloatArray, world_from_camera: RigidTransform) -> View:
+        """A view of a `place` (3,) m that was glimpsed from a camera. Raises PlanningError when there is none."""
+        return self._first_view(views_of(place, world_from_camera, self.parameters.viewing.spiral.distance))
+
+    @counts_as("planning")
+    def best_view(self, world_from_connector: RigidTransform, taken: Sequence[FloatArray] = ()) -> View:
+        """The best viewpoint that shows the whole connector, from another side than the lines of sight `taken` (3,).
+
+        Raises PlanningError when there is none.
+        """
+        viewing, model = self.parameters.viewing, self.model(self.search_arm)
+        points = outline(world_from_connector, self.known.cable.connector.length)
+        for pose in closer_views(world_from_connector, viewing.close_views):
+            sight = pose.rotation.apply([0.0, 0.0, 1.0])
+            if any(float(sight @ other) > viewing.max_cosine for other in taken):
+                continue
+            if self.sees(pose, points) and len(goals := self._view_goals(pose, model)):
+                return View(pose, goals)
+        raise PlanningError(CauseCode.OUT_OF_REACH, "no free place from which the whole connector shows")
+
+    def go_to_view(self, view: View) -> MotionTask:
+        """Bring the camera that searches to a view."""
+        return self.move(self.search_arm, view.joints, margin=self.parameters.viewing.margin, tight=False)
+
+    def held_spheres(self, held: RigidTransform) -> FloatArray:
+        """Spheres (n, 4) m in the tool frame that stand for a held connector (tool_from_connector); see `model`."""
+        return connector_spheres(held, self.known.cable.connector, self.parameters.connector_padding)
+
+    def _model_without_clip(self) -> CollisionModel:
+        return self.model(self.hand, without=self.known.cable.clip.bracket)
+
+    def _pick_connector(
+        self,
+        world_from_connector: RigidTransform,
+        shallow: float,
+        cable: FloatArray | None,
+        point_cloud: PointCloudSource | None,
+    ) -> MotionTask:
+        return self.pick(
+            self.hand,
+            world_from_connector,
+            self.known.cable.connector,
+            shallow=shallow,
+            clear_of=cable,
+            without=self.known.cable.clip.bracket,
+            point_cloud=point_cloud,
+        )
+
+    @counts_as("planning")
+    def _first_view(self, views: Sequence[RigidTransform]) -> View:
+        model = self.model(self.search_arm)
+        for pose in approached(views, self.parameters.viewing.approaches):
+            goals = self._view_goals(pose, model)
+            if len(goals):
+                return View(pose, goals)
+        raise PlanningError(CauseCode.OUT_OF_REACH, "no free place to look from")
+
+    def _view_goals(self, world_from_camera: RigidTransform, model: CollisionModel) -> FloatArray:
+        """Joints (n, 6) rad of the search arm that bring its camera there and are free in its `model`."""
+        mount, margin = self.known.search_mount, self.parameters.viewing.margin
+        views = self.kinematics[self.search_arm].ik_view(world_from_camera, mount.wrist_from_camera)
+        return np.array([q for q in views if model.free(q, margin)]).reshape(-1, 6)
+
+    def _task(self, arm: str, steps: Generator[None, None, T] | Iterator[None]) -> Task[T]:
+        """Steps that do other tasks of `arm`, as one. Each of those fails if the arm is out of order."""
+        return Task(steps, lambda: self.execution.halt(arm))
+
+    def _done(self, task: Task[T]) -> Generator[None, None, T]:
+        """Steps that do a task and return its answer."""
+        while not task.poll():
+            yield
+        return task.answer

@@ -1,0 +1,159 @@
+import numpy as np
+import pytest
+from fake_devices import Rig
+from natural import natural_pose
+from numpy.typing import NDArray
+from scipy.spatial.transform import RigidTransform, Rotation
+
+from regrasp.interfaces.cable.cell import CableKnown
+from regrasp.interfaces.cause import CauseCode
+from regrasp.motion.failure import GraspEmptyError, PlanningError
+from regrasp.motion.service import MotionParameters
+
+Points = NDArray[np.float64]
+TIGHT_MARGIN = MotionParameters().clearances.tight_margin
+READY = np.array([0.4, -0.6, 0.6, 0.0, 0.3, 0.0])
+ASIDE = np.array([-0.5, -0.6, 0.6, 0.0, 0.3, 0.0])
+HELD = RigidTransform.from_components([0.0, 0.0, 0.0], Rotation.from_euler("y", -90, degrees=True))
+
+
+@pytest.fixture
+def rig(known: CableKnown) -> Rig:
+    return Rig(known)
+
+
+def cube(center: Points, edge: float = 0.06, h: float = 0.01) -> Points:
+    steps = np.arange(-edge / 2, edge / 2 + 1e-9, h)
+    return np.asarray(center + np.stack(np.meshgrid(steps, steps, steps), -1).reshape(-1, 3))
+
+
+def flown(rig: Rig, arm: str) -> list[Points]:
+    """Where the arm was along its last trajectory, joints (6,)."""
+    trajectory = rig.arms[arm].followed[-1][1]
+    return [trajectory.sample(t)[0] for t in np.linspace(0.0, trajectory.duration, 60)]
+
+
+def moved(rig: Rig, *way: float) -> RigidTransform:
+    """The right tool's pose, shifted by `way` m in the world."""
+    return RigidTransform.from_translation(way) * rig.motion.tool("right")
+
+
+def in_hand(rig: Rig, off: list[float]) -> RigidTransform:
+    """The right hand takes a connector where its cable, bent `off` m, holds it: tool_from_connector."""
+    connector = natural_pose(rig.known, np.array(off))
+    rig.run(rig.motion.pick("right", connector, rig.known.cable.connector))
+    return rig.motion.tool("right").inv() * connector
+
+
+def test_a_carry_takes_the_way_that_the_cable_goes_to_the_first_goal(rig: Rig) -> None:
+    held = in_hand(rig, [0.02, 0.0, 0.10])
+    start = rig.motion.tool("right")
+    goals = [natural_pose(rig.known, np.array([x, 0.0, 0.17])) * held.inv() for x in (-0.04, 0.0)]
+    rig.run(rig.motion.carry("right", goals, held, speed=0.5))
+    end = rig.motion.tool("right")
+    assert end.translation == pytest.approx(goals[0].translation, abs=1e-3)
+    assert (end.rotation.inv() * goals[0].rotation).magnitude() < 0.01
+    carried = [rig.motion.kinematics["right"].tool(q) * held for q in flown(rig, "right")]
+    anchor, course = rig.known.cable.anchor
+    for pose in carried:
+        place = pose.apply([-0.5 * rig.known.cable.connector.length, 0.0, 0.0]) - anchor
+        natural = natural_pose(rig.known, place - (place @ course) * course)
+        assert np.linalg.norm(pose.translation - natural.translation) < 0.005
+    length = np.linalg.norm(np.diff([pose.translation for pose in carried], axis=0), axis=1).sum()
+    assert length < 1.2 * np.linalg.norm((goals[0] * held).translation - (start * held).translation)
+
+
+def test_a_goal_from_which_the_tool_cannot_go_on_is_no_goal(rig: Rig) -> None:
+    held = in_hand(rig, [0.02, 0.0, 0.10])
+    goals = [natural_pose(rig.known, np.array([-0.04, 0.0, 0.17])) * held.inv()]
+    near, far = (RigidTransform.from_translation([-x, 0.0, 0.0]) for x in (0.03, 2.0))
+    with pytest.raises(PlanningError) as error:
+        rig.run(rig.motion.carry("right", goals, held, onward=[near, far], speed=0.5))
+    assert error.value.code is CauseCode.OUT_OF_REACH
+    rig.run(rig.motion.carry("right", goals, held, onward=[near], speed=0.5))
+    assert rig.motion.tool("right").translation == pytest.approx(goals[0].translation, abs=1e-3)
+
+
+def test_a_carry_leaves_room_for_a_jaw_that_opens(rig: Rig) -> None:
+    upright = ASIDE + np.array([0.0, 0.0, 0.0, 0.0, 0.0, np.pi / 2])  # one finger above the other
+    rig.arms["right"].at = upright
+    goal = moved(rig, 0.0, 0.18, 0.0)
+    bar = [moved(rig, 0.0, y, -0.077).apply([0.02, 0.0, 0.0]) for y in np.linspace(0.03, 0.15, 7)]
+    rig.motion.set_obstacles(np.vstack([cube(place, 0.04) for place in bar]), 0.01)
+    rig.run(rig.motion.carry("right", [goal], HELD, speed=0.5))
+    open_jaw = rig.motion.model("right", held=rig.motion.held_spheres(HELD), opening=0.075)
+    assert all(open_jaw.free(q, 0.0) for q in flown(rig, "right"))
+    assert rig.motion.tool("right").translation == pytest.approx(goal.translation, abs=1e-3)
+
+
+def test_a_carry_leaves_out_a_goal_in_the_panel(rig: Rig) -> None:
+    rig.arms["right"].at = ASIDE
+    tool = rig.motion.tool("right")
+    blocked = RigidTransform.from_components([0.505, -0.15, 0.3], tool.rotation)
+    free = moved(rig, 0.0, 0.10, 0.0)
+    rig.run(rig.motion.carry("right", [blocked, free], HELD, speed=0.5))
+    assert rig.motion.tool("right").translation == pytest.approx(free.translation, abs=1e-3)
+
+
+def test_the_carried_connector_counts_as_body(rig: Rig) -> None:
+    q = READY
+    tip = (rig.motion.kinematics["right"].tool(q) * HELD).apply([0.035, 0.0, 0.0])
+    rig.motion.set_obstacles(tip[None], 0.01)
+    assert (
+        rig.motion.model("right", held=rig.motion.held_spheres(HELD)).nearest(q)[0]
+        < rig.motion.model("right").nearest(q)[0]
+    )
+    assert not rig.motion.model("right", held=rig.motion.held_spheres(HELD)).free(q, TIGHT_MARGIN)
+
+
+def test_a_grip_says_how_the_connector_lies_in_the_hand(rig: Rig) -> None:
+    rig.arms["right"].at = READY
+    rig.grippers["right"].gap, rig.grippers["right"].inside = 0.05, 0.0201
+    connector = moved(rig, 0.0, 0.0, 0.01)
+    task = rig.motion.grip(connector)
+    rig.run(task)
+    assert task.answer.gap == 0.0201
+    assert (rig.motion.tool("right") * task.answer.pose).translation == pytest.approx(connector.translation)
+    assert not rig.motion.watch_grip().evidence().detected
+
+
+def test_a_jaw_that_closes_on_nothing_says_so(rig: Rig) -> None:
+    rig.grippers["right"].gap = 0.05
+    with pytest.raises(GraspEmptyError, match=r"closed on nothing: pads 0.0 mm apart") as error:
+        rig.run(rig.motion.grip(rig.motion.tool("right")))
+    assert error.value.code is CauseCode.GRASP_EMPTY
+
+
+def test_the_hand_draws_back_as_far_as_is_free(rig: Rig) -> None:
+    rig.arms["right"].at = READY
+    start = rig.motion.tool("right")
+    task = rig.motion.draw_back()
+    rig.run(task)
+    assert task.answer == ""
+    back = start.inv().apply(rig.motion.tool("right").translation)
+    assert back == pytest.approx([-0.10, 0.0, 0.0], abs=1e-3)
+
+
+def test_where_no_way_back_is_free_the_answer_says_why(rig: Rig) -> None:
+    task = rig.motion.draw_back()  # asleep, folded over its own base
+    rig.run(task)
+    assert "m" in task.answer
+    assert not rig.arms["right"].followed
+
+
+def test_a_search_begins_where_the_end_was_seen_or_at_the_panel(rig: Rig) -> None:
+    seen = np.array([0.4, 0.1, 0.25])
+    start, viewpoints = rig.motion.search_views(seen)
+    assert start == pytest.approx(seen)
+    first = next(viewpoints)
+    assert rig.motion.view(first.world_from_camera).joints.shape[1] == 6
+    start, _ = rig.motion.search_views(None)
+    assert start == pytest.approx(next(box.center for box in rig.known.boxes if box.name == "back_panel"))
+
+
+def test_the_clip_may_be_touched_by_a_straight_way_and_not_by_a_plan(rig: Rig) -> None:
+    bracket = rig.known.cable.clip.bracket
+    kin = rig.motion.kinematics["right"]
+    inside = kin.ik(RigidTransform.from_translation(bracket[0].center))
+    near = rig.motion.model("right", without=bracket)
+    assert any(near.clearance(q) > rig.motion.model("right").clearance(q) for q in inside)
