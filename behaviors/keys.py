@@ -142,10 +142,14 @@ class WithKeys:
         """What the key holds; where it holds nothing, `otherwise`, or the key's default.
 
         Raises:
-            MissingKeyError: it holds nothing, and there is neither. Let it pass: the leaf then fails, and says why.
+            MissingKeyError: it holds nothing, and there is neither. Let it pass out of `work` or `steps`: the leaf then
+                fails, and says why.
         """
         self._check(key, Access.READ, "reads", "NEEDS or READS")
-        held = self._keys.get(key.path) if self._keys.exists(key.path) else NOTHING
+        try:
+            held = self._keys.get(key.path)
+        except KeyError:
+            held = NOTHING
         return _or_default(key, held, otherwise)
 
     def write(self, key: Key[T], value: T) -> None:

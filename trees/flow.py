@@ -76,7 +76,7 @@ def _unwritten(reader: Wire, known: Mapping[str, ElementKind]) -> str:
     if reader.key is None:
         return f"{reader.what} reads {cut(reader.path)}, which no port writes; wire an output to it"
     own = reader.what.partition(" ")[0]
-    tags = [tag for tag, kind in known.items() if reader.key in kind.writes and tag != own]
+    tags = [tag for tag, kind in known.items() if tag != own and reader.path in (key.path for key in kind.writes)]
     right = f"tick {' or '.join(tags)} before it" if tags else "no leaf that is known does, so remove it"
     return f"{reader.what} needs {reader.key.text}, which nothing in this tree writes; {right}"
 
