@@ -10,7 +10,7 @@
 
     class LetGo(Leaf):
         READS = (HELD,)      # and in work: if self.read(HELD, None) is None: ...
-        WRITES = (HELD,)     # and in work: self.clear(HELD)
+        CLEARS = (HELD,)     # and in work: self.clear(HELD)
 
 The check of a tree file finds a leaf whose key nothing can have written before its first tick. Values are immutable:
 who changes one writes a new one. A key's name begins with its task's, and its place on the blackboard is none that a
@@ -38,8 +38,8 @@ class _Nothing(Enum):
 
 
 NOTHING = _Nothing.NOTHING
-Use = Literal["NEEDS", "READS", "WRITES"]  # the attribute in which a class declares a key
-USES: tuple[Use, ...] = ("NEEDS", "READS", "WRITES")
+Use = Literal["NEEDS", "READS", "WRITES", "CLEARS"]  # the attribute in which a class declares a key
+USES: tuple[Use, ...] = ("NEEDS", "READS", "WRITES", "CLEARS")
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,6 +105,11 @@ def value_of(key: Key[Any], otherwise: Any = NOTHING) -> Any:
     return _or_default(key, Blackboard.storage.get(key.path, NOTHING), otherwise)
 
 
+def put(key: Key[T], value: T) -> None:
+    """Let a key hold a value before a tree or a leaf is run, as in a study."""
+    Blackboard.storage[key.path] = value
+
+
 def causes() -> tuple[Cause, ...]:
     """The causes of the leaves that have failed so far in this run, the latest last."""
     return value_of(CAUSES)
@@ -114,12 +119,14 @@ class WithKeys:
     """A node that may use the keys that its class declares; those of its base classes are declared with them.
 
     `NEEDS`: written before the node's first tick, else the check of the tree has a finding. `READS`: may hold nothing.
-    `WRITES`: written or cleared. A node that uses another key raises TypeError.
+    `WRITES`: written, and cleared where it likes. `CLEARS`: cleared only, so that nobody takes it for a writer. A node
+    that uses another key raises TypeError.
     """
 
     NEEDS: ClassVar[Keys] = ()
     READS: ClassVar[Keys] = ()
     WRITES: ClassVar[Keys] = ()
+    CLEARS: ClassVar[Keys] = ()
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
@@ -132,7 +139,7 @@ class WithKeys:
         self._keys: Client = cast(Any, self).attach_blackboard_client(name=f"{cast(Any, self).name} keys")
         for use in USES:
             for key in declared(type(self), use):
-                self._keys.register_key(key.path, Access.WRITE if use == "WRITES" else Access.READ)
+                self._keys.register_key(key.path, Access.READ if use in ("NEEDS", "READS") else Access.WRITE)
 
     @overload
     def read(self, key: Key[T]) -> T: ...
@@ -155,11 +162,13 @@ class WithKeys:
     def write(self, key: Key[T], value: T) -> None:
         """Let the key hold a value, which nobody changes from now on."""
         self._check(key, Access.WRITE, "writes", "WRITES")
+        if key not in declared(type(self), "WRITES"):
+            raise TypeError(f"{type(self).__name__} writes {key.name}, which it only CLEARS; name it in WRITES")
         self._keys.set(key.path, value)
 
     def clear(self, key: Key[Any]) -> None:
         """Let the key hold nothing, as if nothing had ever written it."""
-        self._check(key, Access.WRITE, "clears", "WRITES")
+        self._check(key, Access.WRITE, "clears", "CLEARS or WRITES")
         self._keys.unset(key.path)
 
     def _check(self, key: Key[Any], access: Access, does: str, where: str) -> None:

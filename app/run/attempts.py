@@ -36,8 +36,8 @@ class Attempts(py_trees.visitors.VisitorBase):
     """A visitor of a tree; `made` are the attempts so far, in the order of their beginning.
 
     The attempts must be noted tick by tick: a node with memory resets what failed before at the next tick. `causes`
-    gives those of the leaves that have failed so far, the latest last. `types` holds the tree file's element name of each
-    node by path; a node without one is named by its class. After a stop outside a tick call `finalise()`.
+    gives those of the leaves that have failed so far, the latest last. `types` holds the tree file's element name of
+    each node by path; a node without one is named by its class. After a stop outside a tick call `finalise()`.
     """
 
     def __init__(

@@ -8,7 +8,7 @@ from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,7 +47,7 @@ class Film:
     thread.
     """
 
-    def __init__(self, path: Path | None, world: World, parameters: FilmParameters = FilmParameters()) -> None:
+    def __init__(self, path: Path | None, world: World[Any], parameters: FilmParameters = FilmParameters()) -> None:
         self._path, self._world, self._parameters = path, world, parameters
         self._stack = ExitStack()
         self._writer: VideoWriter | None = None

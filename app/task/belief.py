@@ -10,15 +10,9 @@ if TYPE_CHECKING:
 
 def belief(services: "Services") -> dict[str, Any]:
     """Its arms by their readings, and the obstacles that it has mapped; lengths are rounded to 0.1 mm."""
-    return {"arms": arms(services), "occupied_voxels": len(services.perception.occupancy.occupied_points())}
-
-
-def arms(services: "Services") -> dict[str, Any]:
-    """Each arm's joints (rad) as read, and world_from_tool by them."""
-    motion = services.motion
-    return {
-        name: {"joints": motion.joints(name).round(4).tolist(), "tool": pose(motion.tool(name))} for name in motion.arms
-    }
+    motion, names = services.motion, [arm.name for arm in services.known.arms]
+    arms = {name: {"joints": motion.joints(name).round(4).tolist(), "tool": pose(motion.tool(name))} for name in names}
+    return {"arms": arms, "occupied_voxels": len(services.perception.obstacles()[0])}
 
 
 def pose(value: "RigidTransform") -> dict[str, Any]:

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from regrasp.behaviors.services import Services
     from regrasp.interfaces.cell import Cell
     from regrasp.interfaces.fault import Fault, When
+    from regrasp.sim.objects import TaskObjects
     from regrasp.sim.world import World
 
 
@@ -32,7 +33,7 @@ class Task:
     name: str  # also that of its sections in a cell file, known.NAME and hidden.NAME
     about: str  # a sentence for lists
     # What it builds in the world of a cell.
-    objects: Part["Callable[[Any], Any]"]
+    objects: Part["Callable[[Any], TaskObjects]"] = Part("regrasp.sim.objects:NoObjects")
     # The model of a cell file with the task's sections.
     cell: Part["type[Cell]"] = Part("regrasp.interfaces.cell:Cell")
     # Findings in a cell each of whose values is right; only if the flag is set, how its parts lie to one another.
@@ -46,7 +47,7 @@ class Task:
     when: Part["type[When]"] = Part("regrasp.interfaces.fault:When")
     faults: Part["tuple[type[Fault], ...]"] = Part("regrasp.app.task.part:NOTHING")
     service_calls: tuple[str, ...] = ()  # that the fault service_raises may break, besides those of every task
-    services: Part["Callable[[World, int, Any], Services]"] = Part("regrasp.app.run.compose:build_services")
+    services: Part["Callable[[World[Any], int, Any], Services]"] = Part("regrasp.app.run.compose:build_services")
     judge: Part["type[Judge[Any]]"] = Part("regrasp.app.task.judge:Judge")
     belief: Part["Callable[[Any], dict[str, Any]]"] = Part("regrasp.app.task.belief:belief")  # for the record
     words: Part["Words"] = Part("regrasp.app.task.words:PLAIN")

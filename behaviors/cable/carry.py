@@ -4,6 +4,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from regrasp.behaviors.cable.hand import HandLeaf
+from regrasp.behaviors.cable.keys import HELD
+from regrasp.behaviors.keys import Keys
 from regrasp.behaviors.leaf import LeafSteps
 
 
@@ -18,6 +20,8 @@ class InsertParameters:
 class Carry(HandLeaf):
     """Plans the held connector's path to a place in front of the clip and follows it."""
 
+    NEEDS: ClassVar[Keys] = (HELD,)
+
     def steps(self) -> LeafSteps:
         """See the class."""
         yield self.services.motion.carry_to_clip(self.held())
@@ -26,6 +30,8 @@ class Carry(HandLeaf):
 class Insert(HandLeaf):
     """Looks how the connector lies in the hand, and brings it straight into the clip."""
 
+    NEEDS: ClassVar[Keys] = (HELD,)
+    WRITES: ClassVar[Keys] = (HELD,)
     parameters: ClassVar[InsertParameters] = InsertParameters()
 
     def steps(self) -> LeafSteps:
@@ -36,15 +42,16 @@ class Insert(HandLeaf):
 
     def _look(self) -> LeafSteps:
         """Correct the belief of how the connector lies in the hand by what the overview camera sees of it."""
-        belief, motion, perception = self.services.belief, self.services.motion, self.services.perception
+        motion, perception = self.services.motion, self.services.perception
         # Only later frames: in this moment the hand may still move.
         looked = yield from self.ask(perception.watch(self.overview, self.parameters.look_time, later=True))
         seen = looked.estimates
-        found = None if belief.held is None else perception.in_hand(seen, motion.tool(self.hand), belief.held)
+        held = self.read(HELD, None)
+        found = None if held is None else perception.in_hand(seen, motion.tool(self.hand), held)
         if found is None:
             self.say("the hand hides the connector", frames=len(seen))
             return
         shift, turn = round(found.shift, 4), round(found.turn_deg, 1)
         self.say("connector in the hand", whole=found.whole, shift=shift, turn_deg=turn, trusted=found.trusted)
         if found.trusted:
-            belief.held = found.pose
+            self.write(HELD, found.pose)

@@ -4,9 +4,10 @@ from typing import Any, ClassVar
 
 from py_trees.common import Status
 
+from regrasp.behaviors.cable.keys import HELD, NOTICES, LossNotice
 from regrasp.behaviors.cable.services import CableServices
+from regrasp.behaviors.keys import Keys
 from regrasp.behaviors.leaf import Leaf
-from regrasp.behaviors.services import LossNotice
 from regrasp.interfaces.cable.cause import CableCause
 
 
@@ -17,6 +18,9 @@ class DetectSlip(Leaf):
     jaw; there the finger gap tells at once.
     """
 
+    READS: ClassVar[Keys] = (NOTICES,)
+    WRITES: ClassVar[Keys] = (NOTICES,)
+    CLEARS: ClassVar[Keys] = (HELD,)
     INPUT_PORTS: ClassVar[dict[str, Any]] = {}
     OUTPUT_PORTS: ClassVar[dict[str, Any]] = {}
     RETURNS = frozenset({Status.RUNNING, Status.FAILURE})
@@ -31,8 +35,8 @@ class DetectSlip(Leaf):
         tool = self.services.motion.tool(self.services.known.cable.hand)
         for evidence in (self._grip.evidence(), self.services.perception.slipped(tool)):
             if evidence is not None and evidence.detected:
-                self.services.belief.held = None
-                self.services.belief.notices.append(LossNotice(self.services.clock.now(), evidence.by))
+                self.clear(HELD)
+                self.write(NOTICES, (*self.read(NOTICES), LossNotice(self.services.clock.now(), evidence.by)))
                 self.say("slip", by=evidence.by, value=round(evidence.value, 4), limit=evidence.limit)
                 return self.fail(CableCause.SLIPPED, evidence.sentence)
         return Status.RUNNING

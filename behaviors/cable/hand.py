@@ -3,6 +3,7 @@
 from collections.abc import Generator
 from typing import TYPE_CHECKING, TypeVar
 
+from regrasp.behaviors.cable.keys import HELD
 from regrasp.behaviors.cable.services import CableServices
 from regrasp.behaviors.leaf import LeafFailed, LeafSteps, StepsLeaf
 from regrasp.interfaces.arrays import FloatArray
@@ -55,11 +56,11 @@ class CableLeaf(StepsLeaf):
 
 
 class HandLeaf(CableLeaf):
-    """A leaf in which the hand works."""
+    """A leaf in which the hand works. One that asks for `held` NEEDS the key HELD, one that grips WRITES it."""
 
     def held(self) -> "RigidTransform":
         """tool_from_connector as believed. Raises `LeafFailed` when `DetectSlip` has just noticed a loss."""
-        held = self.services.belief.held
+        held = self.read(HELD, None)
         if held is None:
             raise LeafFailed(CableCause.SLIPPED, "the hand holds nothing any more")
         return held
@@ -67,7 +68,7 @@ class HandLeaf(CableLeaf):
     def grip(self, world_from_connector: "RigidTransform") -> LeafSteps:
         """Close the jaw; then the belief is that it holds the connector. Raises PlanningError when it does not."""
         grip = yield from self.ask(self.services.motion.grip(world_from_connector))
-        self.services.belief.held = grip.pose
+        self.write(HELD, grip.pose)
         self.say("grasped", gap=grip.gap)
 
     def draw_back(self) -> LeafSteps:

@@ -3,7 +3,9 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
+from regrasp.behaviors.cable.keys import FOUND, Found
 from regrasp.behaviors.cable.look import LookLeaf
+from regrasp.behaviors.keys import Keys
 from regrasp.behaviors.leaf import LeafSteps
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cable.sight import Estimate
@@ -25,19 +27,20 @@ class LookCloser(LookLeaf):
     no better pose is found, the first one stands.
     """
 
+    NEEDS: ClassVar[Keys] = (FOUND,)
+    WRITES: ClassVar[Keys] = (FOUND,)
     parameters: ClassVar[LookCloserParameters] = LookCloserParameters()
 
     def steps(self) -> LeafSteps:
         """See the class."""
-        belief, motion = self.services.belief, self.services.motion
-        if belief.found_by == self.overview and belief.sure:
+        best, motion = self.read(FOUND), self.services.motion
+        if best.camera == self.overview and best.whole:
             return
         taken: list[FloatArray] = []
         whole: list[Estimate] = []
         for _ in range(self.parameters.looks):
             try:
-                assert belief.connector is not None
-                view = motion.best_view(belief.connector, taken)
+                view = motion.best_view(best.world_from_connector, taken)
                 taken.append(view.sight)
                 looked = yield from self.go_and_look(view, self.parameters.look_time)
             except PlanningError as error:
@@ -46,7 +49,8 @@ class LookCloser(LookLeaf):
             whole += [e for e in looked.estimates if e.whole]
             if looked.estimates:
                 found = self.services.perception.fuse(whole or looked.estimates)
-                belief.connector, belief.sure = found.world_from_connector, found.whole
-                belief.found_by = self.search
-                self.say("looked closer", position=belief.connector.translation.round(4).tolist(), sure=belief.sure)
+                best = Found(found.world_from_connector, found.whole, self.search)
+                self.write(FOUND, best)
+                position = best.world_from_connector.translation.round(4).tolist()
+                self.say("looked closer", position=position, sure=best.whole)
         yield from self.go_to_sleep(self.search_arm)

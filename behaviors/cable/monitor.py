@@ -4,7 +4,9 @@ from typing import Any, ClassVar
 
 from py_trees.common import Status
 
+from regrasp.behaviors.cable.keys import HELD
 from regrasp.behaviors.cable.services import CableServices
+from regrasp.behaviors.keys import Keys
 from regrasp.behaviors.leaf import Leaf, LeafPort
 
 
@@ -14,6 +16,7 @@ class Monitor(Leaf):
     It stands before `DetectSlip` in a Sequence without memory, so that both are ticked every time.
     """
 
+    READS: ClassVar[Keys] = (HELD,)
     INPUT_PORTS: ClassVar[dict[str, Any]] = {
         "period": LeafPort(data_type=float, required=False, default_value=0.1, above=0, description="s between looks")
     }
@@ -26,7 +29,7 @@ class Monitor(Leaf):
     def work(self) -> Status:
         """See the class."""
         perception, now, cable = self.services.perception, self.services.clock.now(), self.services.known.cable
-        perception.expect_in_hand(self.services.motion.tool(cable.hand), self.services.belief.held)
+        perception.expect_in_hand(self.services.motion.tool(cable.hand), self.read(HELD, None))
         if now >= self._due - 1e-9:
             perception.look(cable.overview)
             self._due = now + self.get_input("period")

@@ -5,6 +5,8 @@ from itertools import chain
 from typing import Any, ClassVar
 
 from regrasp.behaviors.cable.hand import HandLeaf
+from regrasp.behaviors.cable.keys import FOUND
+from regrasp.behaviors.keys import Keys
 from regrasp.behaviors.leaf import LeafFailed, LeafPort, LeafSteps
 from regrasp.interfaces.cable.cause import CableCause
 from regrasp.interfaces.cause import CauseCode
@@ -32,11 +34,12 @@ class MakeRoom(HandLeaf):
     away may hook it.
     """
 
+    CLEARS: ClassVar[Keys] = (FOUND,)
     parameters: ClassVar[MakeRoomParameters] = MakeRoomParameters()
 
     def steps(self) -> LeafSteps:
         """See the class."""
-        self.services.belief.connector = self.services.belief.found_by = None
+        self.clear(FOUND)
         self.services.motion.open_jaw(self.hand)
         for step in chain(self.wait(self.parameters.leave_time), self.draw_back(), self.go_to_sleep(self.hand)):
             self.services.perception.look(self.overview)  # the search starts where the end was seen last

@@ -4,6 +4,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from regrasp.behaviors.cable.hand import HandLeaf
+from regrasp.behaviors.cable.keys import FOUND, HELD
+from regrasp.behaviors.keys import Keys
 from regrasp.behaviors.leaf import LeafSteps
 from regrasp.motion.failure import GraspEmptyError
 
@@ -21,12 +23,13 @@ class Regrasp(HandLeaf):
     A hand that closes on nothing opens and goes back to sleep, and the leaf fails.
     """
 
+    NEEDS: ClassVar[Keys] = (FOUND,)
+    WRITES: ClassVar[Keys] = (HELD,)
     parameters: ClassVar[RegraspParameters] = RegraspParameters()
 
     def steps(self) -> LeafSteps:
         """See the class."""
-        motion, connector = self.services.motion, self.services.belief.connector
-        assert connector is not None
+        motion, connector = self.services.motion, self.read(FOUND).world_from_connector
         motion.set_obstacles(*self.services.perception.obstacles_beside(connector))
         yield motion.pick_loose(connector, point_cloud=self.overview_points)
         try:

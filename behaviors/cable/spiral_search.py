@@ -4,7 +4,9 @@ from collections.abc import Generator, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from regrasp.behaviors.cable.keys import FOUND, VAIN_SEARCHES, Found
 from regrasp.behaviors.cable.look import LookLeaf
+from regrasp.behaviors.keys import Keys
 from regrasp.behaviors.leaf import LeafFailed, LeafPort, LeafSteps
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cable.cause import CableCause
@@ -34,6 +36,11 @@ class SpiralSearch(LookLeaf):
     next. When the search fails the arm goes back to sleep.
     """
 
+    READS: ClassVar[Keys] = (VAIN_SEARCHES,)
+    WRITES: ClassVar[Keys] = (
+        FOUND,
+        VAIN_SEARCHES,
+    )
     parameters: ClassVar[SpiralSearchParameters] = SpiralSearchParameters()
 
     INPUT_PORTS: ClassVar[dict[str, Any]] = {
@@ -64,7 +71,7 @@ class SpiralSearch(LookLeaf):
                 position, stop = self._believe(self.services.perception.fuse(seen)), viewpoint.index
                 self.say("found", camera=self.search, stop=stop, looked=looked, skipped=skipped, position=position)
                 return
-        self.services.belief.vain_searches += 1
+        self.write(VAIN_SEARCHES, self.read(VAIN_SEARCHES) + 1)
         yield from self.go_to_sleep(self.search_arm)
         seconds = clock.now() - begin
         self.say("not found", looked=looked, skipped=skipped)
@@ -103,16 +110,15 @@ class SpiralSearch(LookLeaf):
         return looked.estimates
 
     def _believe(self, found: Estimate) -> list[float]:
-        """Take the found connector into the belief; its position (m in the world) for the log."""
-        belief = self.services.belief
-        belief.connector, belief.sure = found.world_from_connector, found.whole
-        belief.found_by, belief.vain_searches = self.search, 0
+        """Hand on where the connector was found; its position (m in the world) for the log."""
+        self.write(FOUND, Found(found.world_from_connector, found.whole, self.search))
+        self.write(VAIN_SEARCHES, 0)
         position: list[float] = found.position.round(4).tolist()
         return position
 
     def _viewpoints(self) -> Iterator[Viewpoint]:
         last = self.services.perception.last
-        from_last = last is not None and self.services.belief.vain_searches % 2 == 0
+        from_last = last is not None and self.read(VAIN_SEARCHES) % 2 == 0
         position = last.position if last is not None and from_last else None
         start, viewpoints = self.services.motion.search_views(position)
         self.say("search", start=start.round(3).tolist(), last_seen=from_last)

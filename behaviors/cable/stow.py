@@ -5,9 +5,10 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from regrasp.behaviors.cable.hand import HandLeaf
+from regrasp.behaviors.cable.keys import HELD, NOTICES, LossNotice
 from regrasp.behaviors.cable.look import LookLeaf
+from regrasp.behaviors.keys import Keys
 from regrasp.behaviors.leaf import LeafFailed, LeafSteps
-from regrasp.behaviors.services import LossNotice
 from regrasp.interfaces.cable.cause import CableCause
 from regrasp.interfaces.cable.sight import Estimate
 from regrasp.interfaces.cause import CauseCode
@@ -32,12 +33,13 @@ class LookAtStowParameters:
 class LetGo(HandLeaf):
     """Opens the jaw, draws it back and brings the arm to its sleep pose."""
 
+    CLEARS: ClassVar[Keys] = (HELD,)
     parameters: ClassVar[LetGoParameters] = LetGoParameters()
 
     def steps(self) -> LeafSteps:
         """See the class."""
         yield self.services.motion.let_go()
-        self.services.belief.held = None
+        self.clear(HELD)
         yield from self.wait(self.parameters.open_time)
         yield from self.draw_back()
         yield self.services.motion.leave_clip()
@@ -49,6 +51,8 @@ class LookAtStow(LookLeaf):
     The wrist camera looks when the rear one is not to be trusted.
     """
 
+    READS: ClassVar[Keys] = (NOTICES,)
+    WRITES: ClassVar[Keys] = (NOTICES,)
     parameters: ClassVar[LookAtStowParameters] = LookAtStowParameters()
 
     def steps(self) -> LeafSteps:
@@ -85,5 +89,5 @@ class LookAtStow(LookLeaf):
         return looked.estimates
 
     def _lost(self, message: str) -> None:
-        self.services.belief.notices.append(LossNotice(self.services.clock.now(), "place"))
+        self.write(NOTICES, (*self.read(NOTICES), LossNotice(self.services.clock.now(), "place")))
         raise LeafFailed(CableCause.NOT_STOWED, message)

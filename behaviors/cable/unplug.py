@@ -3,12 +3,15 @@
 from typing import Any, ClassVar
 
 from regrasp.behaviors.cable.hand import HandLeaf
+from regrasp.behaviors.cable.keys import HELD
+from regrasp.behaviors.keys import Keys
 from regrasp.behaviors.leaf import LeafPort, LeafSteps
 
 
 class Unplug(HandLeaf):
     """Grips the connector in the `socket` of that name, draws it out along its axis, and away from the panel."""
 
+    WRITES: ClassVar[Keys] = (HELD,)
     INPUT_PORTS: ClassVar[dict[str, Any]] = {
         "socket": LeafPort(
             data_type=str,

@@ -19,7 +19,7 @@ from collections.abc import Iterator
 from functools import partial
 from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -28,6 +28,9 @@ from regrasp.app.run.episode import run_episode
 from regrasp.app.run.observers import Observers
 from regrasp.app.run.processes import run_each
 from regrasp.app.scenario.load import load_scenario
+from regrasp.behaviors.cable.keys import FOUND, HELD
+from regrasp.behaviors.cable.services import CableServices
+from regrasp.behaviors.keys import value_of
 
 KEPT = Path(__file__).with_name("runs.json")
 SCENARIOS = ("no_obstacle", "short_obstacle", "tall_obstacle")
@@ -63,9 +66,10 @@ class StateTrace:
             yield from (reading.positions, reading.velocities, reading.efforts, [arm.gripper.reading().gap])
         yield from world.objects.cable.connector_state()[2:]
         yield world.objects.connector_pose().as_matrix()
-        if (last := services.perception.track.last) is not None:
+        if (last := cast(CableServices, services).perception.last) is not None:
             yield from (last.position, [last.stamp])
-        for pose in (services.belief.held, services.belief.connector):
+        held, found = value_of(HELD, None), value_of(FOUND, None)
+        for pose in (held, None if found is None else found.world_from_connector):
             if pose is not None:
                 yield pose.as_matrix()
 

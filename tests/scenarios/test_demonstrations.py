@@ -119,7 +119,7 @@ def test_the_software_renderer_carries_the_run_as_far_as_the_slip(tmp_path: Path
     scenario = load_scenario("no_obstacle", ["limits.sim_seconds=11"])
     result = run_episode(scenario, tmp_path / "run", seed=0, renderer="software")
     assert (result.outcome, result.renderer) == ("time_limit", "software")
-    [slip] = result.slips
+    [slip] = result.measured["slips"]
     assert slip.detected_at is not None
     assert slip.detected_at - slip.released_at < 1.0
 

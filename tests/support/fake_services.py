@@ -9,11 +9,12 @@ import numpy as np
 import py_trees
 from numpy.typing import NDArray
 from py_trees.common import Status
+from py_trees.parsers.behaviour_tree_xml import parse_behaviour_tree_xml
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.behaviors import LEAVES, keys
+from regrasp.behaviors.cable.keys import FOUND, HELD, NOTICES, Found, LossNotice
 from regrasp.behaviors.cable.services import CableServices
-from regrasp.behaviors.services import Belief
 from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.cable.motion import Grip, View, Viewpoint
 from regrasp.interfaces.cable.sight import Estimate, InHand, NoEstimate, NotSeen, Sightings, TrackHealth, TrackState
@@ -36,7 +37,6 @@ from regrasp.perception.pose.fusion import fuse
 from regrasp.perception.tracking.slip import distance_slip, seen_at
 from regrasp.perception.tracking.stillness import Stillness
 from regrasp.perception.tracking.track import ConnectorTrack
-from regrasp.trees import load_tree
 
 VIEWING = ViewingParameters()
 LEFT = np.array([0.0, 1.0, 0.0])
@@ -335,6 +335,42 @@ class FakePerception:
         return self.obstacles()
 
 
+class Belief:
+    """What the keys of the cable's leaves hold, to read and to write from outside."""
+
+    @property
+    def held(self) -> RigidTransform | None:
+        return keys.value_of(HELD, None)
+
+    @held.setter
+    def held(self, pose: RigidTransform | None) -> None:
+        _put(HELD, pose)
+
+    @property
+    def found(self) -> Found | None:
+        return keys.value_of(FOUND, None)
+
+    @found.setter
+    def found(self, found: Found | None) -> None:
+        _put(FOUND, found)
+
+    @property
+    def notices(self) -> tuple[LossNotice, ...]:
+        return keys.value_of(NOTICES)
+
+    @notices.setter
+    def notices(self, notices: tuple[LossNotice, ...]) -> None:
+        _put(NOTICES, notices)
+
+
+def _put(key: keys.Key[Any], value: Any) -> None:
+    """Let the key hold the value; None: nothing."""
+    if value is None:
+        py_trees.blackboard.Blackboard.storage.pop(key.path, None)
+    else:
+        keys.put(key, value)
+
+
 @dataclass
 class Stage:
     """The fakes of one test on an empty blackboard, and the services made of them."""
@@ -343,13 +379,14 @@ class Stage:
     folder: Path
     clock: Clock = field(default_factory=Clock)
     log: Log = field(default_factory=Log)
+
     belief: Belief = field(default_factory=Belief)
 
     def __post_init__(self) -> None:
         py_trees.blackboard.Blackboard.clear()
         self.motion = FakeMotion(self.clock, self.known)
         self.perception = FakePerception(self.clock, self.known)
-        self.services = CableServices(self.known, self.clock, self.motion, self.perception, self.log, self.belief)
+        self.services = CableServices(self.known, self.clock, self.motion, self.perception, self.log)
 
     @property
     def causes(self) -> tuple[Cause, ...]:
@@ -357,10 +394,10 @@ class Stage:
         return keys.causes()
 
     def tree(self, body: str) -> py_trees.trees.BehaviourTree:
-        """The tree of this XML element, set up."""
+        """The tree of this XML element, set up; unchecked: a test may write the keys that a leaf needs."""
         path = self.folder / "tree.xml"
         path.write_text(f'<root main_tree_to_execute="M"><BehaviorTree ID="M">{body}</BehaviorTree></root>')
-        tree = py_trees.trees.BehaviourTree(load_tree(path, LEAVES))
+        tree = py_trees.trees.BehaviourTree(parse_behaviour_tree_xml(str(path), node_registry=dict(LEAVES)))
         tree.setup(services=self.services)
         return tree
 

@@ -7,15 +7,17 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from regrasp.behaviors.cable.services import CableServices
-from regrasp.sim.cable.ground_truth import CableTruth
-from regrasp.sim.cable.objects import CableObjects
 
 from regrasp.app.task.expectation import Expectation
 from regrasp.app.task.judge import Judge, at_most
 from regrasp.app.tasks.cable.expectations import EndState, Expect
+from regrasp.behaviors.cable.keys import FOUND, NOTICES
+from regrasp.behaviors.cable.services import CableServices
+from regrasp.behaviors.keys import value_of
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.wall_time import counts_as
+from regrasp.sim.cable.ground_truth import CableTruth
+from regrasp.sim.cable.objects import CableObjects
 from regrasp.sim.cable.phase import ConditionTimer, PhaseParameters
 from regrasp.sim.world import World
 
@@ -64,9 +66,10 @@ class CableJudge(Judge[Expect]):
         services: CableServices,
         expect: Expect,
         parameters: JudgeParameters = JudgeParameters(),
+        truth: CableTruth | None = None,
     ) -> None:
         super().__init__(world, services, expect)
-        self._truth, self._parameters = CableTruth(world), parameters
+        self._truth, self._parameters = truth or CableTruth(world), parameters
         self._cable = world.objects.cell.known.cable
         self._was_held = False
         self._held = ConditionTimer()  # both pads touch it
@@ -81,7 +84,7 @@ class CableJudge(Judge[Expect]):
     @counts_as("record")
     def observe(self, now: float) -> None:
         """Update with the ground truth after a tick at second `now`."""
-        self.found_by = self.found_by or self.services.belief.found_by
+        self.found_by = self.found_by or _found_by()
         if self._truth.held():
             self._watch_hold(now)
             return
@@ -114,7 +117,7 @@ class CableJudge(Judge[Expect]):
         """
         slips = []
         for released, end in pairwise([*self.losses, float("inf")]):
-            notice = next((n for n in self.services.belief.notices if released <= n.at < end), None)
+            notice = next((n for n in value_of(NOTICES) if released <= n.at < end), None)
             slips.append(Slip(released, notice.at if notice else None, notice.by if notice else None))
         return tuple(slips)
 
@@ -158,3 +161,9 @@ class CableJudge(Judge[Expect]):
         delays = [None if s.detected_at is None else s.detected_at - s.released_at for s in self.slips()]
         known = [delay for delay in delays if delay is not None]
         return max(known, default=0.0) if len(known) == len(delays) else None
+
+
+def _found_by() -> str | None:
+    """The camera that found the connector last, None while it is not found."""
+    found = value_of(FOUND, None)
+    return None if found is None else found.camera

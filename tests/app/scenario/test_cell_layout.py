@@ -7,16 +7,17 @@ import numpy as np
 import pybullet as p
 import pytest
 import yaml
-from regrasp.sim.cable.objects import cable_world
 
 from regrasp.app.files.findings import Findings
 from regrasp.app.files.overrides import parse_overrides
 from regrasp.app.files.resources import shipped
 from regrasp.app.scenario.cell_file import load_cell
 from regrasp.app.scenario.load import load_scenario
+from regrasp.app.tasks.cable.cells import cable_cell
 from regrasp.app.tasks.cable.placement import cable_at_start
 from regrasp.interfaces.cable.cell import CableCell
 from regrasp.interfaces.scene import GRAVITIES, Gravity
+from regrasp.sim.cable.objects import cable_world
 
 
 def findings(*overrides: str, scenario: str = "no_obstacle") -> list[str]:
@@ -131,8 +132,8 @@ def test_who_only_looks_at_pictures_may_have_a_cell_that_cannot_work() -> None:
     high, wrong = parse_overrides(["known.cable.clip.seat=[0.4,0.1,3.0]"])
     assert not wrong
     with pytest.raises(Findings):
-        load_cell(path, high)
-    assert load_cell(path, high, laid_out=False).known.cable.clip.seat == (0.4, 0.1, 3.0)
+        cable_cell(path, high)
+    assert cable_cell(path, high, laid_out=False).known.cable.clip.seat == (0.4, 0.1, 3.0)
     misnamed, _ = parse_overrides(["known.plugged_into=nowhere"])
     with pytest.raises(Findings, match="nowhere"):
         load_cell(path, misnamed, laid_out=False)

@@ -11,6 +11,7 @@ from regrasp.app.files.findings import Findings
 from regrasp.app.records.reader import read_record
 from regrasp.app.scenario.load import cases, load_scenario
 from regrasp.app.scenario.old_words import OldWordWarning, migrated
+from regrasp.app.tasks.cable.expectations import Expect
 
 OLD = """\
 description: old    # a remark
@@ -37,6 +38,7 @@ def test_an_old_word_is_read_with_a_warning_that_shows_the_new_one(
     Path("mine.yaml").write_text(f"{HEAD}expect: {{outcome: {old}}}\n")
     with pytest.warns(OldWordWarning, match=f"^mine.yaml:5: expect.outcome: {old} .* write outcome: {outcome}, as"):
         expect = load_scenario("mine.yaml").file.expect
+    assert isinstance(expect, Expect)
     assert (expect.outcome, expect.end_state) == (outcome, end)
 
 

@@ -15,6 +15,7 @@ from regrasp.app.scenario.load import load_scenario
 from regrasp.app.scenario.references import tree_text
 from regrasp.behaviors.cable.unplug import Unplug
 from regrasp.interfaces.cable.cause import CableCause
+from regrasp.interfaces.cable.cell import CableCell
 
 ARMS = 1 + shipped("cell")["thesis"].read_text().splitlines().index("  arms:")  # the line of that key
 METRES = "expected a number in metres, such as 0.3"
@@ -53,14 +54,15 @@ def test_a_scenario_brings_its_cell_and_tree(scenario: Path) -> None:
     loaded = load_scenario("mine.yaml")
     assert (loaded.name, loaded.tree) == ("mine", Path("tree.xml"))
     assert loaded.file.obstacles[0].position_in("zero") == (0.30, 0.14, 0.16)
-    assert loaded.file.faults[0].when.carried == (0.3, 0.8)
+    assert loaded.file.faults[0].when.model_dump()["carried"] == (0.3, 0.8)
+    assert isinstance(loaded.cell, CableCell)
     assert loaded.cell.known.cable.plugged_into == "back_4"
 
 
 def test_what_is_left_out_has_its_default(scenario: Path) -> None:
     scenario.write_text("description: bare\ncell: thesis\ntree: tree.xml\ngravity: earth\n")
     file = load_scenario("mine.yaml").file
-    assert (file.obstacles, file.faults, file.expect.outcome, file.expect.slips) == ((), (), "success", None)
+    assert (file.obstacles, file.faults, file.expect.outcome, file.expect.cause) == ((), (), "success", None)
     assert (file.limits.sim_seconds, file.inputs, file.seed) == (600.0, {}, 0)
 
 
@@ -80,7 +82,8 @@ def test_overrides_change_scenario_and_cell(scenario: Path) -> None:
     assert loaded.file.gravity == "earth"
     assert loaded.file.obstacles[0].size == (0.1, 0.1, 0.1)
     assert loaded.inputs == {"tries": "2"}
-    assert loaded.file.expect.cause == CableCause.SEARCH_EXHAUSTED
+    assert str(loaded.file.expect.cause) == CableCause.SEARCH_EXHAUSTED
+    assert isinstance(loaded.cell, CableCell)
     assert loaded.cell.hidden.errors.arm_tool == 0
     # Socket 0 is the anchor that the others are aliases of: an override holds for the one item that it names.
     assert [s.depth for s in loaded.cell.known.cable.sockets] == [0.02, 0.015, 0.015, 0.015, 0.015]

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from py_trees.common import Status
 from scipy.spatial.transform import RigidTransform
 
+from regrasp.behaviors.cable.keys import Found
 from regrasp.interfaces.cable.cause import CableCause
 from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.cause import CauseCode
@@ -57,7 +58,7 @@ def test_a_frame_from_before_does_not_count(stage: Stage) -> None:
 
 
 def test_room_is_made_with_the_eye_open_the_jaw_open_first_and_straight_back(stage: Stage) -> None:
-    stage.belief.connector, stage.belief.found_by = RigidTransform.identity(), "wrist"
+    stage.belief.found = Found(RigidTransform.identity(), whole=True, camera="wrist")
     assert stage.run(stage.tree(ROOM), 5.0) is Status.SUCCESS
     [(hand, way)] = stage.motion.shifts
     assert hand == "right"
@@ -67,8 +68,7 @@ def test_room_is_made_with_the_eye_open_the_jaw_open_first_and_straight_back(sta
     assert goals == pytest.approx(np.array([stage.known.arm("right").sleep]))
     assert len(stage.perception.looks) >= 4
     assert [word for word, _ in stage.motion.grippers["right"].told] == ["open"]
-    assert stage.services.belief.connector is None
-    assert stage.services.belief.found_by is None
+    assert stage.belief.found is None
 
 
 def test_a_way_that_cannot_be_found_is_the_leaf_s_cause(stage: Stage) -> None:

@@ -56,9 +56,9 @@ def test_it_begins_where_the_end_was_last_seen_and_ends_with_the_find(stage: Sta
     assert stage.run(stage.tree(search(300)), 60.0) is Status.SUCCESS
     assert len(stage.motion.moves) == 2
     assert [eye(stage, i) for i in range(2)] == [pytest.approx(p) for p in expected]
-    assert stage.belief.found_by == "wrist"
-    assert stage.belief.connector is not None
-    assert stage.belief.connector.translation == pytest.approx(PLACE, abs=1e-3)
+    assert stage.belief.found is not None
+    assert stage.belief.found.camera == "wrist"
+    assert stage.belief.found.world_from_connector.translation == pytest.approx(PLACE, abs=1e-3)
     [found] = stage.log.of("found")
     assert (found["looked"], found["skipped"]) == (2, [])
 
@@ -75,7 +75,7 @@ def test_an_end_never_seen_is_sought_from_the_panel_s_middle(known: CableKnown, 
 def test_a_glimpse_is_no_find(stage: Stage) -> None:
     stage.perception.shows = lambda _, t: seen(t, PLACE, "wrist") if 0.6 <= t < 0.73 else unseen(t)  # two frames
     assert stage.run(stage.tree(search(10)), 60.0) is Status.FAILURE
-    assert stage.belief.connector is None
+    assert stage.belief.found is None
 
 
 def test_what_shows_too_little_is_looked_at_next(stage: Stage) -> None:
@@ -91,8 +91,8 @@ def test_what_shows_too_little_is_looked_at_next(stage: Stage) -> None:
     assert len(stage.motion.moves) == 2
     assert eye(stage, 0) == pytest.approx(first)
     assert np.linalg.norm(eye(stage, 1) - place) == pytest.approx(SPIRAL.distance)
-    assert stage.belief.connector is not None
-    assert stage.belief.connector.translation == pytest.approx(place, abs=1e-3)
+    assert stage.belief.found is not None
+    assert stage.belief.found.world_from_connector.translation == pytest.approx(place, abs=1e-3)
 
 
 def test_stops_out_of_reach_are_skipped_and_counted(stage: Stage) -> None:
@@ -128,7 +128,7 @@ def test_it_ends_at_its_time_limit_with_the_arm_asleep(stage: Stage) -> None:
     assert goals == pytest.approx(np.array([stage.known.arm("left").sleep]))
     [cause] = stage.causes
     assert cause.code is CableCause.SEARCH_EXHAUSTED
-    assert stage.belief.connector is None
+    assert stage.belief.found is None
 
 
 def test_stopped_midway_it_stops_looking(stage: Stage) -> None:

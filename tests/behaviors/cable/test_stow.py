@@ -53,4 +53,4 @@ def test_letting_go_opens_the_jaw_and_believes_nothing_held(stage: Stage) -> Non
     stage.run(tree, 0.2)
     assert stage.motion.grippers["right"].told[0][0] == "open"
     assert not stage.motion.moves  # the arm waits until the jaw is open
-    assert stage.services.belief.held is None
+    assert stage.belief.held is None

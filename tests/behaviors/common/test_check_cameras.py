@@ -20,16 +20,17 @@ def stage(known: CableKnown, tmp_path: Path) -> Stage:
 def test_an_end_in_sight_is_found_without_a_search(stage: Stage) -> None:
     stage.perception.shows = lambda _, t: seen(t, PLACE)
     assert stage.run(stage.tree(CHECK), 5.0) is Status.SUCCESS
-    assert stage.belief.connector is not None
-    assert stage.belief.connector.translation == pytest.approx(PLACE, abs=1e-3)
-    assert (stage.belief.found_by, stage.belief.sure) == ("rear", True)
+    assert stage.belief.found is not None
+    assert stage.belief.found.world_from_connector.translation == pytest.approx(PLACE, abs=1e-3)
+    assert (stage.belief.found.camera, stage.belief.found.whole) == ("rear", True)
     assert stage.clock.t == pytest.approx(1.5, abs=0.06)
 
 
 def test_a_part_in_sight_is_found_but_not_sure(stage: Stage) -> None:
     stage.perception.shows = lambda _, t: seen(t, PLACE, whole=False)
     assert stage.run(stage.tree(CHECK), 5.0) is Status.SUCCESS
-    assert not stage.belief.sure
+    assert stage.belief.found is not None
+    assert not stage.belief.found.whole
 
 
 def frozen(_camera: str, _stamp: float) -> Seen:
@@ -52,5 +53,4 @@ def test_an_end_that_is_not_there_not_fresh_or_not_live_must_be_searched(stage: 
     [cause] = stage.causes
     assert cause.code is CableCause.CONNECTOR_NOT_FOUND
     assert why in cause.message
-    assert stage.belief.connector is None
-    assert stage.belief.found_by is None
+    assert stage.belief.found is None

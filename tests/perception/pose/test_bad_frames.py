@@ -15,7 +15,7 @@ from raycast import REAR_POSE, RED
 from scene import LEFTWARDS, PLACE, REAR, blocks, plug, seen
 
 from regrasp.app.files.resources import shipped
-from regrasp.app.scenario.cell_file import load_cell
+from regrasp.app.tasks.cable.cells import cable_cell
 from regrasp.app.tasks.cable.studies.pose.trial import CELL_OF_TECHNIQUE
 from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.frame import RgbdFrame
@@ -77,7 +77,7 @@ def whole(known: CableKnown) -> RgbdFrame:
 def technique(request: pytest.FixtureRequest) -> Technique:
     """Each in a cell that it can work in."""
     return make_technique(
-        request.param, load_cell(shipped("cell")[CELL_OF_TECHNIQUE.get(request.param, "thesis")]).known
+        request.param, cable_cell(shipped("cell")[CELL_OF_TECHNIQUE.get(request.param, "thesis")]).known
     )
 
 

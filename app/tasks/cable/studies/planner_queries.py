@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from regrasp.interfaces.arrays import FloatArray
-from regrasp.interfaces.cable.cell import PLUGGED_INTO
+from regrasp.interfaces.cable.cell import PLUGGED_INTO, CableKnown
 from regrasp.interfaces.cell import WristMount
 from regrasp.interfaces.scene import Obstacle
 from regrasp.motion.failure import PlanningError
@@ -100,8 +100,8 @@ def _viewing(
     scene: PlanningScene, arm: str, lost: Sequence[RigidTransform], parameters: QueryParameters
 ) -> Iterator[FloatArray]:
     """Joints (6,) rad at viewpoints of the search for the lost ends, and of closer looks at them."""
-    rear, mount = scene.known.camera("rear"), scene.known.camera("wrist").mount
-    assert isinstance(mount, WristMount)
+    known = _with_cable(scene)
+    rear, mount = known.camera(known.cable.overview), known.search_mount
     assert not isinstance(rear.mount, WristMount)
     model, size = scene.model(arm), SpiralParameters(distance=parameters.search_distance)
     for end in lost:
@@ -117,17 +117,23 @@ def _grasping(
     scene: PlanningScene, arm: str, lost: Sequence[RigidTransform], parameters: QueryParameters
 ) -> Iterator[FloatArray]:
     """Joints (6,) rad before grasps of a connector in the socket, in the clip, and where it was lost."""
-    connector = scene.known.cable.connector
-    plug = scene.known.cable.socket(PLUGGED_INTO).world_from_plug(connector.length)
+    cable = _with_cable(scene).cable
+    connector = cable.connector
+    plug = cable.socket(PLUGGED_INTO).world_from_plug(connector.length)
     sleep = np.array(scene.known.arm(arm).sleep)
-    model, near = scene.model(arm), scene.model(arm, clip=False)
-    for pose in (plug, scene.known.cable.clip.world_from_seat, *lost):
+    model, near = scene.model(arm), scene.model(arm, without=cable.clip.bracket)
+    for pose in (plug, cable.clip.world_from_seat, *lost):
         try:
             grasps = pick_candidates(pose, connector, 0.0)
             paths = find_approaches(model, near, sleep, grasps, parameters.clearances)
         except PlanningError:  # none from which this one can be reached
             continue
         yield from (path[0] for path in paths[: parameters.standoffs])
+
+
+def _with_cable(scene: PlanningScene) -> CableKnown:
+    assert isinstance(scene.known, CableKnown)
+    return scene.known
 
 
 def _surface(obstacle: Obstacle, voxel: float) -> FloatArray:

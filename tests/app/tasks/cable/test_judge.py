@@ -1,13 +1,19 @@
 from dataclasses import dataclass, field
+from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from py_trees.blackboard import Blackboard
+from scipy.spatial.transform import RigidTransform
 
 from regrasp.app.tasks.cable.expectations import Expect, PoseError
-from regrasp.behaviors.services import Belief, LossNotice
+from regrasp.app.tasks.cable.judge import CableJudge
+from regrasp.behaviors.cable.keys import FOUND, NOTICES, Found, LossNotice
+from regrasp.behaviors.keys import put, value_of
 from regrasp.interfaces.cause import CauseCode
+from regrasp.sim.cable.ground_truth import CableTruth
 from regrasp.sim.cable.phase import PhaseParameters
 
 TICK = 0.05
@@ -60,11 +66,24 @@ class Run:
 
     expect: Expect = field(default_factory=Expect)
     truth: Truth = field(default_factory=Truth)
-    belief: Belief = field(default_factory=Belief)
     tick: int = 0
 
     def __post_init__(self) -> None:
-        self.judge = Judge(cast(GroundTruth, self.truth), self.expect)
+        Blackboard.clear()
+        cable = SimpleNamespace(overview="rear", search="wrist")
+        cell = SimpleNamespace(known=SimpleNamespace(cable=cable))
+        world = SimpleNamespace(
+            objects=SimpleNamespace(cell=cell), now=lambda: (self.tick - 1) * TICK, contact_peaks=self.truth.peaks
+        )
+        self.judge = CableJudge(cast(Any, world), cast(Any, None), self.expect, truth=cast(CableTruth, self.truth))
+
+    def notice(self, *notices: LossNotice) -> None:
+        """Let the robot notice these losses."""
+        put(NOTICES, (*value_of(NOTICES), *notices))
+
+    def find(self, camera: str) -> None:
+        """Let the robot find the connector by that camera."""
+        put(FOUND, Found(RigidTransform.identity(), whole=True, camera=camera))
 
     def go(self, seconds: float, **truth: Any) -> float:
         """Let the truth be so for so long; the second at which that began."""
@@ -72,12 +91,12 @@ class Run:
             setattr(self.truth, name, value)
         begin = self.tick * TICK
         for _ in range(round(seconds / TICK)):
-            self.judge.observe(self.tick * TICK, self.belief)
+            self.judge.observe(self.tick * TICK)
             self.tick += 1
         return begin
 
     def verdict(self, name: str, outcome: str = "success", cause: str | None = None) -> tuple[bool, Any]:
-        [found] = [e for e in self.judge.expectations(outcome, cause, self.belief) if e.name == name]
+        [found] = [e for e in self.judge.expectations(outcome, cause) if e.name == name]
         return found.met, found.value
 
 
@@ -108,7 +127,7 @@ def test_an_end_that_slides_out_of_the_jaw_is_being_lost_before_the_pads_let_go(
     slides = run.go(0.2, in_hand=0.01)
     run.go(1.0, fingers=0)
     assert run.judge.losses == [pytest.approx(slides)]
-    run.belief.notices.append(LossNotice(slides + 0.1, "gap"))
+    run.notice(LossNotice(slides + 0.1, "gap"))
     assert run.verdict("slips") == (True, 1)
     assert run.verdict("detection_delay") == (True, pytest.approx(0.1))
 
@@ -131,7 +150,7 @@ def test_what_slid_and_was_held_fast_again_is_lost_only_later() -> None:
 def test_a_false_alarm_is_no_notice_of_the_loss_that_it_brings_about() -> None:
     run = Run(Expect(slips=1))
     alarm = run.go(0.2, fingers=2)
-    run.belief.notices.append(LossNotice(alarm + 0.1, "gap"))
+    run.notice(LossNotice(alarm + 0.1, "gap"))
     run.go(1.0, fingers=0)  # the robot opens its jaw
     assert run.verdict("slips") == (False, 0)
 
@@ -159,12 +178,12 @@ def test_each_loss_has_the_first_notice_before_the_next() -> None:
     first = run.go(1.0, fingers=0)
     run.go(1.0, fingers=2)
     second = run.go(1.0, fingers=0)
-    run.belief.notices += [
+    run.notice(
         LossNotice(0.5, "distance"),
         LossNotice(first + 0.2, "gap"),
         LossNotice(first + 0.4, "place"),
-    ]
-    one, two = run.judge.slips(run.belief)
+    )
+    one, two = run.judge.slips()
     assert (one.released_at, one.detected_at) == pytest.approx((first, first + 0.2))
     assert one.detected_by == "gap"
     assert two.released_at == pytest.approx(second)
@@ -178,7 +197,7 @@ def test_slips_are_met_when_every_loss_was_noticed_and_there_were_enough() -> No
     run.go(1.0, fingers=2)
     lost = run.go(1.0, fingers=0)
     assert run.verdict("slips") == (False, 0)
-    run.belief.notices.append(LossNotice(lost + 0.3, "gap"))
+    run.notice(LossNotice(lost + 0.3, "gap"))
     assert run.verdict("slips") == (True, 1)
     run.go(1.0, fingers=2)
     run.go(1.0, fingers=0)  # a second one, unnoticed
@@ -195,9 +214,9 @@ def test_hidden_is_an_empty_mask_once_settled_and_a_find_by_the_wrist_camera() -
     run = Run(Expect(hidden=True))
     lost_and_settled(run, pixels=0)
     assert run.verdict("hidden") == (False, False)  # nobody found it yet
-    run.belief.found_by = "wrist"
+    run.find("wrist")
     run.go(1.0, pixels=900)  # what the arm does to it afterwards does not matter
-    run.belief.found_by = "rear"
+    run.find("rear")
     run.go(1.0)
     assert run.verdict("hidden") == (True, True)
 
@@ -206,7 +225,7 @@ def test_hidden_is_an_empty_mask_once_settled_and_a_find_by_the_wrist_camera() -
 def test_an_end_in_sight_or_found_by_the_rear_camera_was_not_hidden(pixels: int, by: str) -> None:
     run = Run(Expect(hidden=True))
     lost_and_settled(run, pixels)
-    run.belief.found_by = by
+    run.find(by)
     run.go(0.1)
     assert run.verdict("hidden") == (False, False)
 
@@ -240,8 +259,8 @@ def test_the_largest_unintended_force_counts(peaks: dict[str, float], met: bool)
 
 def test_what_is_not_expected_is_not_judged() -> None:
     failing = Run(Expect(outcome="failure"))
-    assert [e.name for e in failing.judge.expectations("failure", None, Belief())] == ["outcome"]
-    assert [e.name for e in Run().judge.expectations("success", None, Belief())] == ["outcome", "end"]
+    assert [e.name for e in failing.judge.expectations("failure", None)] == ["outcome"]
+    assert [e.name for e in Run().judge.expectations("success", None)] == ["outcome", "end"]
 
 
 def test_the_last_second_counts_against_a_time_limit() -> None:
@@ -271,7 +290,7 @@ def test_the_longest_delay_counts_and_an_unseen_loss_is_too_late() -> None:
         run.go(1.0, fingers=2)
         lost = run.go(1.0, fingers=0)
         assert run.verdict("detection_delay") == (False, None)
-        run.belief.notices.append(LossNotice(lost + delay, "gap"))
+        run.notice(LossNotice(lost + delay, "gap"))
         assert run.verdict("detection_delay") == (met, pytest.approx(delay))
 
 
@@ -279,7 +298,5 @@ def test_the_end_s_place_and_axis_in_the_clip_are_judged_apart() -> None:
     run = Run(Expect(pose_error=PoseError(position=0.002, angle_deg=1.0)))
     assert run.verdict("pose_error.position") == (True, 0.002)
     assert run.verdict("pose_error.angle_deg") == (False, 1.5)
-    names = [
-        e.name for e in Run(Expect(pose_error=PoseError(angle_deg=2.0))).judge.expectations("success", None, Belief())
-    ]
+    names = [e.name for e in Run(Expect(pose_error=PoseError(angle_deg=2.0))).judge.expectations("success", None)]
     assert names == ["outcome", "end", "pose_error.angle_deg"]

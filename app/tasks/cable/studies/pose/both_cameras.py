@@ -1,17 +1,20 @@
 """The pose study with both cameras: after the rear camera, the wrist camera looks from the best view."""
 
 from dataclasses import replace
+from typing import ClassVar
 
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.app.tasks.cable.studies.pose.grasp import grasp, run_leaf, services_of
 from regrasp.app.tasks.cable.studies.pose.scenes import StudyScene
 from regrasp.app.tasks.cable.studies.pose.trial import MeanEstimate, Setup, Trial, mean_estimate, rear_mean, with_errors
-from regrasp.behaviors.cable.hand import CAMERA_ARM
+from regrasp.behaviors.cable.keys import FOUND, Found
 from regrasp.behaviors.cable.look import LookLeaf
+from regrasp.behaviors.cable.services import CableServices
 from regrasp.behaviors.common.start_up import StartUp
+from regrasp.behaviors.keys import Keys, put
 from regrasp.behaviors.leaf import LeafSteps
-from regrasp.behaviors.services import Services
+from regrasp.motion.cable.service import CableMotion
 from regrasp.perception.pose.fusion import fuse
 from regrasp.perception.pose.technique import Technique
 
@@ -21,14 +24,13 @@ BOTH = "both cameras"  # follows the technique's name in a row's title
 class BestView(LookLeaf):
     """Moves the wrist camera to the best view of the connector's estimated pose."""
 
+    NEEDS: ClassVar[Keys] = (FOUND,)
     settle_seconds = 0.5  # simulated, until the arm no longer swings
 
     def steps(self) -> LeafSteps:
         """See the class."""
-        connector = self.services.belief.connector
-        assert connector is not None
-        _, goals = self.best_view(connector)
-        yield self.services.motion.move(CAMERA_ARM, goals, margin=self.view.margin, tight=False)
+        motion = self.services.motion
+        yield motion.go_to_view(motion.best_view(self.read(FOUND).world_from_connector))
         yield from self.wait(self.settle_seconds)
 
 
@@ -37,7 +39,7 @@ class PutAway(LookLeaf):
 
     def steps(self) -> LeafSteps:
         """See the class."""
-        yield from self.go_to_sleep(CAMERA_ARM)
+        yield from self.go_to_sleep(self.search_arm)
 
 
 def run_both(setup: Setup, configuration: str, seed: int) -> list[Trial]:
@@ -63,15 +65,16 @@ def _trial(setup: Setup, configuration: str, seed: int, name: str) -> Trial:
 
 
 def _fused_pose(
-    setup: Setup, scene: StudyScene, services: Services, technique: Technique, rear: MeanEstimate
+    setup: Setup, scene: StudyScene, services: CableServices, technique: Technique, rear: MeanEstimate
 ) -> tuple[RigidTransform, str]:
     """world_from_connector by both cameras and ''; or the rear camera's alone, and why."""
     assert rear.world_from_connector is not None
-    services.belief.connector = rear.world_from_connector
+    put(FOUND, Found(rear.world_from_connector, whole=True, camera=services.known.cable.overview))
     why = run_leaf(scene, services, StartUp(name="start_up")) or run_leaf(scene, services, BestView(name="best_view"))
     if why:
         return rear.world_from_connector, why
     frames = list(scene.frames(round(setup.parameters.mean_seconds * scene.world.cameras["wrist"].spec.rate), "wrist"))
+    assert isinstance(services.motion, CableMotion)
     pose = services.motion.camera_pose(frames[0])
     wrist = mean_estimate(technique, frames, pose, scene.truth.connector_pose(), setup.parameters)
     if not wrist.estimates:

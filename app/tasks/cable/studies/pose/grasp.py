@@ -7,13 +7,14 @@ import structlog
 from py_trees.common import Status
 from scipy.spatial.transform import RigidTransform
 
-from regrasp.app.run.compose import build_services
+from regrasp.app.tasks.cable.services import cable_services
 from regrasp.app.tasks.cable.studies.pose.scenes import StudyScene
-from regrasp.behaviors.cable.hand import HANDLING_ARM
+from regrasp.behaviors.cable.keys import FOUND, Found
 from regrasp.behaviors.cable.regrasp import Regrasp
+from regrasp.behaviors.cable.services import CableServices
 from regrasp.behaviors.common.start_up import StartUp
+from regrasp.behaviors.keys import causes, put
 from regrasp.behaviors.leaf import Leaf
-from regrasp.behaviors.services import Services
 from regrasp.interfaces.devices import TICK
 from regrasp.motion.failure import PlanningError
 
@@ -29,16 +30,16 @@ class GraspTrialParameters:
     hold_seconds: float = 2.0  # simulated, with both pads on the connector; choice
 
 
-def services_of(scene: StudyScene) -> Services:
+def services_of(scene: StudyScene) -> CableServices:
     """A robot in the scene, which has looked at nothing yet; its cameras show the scene as it is."""
     scene.world.advance(FRESH)
     silent = structlog.make_filtering_bound_logger(logging.CRITICAL)
-    return build_services(scene.world, scene.seed, structlog.wrap_logger(None, wrapper_class=silent))
+    return cable_services(scene.world, scene.seed, structlog.wrap_logger(None, wrapper_class=silent))
 
 
 def grasp(
     scene: StudyScene,
-    services: Services,
+    services: CableServices,
     pose: RigidTransform,
     parameters: GraspTrialParameters = GraspTrialParameters(),
 ) -> str:
@@ -47,12 +48,12 @@ def grasp(
     `pose` is the estimated world_from_connector. The connector counts as grasped when, by ground truth, it is held and
     followed the arm back. The scene's objects move.
     """
-    services.belief.connector = pose
+    put(FOUND, Found(pose, whole=True, camera=services.known.cable.overview))
     why = run_leaf(scene, services, StartUp(name="start_up")) or run_leaf(scene, services, Regrasp(name="regrasp"))
     return why or _pull_out(services, scene, parameters)
 
 
-def run_leaf(scene: StudyScene, services: Services, leaf: Leaf) -> str:
+def run_leaf(scene: StudyScene, services: CableServices, leaf: Leaf) -> str:
     """Tick a leaf to its end while the world runs: '' if it succeeds, else why it failed."""
     leaf.setup(services=services)
     leaf.tick_once()
@@ -61,16 +62,16 @@ def run_leaf(scene: StudyScene, services: Services, leaf: Leaf) -> str:
         leaf.tick_once()
     if leaf.status is Status.SUCCESS:
         return ""
-    cause = services.belief.causes[-1]
+    cause = causes()[-1]
     return f"{cause.code}: {cause.message}"
 
 
-def _pull_out(services: Services, scene: StudyScene, parameters: GraspTrialParameters) -> str:
+def _pull_out(services: CableServices, scene: StudyScene, parameters: GraspTrialParameters) -> str:
     """Draw the closed jaw straight back: '' if the connector follows and stays held, else what went wrong."""
-    motion, truth = services.motion, scene.truth
+    motion, truth, hand = services.motion, scene.truth, services.known.cable.hand
     start = truth.connector_pose().translation
-    back = motion.tool(HANDLING_ARM).rotation.apply([-parameters.retreat, 0.0, 0.0])
-    task = motion.shift(HANDLING_ARM, back, checked=False)
+    back = motion.tool(hand).rotation.apply([-parameters.retreat, 0.0, 0.0])
+    task = motion.shift(hand, back, checked=False)
     try:
         while not task.poll():
             scene.world.advance(TICK)

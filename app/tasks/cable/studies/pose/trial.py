@@ -68,7 +68,7 @@ class MeanEstimate:
 
 def technique_named(name: str, known: CableKnown) -> Technique:
     """A new technique. Raises ValueError where it cannot work in that cell."""
-    return make_technique(name, known)  # type: ignore[arg-type]  # names come checked from the command line
+    return make_technique(name, known)
 
 
 @dataclass(frozen=True)
