@@ -63,6 +63,11 @@ class Motion(PlanningScene):
         self.execution = Execution(arms, grippers, clock, known.latencies.plan, parameters.execution, on_anomaly)
         self._clock, self._seed = clock, seed
 
+    def warm_up(self) -> None:
+        """Load the compiled functions of a collision check now, so that no tick waits for it."""
+        for arm in self.arms:
+            self.model(arm).free(self.joints(arm), 0.0)
+
     def move(self, arm: str, goals: FloatArray, *, margin: float | None = None, tight: bool = True) -> MotionTask:
         """Plan a path to one of the goals (n, 6) rad and follow it, `margin` m from everything (default: as set).
 

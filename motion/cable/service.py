@@ -10,25 +10,23 @@ from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cable.cell import CableKnown
-from regrasp.interfaces.cable.motion import Grip, View, Viewpoint
+from regrasp.interfaces.cable.motion import Grip
 from regrasp.interfaces.cause import CauseCode
-from regrasp.interfaces.cell import Box, FixedMount
+from regrasp.interfaces.cell import Box
 from regrasp.interfaces.devices import Arm, Clock, Gripper
 from regrasp.interfaces.task import Task
-from regrasp.interfaces.wall_time import counts_as
 from regrasp.motion.cable.cable_shape import cable_course, connector_points
 from regrasp.motion.cable.carry_paths import CarryPathParameters, can_continue, carry_paths, first_free
 from regrasp.motion.cable.held import connector_spheres
+from regrasp.motion.cable.search import SearchMotion, SearchMotionParameters
 from regrasp.motion.cable.seating import SeatingParameters, poses_before, seated_pose
-from regrasp.motion.cable.viewing import ViewingParameters, approached, outline, views_of
 from regrasp.motion.failure import PlanningError
 from regrasp.motion.grasping.approach import pick_candidates
 from regrasp.motion.grasping.gap_test import GripWatch
-from regrasp.motion.planning.viewpoints import closer_views, spiral
 from regrasp.motion.robots.spheres import JAW_OPENING
 from regrasp.motion.scene.collision import CollisionModel
 from regrasp.motion.scene.planning_scene import NO_POINTS
-from regrasp.motion.service import Motion, MotionParameters, PointCloudSource
+from regrasp.motion.service import PointCloudSource
 from regrasp.motion.task import MotionTask
 
 T = TypeVar("T")
@@ -46,7 +44,7 @@ class UnplugParameters:
 
 
 @dataclass(frozen=True)
-class CableMotionParameters(MotionParameters):
+class CableMotionParameters(SearchMotionParameters):
     """Those of every task, and of what is done with the cable."""
 
     connector_padding: float = 1.2  # radii of the spheres that cover a carried connector, in its own radii; choice
@@ -55,13 +53,11 @@ class CableMotionParameters(MotionParameters):
     unplug: UnplugParameters = field(default_factory=UnplugParameters)
     carry: CarryPathParameters = field(default_factory=CarryPathParameters)
     seating: SeatingParameters = field(default_factory=SeatingParameters)
-    viewing: ViewingParameters = field(default_factory=ViewingParameters)
 
 
-class CableMotion(Motion):
+class CableMotion(SearchMotion):
     """Requests to the arm that handles the cable, the hand, and to the one that carries the camera that searches."""
 
-    known: CableKnown
     parameters: CableMotionParameters
 
     def __init__(
@@ -75,7 +71,7 @@ class CableMotion(Motion):
         on_anomaly: Callable[[str], None] = lambda sentence: None,
     ) -> None:
         super().__init__(known, arms, grippers, clock, seed, parameters, on_anomaly)
-        self.hand, self.search_arm = known.cable.hand, known.search_mount.arm
+        self.hand = known.cable.hand
 
     def warm_up(self) -> None:
         """Look for a grasp of the plugged connector and drop it.
@@ -232,49 +228,6 @@ class CableMotion(Motion):
 
         return self._task(self.hand, steps())
 
-    def search_views(self, last_seen: FloatArray | None) -> tuple[FloatArray, Iterator[Viewpoint]]:
-        """Where a search begins, (3,) m in the world, and its viewpoints, the first first.
-
-        It begins where the connector was `last_seen` (3,) m; None: at the middle of a panel.
-        """
-        start, viewing = last_seen, self.parameters.viewing
-        if start is None:
-            start = np.array(next(box.center for box in self.known.boxes if box.name == viewing.start_at))
-        overview = self.known.camera(self.known.cable.overview)
-        assert isinstance(overview.mount, FixedMount)  # the cell's check
-        return start, spiral(start, overview.mount.world_from_camera, overview.intrinsics, viewing.spiral)
-
-    def view(self, world_from_camera: RigidTransform) -> View:
-        """The viewpoint, or one a little nearer or further, to which the camera that searches can be brought.
-
-        Raises PlanningError when there is none.
-        """
-        return self._first_view([world_from_camera])
-
-    def view_of(self, place: FloatArray, world_from_camera: RigidTransform) -> View:
-        """A view of a `place` (3,) m that was glimpsed from a camera. Raises PlanningError when there is none."""
-        return self._first_view(views_of(place, world_from_camera, self.parameters.viewing.spiral.distance))
-
-    @counts_as("planning")
-    def best_view(self, world_from_connector: RigidTransform, taken: Sequence[FloatArray] = ()) -> View:
-        """The best viewpoint that shows the whole connector, from another side than the lines of sight `taken` (3,).
-
-        Raises PlanningError when there is none.
-        """
-        viewing, model = self.parameters.viewing, self.model(self.search_arm)
-        points = outline(world_from_connector, self.known.cable.connector.length)
-        for pose in closer_views(world_from_connector, viewing.close_views):
-            sight = pose.rotation.apply([0.0, 0.0, 1.0])
-            if any(float(sight @ other) > viewing.max_cosine for other in taken):
-                continue
-            if self.sees(pose, points) and len(goals := self._view_goals(pose, model)):
-                return View(pose, goals)
-        raise PlanningError(CauseCode.OUT_OF_REACH, "no free place from which the whole connector shows")
-
-    def go_to_view(self, view: View) -> MotionTask:
-        """Bring the camera that searches to a view."""
-        return self.move(self.search_arm, view.joints, margin=self.parameters.viewing.margin, tight=False)
-
     def held_spheres(self, held: RigidTransform) -> FloatArray:
         """Spheres (n, 4) m in the tool frame that stand for a held connector (tool_from_connector); see `model`."""
         return connector_spheres(held, self.known.cable.connector, self.parameters.connector_padding)
@@ -298,21 +251,6 @@ class CableMotion(Motion):
             without=self.known.cable.clip.bracket,
             point_cloud=point_cloud,
         )
-
-    @counts_as("planning")
-    def _first_view(self, views: Sequence[RigidTransform]) -> View:
-        model = self.model(self.search_arm)
-        for pose in approached(views, self.parameters.viewing.approaches):
-            goals = self._view_goals(pose, model)
-            if len(goals):
-                return View(pose, goals)
-        raise PlanningError(CauseCode.OUT_OF_REACH, "no free place to look from")
-
-    def _view_goals(self, world_from_camera: RigidTransform, model: CollisionModel) -> FloatArray:
-        """Joints (n, 6) rad of the search arm that bring its camera there and are free in its `model`."""
-        mount, margin = self.known.search_mount, self.parameters.viewing.margin
-        views = self.kinematics[self.search_arm].ik_view(world_from_camera, mount.wrist_from_camera)
-        return np.array([q for q in views if model.free(q, margin)]).reshape(-1, 6)
 
     def _task(self, arm: str, steps: Generator[None, None, T] | Iterator[None]) -> Task[T]:
         """Steps that do other tasks of `arm`, as one. Each of those fails if the arm is out of order."""

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from regrasp.interfaces.arrays import FloatArray
-from regrasp.motion.planning.viewpoints import CloseViewParameters, SpiralParameters
+from regrasp.motion.cable.viewpoints import CloseViewParameters, SpiralParameters
 
 
 def _spiral_of_the_left_arm() -> SpiralParameters:

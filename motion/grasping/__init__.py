@@ -1,1 +1,1 @@
-"""Grasps of the connector, and approaches to them."""
+"""Grasps of a cylinder, approaches to them, and whether a jaw holds what it closed on."""

@@ -33,8 +33,7 @@ class FrameRule:
     def __init__(self, now: float, seconds: float, settle: float, later: bool) -> None:
         """See `watched`."""
         self.end = now + settle + seconds
-        # `later` measures back from the end, as it always has: the sum's rounding may take a frame of the very first
-        # moment in, and a run must stay what it was.
+        # `later` measures back from the end. The sum's rounding may let a frame of the very first moment in.
         self._since = float(np.nextafter(self.end - seconds, np.inf)) if later else now + settle
         self._stamps: set[float] = set()
 

@@ -10,9 +10,11 @@ from py_trees.common import Status
 from regrasp.behaviors.cable.recover import WaitUntilStill, WaitUntilStillParameters
 from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.cause import CauseCode, ServiceError
+from regrasp.interfaces.frame import Intrinsics, RgbdFrame
 from regrasp.motion.execution import GripParameters
 
 LEAF = '<{} name="leaf"/>'
+K = Intrinsics(4, 4, 4.0, 4.0, 1.5, 1.5)
 REAR, WRIST = "the rear camera is dark", "the wrist camera is frozen"
 
 
@@ -75,6 +77,22 @@ def test_a_start_without_the_rear_camera_is_no_start(stage: Stage) -> None:
     assert stage.run(stage.tree(LEAF.format("StartUp")), 5.0) is Status.FAILURE
     assert stage.causes[-1].code is CauseCode.CAMERA_FAILED
     assert stage.clock.t == pytest.approx(2.0, abs=0.11)
+
+
+def test_a_start_waits_for_every_fixed_camera(stage: Stage) -> None:
+    stage.perception.fixed_cameras = ("rear", "side")
+    still = RgbdFrame("rear", 1, 0.0, np.zeros((4, 4, 3), np.uint8), np.zeros((4, 4), np.float32), K)
+    stage.perception.frames = lambda t: still
+    stage.perception.troubles["side"] = "the side camera is dark"
+    tree = stage.tree(LEAF.format("StartUp"))
+    assert stage.run(tree, 1.0) is Status.RUNNING
+    assert stage.perception.looks == []
+    stage.perception.troubles.clear()
+    assert stage.run(tree, 1.0) is Status.SUCCESS
+    assert len(stage.perception.looks) == 1
+    stage.perception.troubles["side"] = "the side camera is dark"
+    assert stage.run(tree, 5.0) is Status.FAILURE
+    assert stage.belief.causes[-1].message == "the side camera is dark; nothing was mapped"
 
 
 def test_the_clip_is_looked_at_with_the_wrist_camera_when_the_rear_one_is_dark(stage: Stage) -> None:

@@ -3,13 +3,13 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from arm_surface import surface
-from fake_devices import TICK, FakeGripper, Rig
+from fake_devices import TICK, Clock, FakeArm, FakeGripper, Rig
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.cause import CauseCode
-from regrasp.interfaces.cell import pose_along
+from regrasp.interfaces.cell import KnownCell, pose_along
 from regrasp.interfaces.frame import Intrinsics, RgbdFrame
 from regrasp.motion.execution import ExecutionParameters, JawParameters
 from regrasp.motion.failure import PlanningError
@@ -304,3 +304,32 @@ def test_a_wrist_frame_is_placed_by_the_joints_at_its_exposure(rig: Rig) -> None
     assert np.linalg.norm(now.translation - then.translation) > 0.1
     rear = rig.motion.camera_pose(RgbdFrame("rear", 1, 0.0, rgb, depth, k))
     assert rear.translation == pytest.approx([-0.3556, 0.0, 0.4064])
+
+
+@pytest.mark.parametrize("names", [["only"], ["one", "two", "three"]])
+def test_there_may_be_one_arm_or_three(known: CableKnown, names: list[str]) -> None:
+    specs = tuple(
+        known.arms[0].model_copy(update={"name": n, "base": (0.0, 0.5 * i, 0.0)}) for i, n in enumerate(names)
+    )
+    cell = KnownCell(boxes=known.boxes, arms=specs, cameras=known.cameras[:1], latencies=known.latencies)
+    clock, remarks = Clock(), list[str]()
+    arms = {name: FakeArm(name, clock, np.array(specs[0].sleep)) for name in names}
+    motion = Motion(cell, arms, {name: FakeGripper(clock) for name in names}, clock, 0, on_anomaly=remarks.append)
+    task = motion.move(names[0], ASIDE[None])
+    while not task.poll():
+        clock.t += TICK
+    assert motion.joints(names[0]) == pytest.approx(ASIDE)
+    motion.set_obstacles(cube(np.array([0.3, 0.0, 0.6])), 0.01)
+    assert len(motion.spheres()) == len(names)
+    motion.stop()
+    assert [arm.stops for arm in arms.values()] == [1] * len(names)
+    assert not remarks
+
+
+def test_a_jaw_closes_on_a_thing_and_says_how_wide_it_holds(rig: Rig) -> None:
+    rig.grippers["left"].gap, rig.grippers["left"].inside = 0.05, 0.031
+    task = rig.motion.close("left", 0.03)
+    rig.run(task)
+    assert task.answer == 0.031
+    assert rig.clock.t == pytest.approx(1.0, abs=TICK)
+    assert rig.grippers["left"].told == [(0.0, "close", 40.0)]

@@ -6,10 +6,12 @@ from raycast import BLACK, PURPLE, REAR_POSE, WOOD, Block, Cylinder, Sensor, ren
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.cable.cell import CableKnown
+from regrasp.interfaces.cell import KnownCell
 from regrasp.interfaces.frame import Intrinsics, RgbdFrame
 from regrasp.perception.cable.service import CablePerception
 from regrasp.perception.mapping.occupancy import Spheres
 from regrasp.perception.pose.estimate import Estimate, NoEstimate
+from regrasp.perception.service import Perception
 
 PLACE = np.array([0.36, 0.02, 0.30])
 AXIS = np.array([0.1, 1.0, 0.1]) / np.sqrt(1.02)
@@ -159,3 +161,59 @@ def test_a_second_look_changes_the_map_only_for_a_new_thing(known: CableKnown) -
     eye.show(seen(FOAM, Block(FOAM.lower + aside, FOAM.upper + aside)), number=4, stamp=0.2)
     assert eyes.map_new_obstacle("rear") > 80
     assert len(eyes.occupancy.occupied_points()) > len(mapped) + 80
+
+
+def test_without_a_task_the_connector_is_an_obstacle_like_another(known: CableKnown) -> None:
+    cell = KnownCell(boxes=known.boxes, arms=known.arms, cameras=known.cameras, latencies=known.latencies)
+    eye = Eye()
+    eye.show(seen(replace(END, radius=0.03)), number=1, stamp=0.0)
+    eyes = Perception(cell, {"rear": eye}, Clock(), believed, list)
+    assert eyes.fixed_cameras == ("rear",)
+    found = eyes.look_around()
+    points, edge = eyes.obstacles()
+    assert len(points) == found
+    assert np.linalg.norm(points - PLACE, axis=1).min() < 0.04
+    assert edge == eyes.parameters.occupancy.voxel_size
+    spared = perception(known, eye)
+    spared.look_around()
+    assert len(spared.obstacles()[0]) < found
+
+
+def test_only_frames_from_its_beginning_on_tell_of_stillness(known: CableKnown) -> None:
+    eye = Eye()
+    watch = perception(known, eye).watch_stillness("rear")
+    assert watch.still() is None
+    frame = seen(END)
+    for number in range(-3, 16):
+        eye.show(frame, number=number, stamp=number / 15)
+        told = watch.still()
+        assert told is (True if number == 15 else None)
+
+
+def test_beside_a_connector_that_was_looked_at_a_guess_is_no_obstacle_and_a_surface_is(known: CableKnown) -> None:
+    eye = Eye()
+    eye.show(seen(FOAM), number=1, stamp=0.0)
+    eyes = perception(known, eye)
+    eyes.look_around()
+    points, edge = eyes.obstacles()
+    behind = RigidTransform.from_translation(np.add(FOAM.lower, [0.06, 0.06, 0.09]))
+    kept, same = eyes.obstacles_beside(behind)
+    surface = eyes.occupancy.occupied_points(guessed=False)
+    assert same == edge
+    assert {tuple(p) for p in surface.tolist()} <= {tuple(p) for p in kept.tolist()}
+    gone = {tuple(p) for p in points.tolist()} - {tuple(p) for p in kept.tolist()}
+    assert gone
+    half = 0.5 * known.cable.connector.length
+    assert all(np.linalg.norm(np.array(p) - behind.translation) < 0.05 + half for p in gone)
+
+
+def test_a_connector_in_the_clip_is_stowed(known: CableKnown) -> None:
+    eye = Eye()
+    eye.show(seen(END), number=1, stamp=0.0)
+    eyes = perception(known, eye)
+    found = eyes.look("rear")
+    assert isinstance(found, Estimate)
+    assert not eyes.stowed(found).detected
+    seat = np.array(known.cable.clip.seat)
+    assert eyes.stowed(replace(found, position=np.add(seat, [0.0, 0.0, 0.03]))).detected
+    assert eyes.slipped(RigidTransform.identity()) is None  # one frame alone does not show a camera that lives

@@ -26,10 +26,10 @@ from regrasp.interfaces.frame import RgbdFrame
 from regrasp.interfaces.reading import GripperReading
 from regrasp.interfaces.task import Task
 from regrasp.motion.cable.viewing import ViewingParameters, approached, views_of
+from regrasp.motion.cable.viewpoints import spiral
 from regrasp.motion.execution import Execution
 from regrasp.motion.failure import PlanningError
 from regrasp.motion.grasping.gap_test import GripWatch
-from regrasp.motion.planning.viewpoints import spiral
 from regrasp.perception.cable.in_hand import connector_axis, connector_in_hand
 from regrasp.perception.cable.watching import FrameRule, watched
 from regrasp.perception.pose.estimate import pose_covariance
@@ -98,7 +98,6 @@ class FakeMotion:
         self.shifts: list[tuple[str, Vector]] = []
         self.cancelled: list[str] = []
         self.stopped = 0
-        self.kept_clear: list[Vector] = []
         self.reachable: Callable[[RigidTransform], bool] = lambda pose: True
 
     def work(self, arm: str) -> Task[None]:
@@ -149,7 +148,7 @@ class FakeMotion:
         pass
 
     def keep_clear(self, points: Vector) -> None:
-        self.kept_clear.append(points)
+        pass
 
     def pick_plug(self, plug: RigidTransform, *, point_cloud: PointCloud | None = None) -> Task[None]:
         return self.work(self.known.cable.hand)

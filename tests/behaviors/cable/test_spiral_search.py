@@ -12,8 +12,8 @@ from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.cell import FixedMount
 from regrasp.motion.cable.viewing import ViewingParameters
+from regrasp.motion.cable.viewpoints import spiral
 from regrasp.motion.failure import PlanningError
-from regrasp.motion.planning.viewpoints import spiral
 from regrasp.perception.pose.estimate import Estimate, NoEstimate
 from regrasp.perception.pose.segmentation import NotSeen
 

@@ -1,4 +1,4 @@
-"""Viewpoints of the wrist camera for the search and for a closer look.
+"""Viewpoints of the camera on an arm for the search and for a closer look.
 
 The search is the thesis's spiral (Hwang 2024, section 3.4.3).
 """
@@ -30,7 +30,7 @@ class SpiralParameters:
     sub_spacing: float = 0.125  # m from a main point to its subpoints, across and up
     view_turn: float = np.pi / 6  # rad by which a subpoint's view turns towards its main point
     distance: float = 0.30  # m from the plane through the start; choice: the thesis leaves it out
-    rings: int = 8  # choice: 2 m, more than the rear camera sees
+    rings: int = 8  # choice: 2 m, more than the overview camera sees
 
 
 @dataclass(frozen=True)
@@ -45,20 +45,20 @@ class CloseViewParameters:
 
 def spiral(
     start: FloatArray,
-    world_from_rear: "RigidTransform",
-    rear: Intrinsics,
+    world_from_overview: "RigidTransform",
+    overview: Intrinsics,
     parameters: SpiralParameters = SpiralParameters(),
 ) -> Iterator[Viewpoint]:
     """Viewpoints of the search from `start` (3,) m in the world outwards.
 
     They look at the plane through the start that is parallel to the back panel. Every main point is viewed flat (along
-    world x) from `distance` metres, then from eight subpoints round it. Main points out of the rear camera's view are
+    world x) from `distance` metres, then from eight subpoints round it. Main points out of the overview's picture are
     left out and do not count.
     """
     main = 0
     for across, up in _square_spiral(parameters.rings):
         point = np.asarray(start, float) + parameters.spacing * (across * _RIGHT + up * _UP)
-        if not _in_view(point, world_from_rear, rear):
+        if not _in_view(point, world_from_overview, overview):
             continue
         for sub, (i, j) in enumerate(((0, 0), *_SUBPOINTS)):
             offset = parameters.sub_spacing * (i * _RIGHT + j * _UP)

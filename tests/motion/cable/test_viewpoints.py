@@ -8,7 +8,7 @@ from scipy.spatial.transform import RigidTransform
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.cell import Box, WristMount
-from regrasp.motion.planning.viewpoints import SpiralParameters, Viewpoint, spiral
+from regrasp.motion.cable.viewpoints import SpiralParameters, Viewpoint, spiral
 from regrasp.motion.robots.kinematics import ArmKinematics
 from regrasp.motion.scene.collision import ArmBody, CollisionModel
 

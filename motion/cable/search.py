@@ -1,0 +1,97 @@
+"""What the leaves ask of the arm that carries the camera that looks for a lost end."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.spatial.transform import RigidTransform
+
+from regrasp.interfaces.arrays import FloatArray
+from regrasp.interfaces.cable.cell import CableKnown
+from regrasp.interfaces.cable.motion import View, Viewpoint
+from regrasp.interfaces.cause import CauseCode
+from regrasp.interfaces.cell import FixedMount
+from regrasp.interfaces.wall_time import counts_as
+from regrasp.motion.cable.viewing import ViewingParameters, approached, outline, views_of
+from regrasp.motion.cable.viewpoints import closer_views, spiral
+from regrasp.motion.failure import PlanningError
+from regrasp.motion.scene.collision import CollisionModel
+from regrasp.motion.service import Motion, MotionParameters
+from regrasp.motion.task import MotionTask
+
+
+@dataclass(frozen=True)
+class SearchMotionParameters(MotionParameters):
+    """Those of every task, and of the looks for the connector."""
+
+    viewing: ViewingParameters = field(default_factory=ViewingParameters)
+
+
+class SearchMotion(Motion):
+    """Brings the camera that searches where it shall look from."""
+
+    known: CableKnown
+    parameters: SearchMotionParameters
+
+    @property
+    def search_arm(self) -> str:
+        """The arm that carries the camera."""
+        return self.known.search_mount.arm
+
+    def search_views(self, last_seen: FloatArray | None) -> tuple[FloatArray, Iterator[Viewpoint]]:
+        """Where a search begins, (3,) m in the world, and its viewpoints, the first first.
+
+        It begins where the connector was `last_seen` (3,) m; None: at the middle of a panel.
+        """
+        start, viewing = last_seen, self.parameters.viewing
+        if start is None:
+            start = np.array(next(box.center for box in self.known.boxes if box.name == viewing.start_at))
+        overview = self.known.camera(self.known.cable.overview)
+        assert isinstance(overview.mount, FixedMount)  # the cell's check
+        return start, spiral(start, overview.mount.world_from_camera, overview.intrinsics, viewing.spiral)
+
+    def view(self, world_from_camera: RigidTransform) -> View:
+        """The viewpoint, or one a little nearer or further, to which the camera that searches can be brought.
+
+        Raises PlanningError when there is none.
+        """
+        return self._first_view([world_from_camera])
+
+    def view_of(self, place: FloatArray, world_from_camera: RigidTransform) -> View:
+        """A view of a `place` (3,) m that was glimpsed from a camera. Raises PlanningError when there is none."""
+        return self._first_view(views_of(place, world_from_camera, self.parameters.viewing.spiral.distance))
+
+    @counts_as("planning")
+    def best_view(self, world_from_connector: RigidTransform, taken: Sequence[FloatArray] = ()) -> View:
+        """The best viewpoint that shows the whole connector, from another side than the lines of sight `taken` (3,).
+
+        Raises PlanningError when there is none.
+        """
+        viewing, model = self.parameters.viewing, self.model(self.search_arm)
+        points = outline(world_from_connector, self.known.cable.connector.length)
+        for pose in closer_views(world_from_connector, viewing.close_views):
+            sight = pose.rotation.apply([0.0, 0.0, 1.0])
+            if any(float(sight @ other) > viewing.max_cosine for other in taken):
+                continue
+            if self.sees(pose, points) and len(goals := self._view_goals(pose, model)):
+                return View(pose, goals)
+        raise PlanningError(CauseCode.OUT_OF_REACH, "no free place from which the whole connector shows")
+
+    def go_to_view(self, view: View) -> MotionTask:
+        """Bring the camera that searches to a view."""
+        return self.move(self.search_arm, view.joints, margin=self.parameters.viewing.margin, tight=False)
+
+    @counts_as("planning")
+    def _first_view(self, views: Sequence[RigidTransform]) -> View:
+        model = self.model(self.search_arm)
+        for pose in approached(views, self.parameters.viewing.approaches):
+            goals = self._view_goals(pose, model)
+            if len(goals):
+                return View(pose, goals)
+        raise PlanningError(CauseCode.OUT_OF_REACH, "no free place to look from")
+
+    def _view_goals(self, world_from_camera: RigidTransform, model: CollisionModel) -> FloatArray:
+        """Joints (n, 6) rad of the search arm that bring its camera there and are free in its `model`."""
+        mount, margin = self.known.search_mount, self.parameters.viewing.margin
+        views = self.kinematics[self.search_arm].ik_view(world_from_camera, mount.wrist_from_camera)
+        return np.array([q for q in views if model.free(q, margin)]).reshape(-1, 6)
