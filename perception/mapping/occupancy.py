@@ -14,8 +14,8 @@ from regrasp.interfaces.arrays import ColorImage, DepthImage, FloatArray, Mask
 from regrasp.interfaces.cell import Box
 from regrasp.interfaces.fields import Color
 from regrasp.interfaces.frame import Intrinsics, RgbdFrame
+from regrasp.perception.camera.color import SegmentationParameters, color_mask
 from regrasp.perception.camera.model import pixel_rays, project, subsampled
-from regrasp.perception.pose.segmentation import SegmentationParameters, color_mask
 
 Spheres = tuple[FloatArray, FloatArray]  # centres (n, 3) m in the world, radii (n,) m
 

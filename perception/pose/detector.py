@@ -18,10 +18,11 @@ from scipy.spatial.transform import RigidTransform
 from regrasp.interfaces.arrays import ColorImage, DepthImage, FloatArray
 from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.frame import Intrinsics, RgbdFrame
+from regrasp.perception.camera.color import SegmentationParameters, color_mask
 from regrasp.perception.camera.model import NEAREST_DEPTH, deproject, project
 from regrasp.perception.pose.estimate import DEFAULT_AXIS, Estimate, NoEstimate, pose_covariance
 from regrasp.perception.pose.rgbd import RgbdParameters, min_max_axis, seen_pose, without_outliers
-from regrasp.perception.pose.segmentation import NoSegment, NotSeen, SegmentationParameters, color_mask, segment
+from regrasp.perception.pose.segmentation import NoSegment, NotSeen, segment
 
 PixelBox = tuple[float, float, float, float]  # (u0, v0, u1, v1) px
 

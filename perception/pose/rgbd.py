@@ -8,9 +8,10 @@ from scipy.spatial.transform import RigidTransform
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.frame import RgbdFrame
+from regrasp.perception.camera.color import SegmentationParameters
 from regrasp.perception.camera.model import deproject
 from regrasp.perception.pose.estimate import DEFAULT_AXIS, Estimate, NoEstimate, pose_covariance
-from regrasp.perception.pose.segmentation import NoSegment, NotSeen, SegmentationParameters, segment
+from regrasp.perception.pose.segmentation import NoSegment, NotSeen, segment
 
 
 @dataclass(frozen=True)

@@ -92,7 +92,7 @@ def test_a_start_waits_for_every_fixed_camera(stage: Stage) -> None:
     assert len(stage.perception.looks) == 1
     stage.perception.troubles["side"] = "the side camera is dark"
     assert stage.run(tree, 5.0) is Status.FAILURE
-    assert stage.belief.causes[-1].message == "the side camera is dark; nothing was mapped"
+    assert stage.causes[-1].message == "the side camera is dark; nothing was mapped"
 
 
 def test_the_clip_is_looked_at_with_the_wrist_camera_when_the_rear_one_is_dark(stage: Stage) -> None:

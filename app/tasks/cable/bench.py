@@ -29,12 +29,12 @@ from regrasp.app.tasks.cable.studies.planner_bench import print_planner_bench
 from regrasp.behaviors import LEAVES
 from regrasp.interfaces.cable.cell import TAG_DICTIONARY, CableCell
 from regrasp.interfaces.frame import RgbdFrame
+from regrasp.perception.camera.color import SegmentationParameters, color_mask
 from regrasp.perception.camera.registration import FIXED_CAMERA_ERRORS, register
 from regrasp.perception.pose.detector import Detector, letterboxed, network_input, pixel_sizes, shipped_network
 from regrasp.perception.pose.estimate import NoEstimate
 from regrasp.perception.pose.fused.fused import Fused
 from regrasp.perception.pose.rgbd import Rgbd
-from regrasp.perception.pose.segmentation import SegmentationParameters, color_mask
 from regrasp.perception.pose.technique import make_technique
 from regrasp.sim.cable.cable import spring_torques
 from regrasp.sim.cable.objects import cable_world

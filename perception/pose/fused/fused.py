@@ -14,6 +14,7 @@ from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.cell import Box, pose_along
 from regrasp.interfaces.frame import RgbdFrame
+from regrasp.perception.camera.color import SegmentationParameters, color_mask
 from regrasp.perception.camera.registration import (
     CameraErrors,
     Registration,
@@ -42,7 +43,7 @@ from regrasp.perception.pose.fused.plausibility import (
     visible_ends,
     visible_extent,
 )
-from regrasp.perception.pose.segmentation import NotSeen, SegmentationParameters, color_mask
+from regrasp.perception.pose.segmentation import NotSeen
 
 
 @dataclass(frozen=True)

@@ -6,14 +6,8 @@ from numpy.typing import NDArray
 from raycast import BLACK, MIDDLE_THIRD, PURPLE, REAR_POSE, RED, WOOD, Block, Cylinder, Sensor, render
 from scipy.spatial.transform import RigidTransform
 
-from regrasp.perception.pose.segmentation import (
-    NoSegment,
-    NotSeen,
-    Segment,
-    SegmentationParameters,
-    color_mask,
-    segment,
-)
+from regrasp.perception.camera.color import SegmentationParameters, color_mask
+from regrasp.perception.pose.segmentation import NoSegment, NotSeen, Segment, segment
 
 PARAMETERS = SegmentationParameters.for_color(RED)
 PANEL = Block(np.array([0.5, -3.0, -3.0]), np.array([0.6, 3.0, 3.0]), WOOD)

@@ -11,9 +11,9 @@ from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cable.cell import PLUGGED_INTO, CableKnown
 from regrasp.interfaces.cell import WristMount
 from regrasp.interfaces.scene import Obstacle
+from regrasp.motion.cable.viewpoints import SpiralParameters, closer_views, spiral
 from regrasp.motion.failure import PlanningError
 from regrasp.motion.grasping.approach import find_approaches, pick_candidates
-from regrasp.motion.planning.viewpoints import SpiralParameters, closer_views, spiral
 from regrasp.motion.scene.collision import Clearances, CollisionModel
 from regrasp.motion.scene.planning_scene import PlanningScene
 

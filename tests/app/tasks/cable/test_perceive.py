@@ -24,6 +24,7 @@ from regrasp.app.frames.image_files import read_depth
 from regrasp.app.frames.snapshot import write_frame
 from regrasp.app.run.compose import build_world
 from regrasp.app.scenario.load import load_scenario
+from regrasp.app.tasks.cable.cells import cable_cell
 from regrasp.perception.pose.technique import TECHNIQUES
 from regrasp.sim.cable.ground_truth import CableTruth
 
@@ -172,7 +173,7 @@ def test_the_clips_tag_tells_where_its_seat_is(shots: Shots) -> None:
     [frame] = answer(*frame_of(shots, 0), *tag)["frames"]
     clip = frame["clip"]
     assert clip["found"], clip
-    seat = load_scenario("no_obstacle", ["cell=thesis_tags"]).cell.known.cable.clip.world_from_seat.translation
+    seat = cable_cell("thesis_tags").known.cable.clip.world_from_seat.translation
     assert clip["pose"]["position"] == pytest.approx(seat.tolist(), abs=0.02)
     assert np.shape(clip["pose"]["covariance"]) == (6, 6)
     assert "clip" not in answer(*frame_of(shots, 0))["frames"][0]

@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regrasp.interfaces.cable.cell import CableCell
+from regrasp.perception.camera.color import SegmentationParameters, color_mask
 from regrasp.perception.camera.model import project
 from regrasp.perception.pose.detector import NETWORK_HEIGHT, NETWORK_WIDTH, letterboxed, pixel_sizes
-from regrasp.perception.pose.segmentation import SegmentationParameters, color_mask
 from regrasp.sim.cable.random_scenes.scene import RandomScene, Shot
 from regrasp.sim.cameras.depth_noise import DepthNoise
 
