@@ -11,9 +11,9 @@ from regrasp.behaviors.keys import CAUSES, Keys, MissingKeyError, WithKeys
 from regrasp.behaviors.services import Services
 from regrasp.interfaces.cause import Cause, CauseCode, ServiceError
 from regrasp.motion.failure import PlanningError
-from regrasp.motion.task import MotionTask
+from regrasp.motion.request import MotionRequest
 
-LeafSteps = Generator[MotionTask | None, None, None]
+LeafSteps = Generator[MotionRequest | None, None, None]
 
 
 class LeafFailed(Exception):  # noqa: N818 - it names the leaf's outcome
@@ -98,14 +98,14 @@ class Leaf(WithServices, BehaviourWithPorts):
 
 
 class StepsLeaf(Leaf):
-    """A leaf whose work is a sequence: `steps()` yields a `MotionTask` to be done, or None to wait for a tick.
+    """A leaf whose work is a sequence: `steps()` yields a `MotionRequest` to be done, or None to wait for a tick.
 
     It ends in SUCCESS when the steps end, and in FAILURE when they raise `LeafFailed` or a task raises PlanningError.
     """
 
     INPUT_PORTS: ClassVar[dict[str, Any]] = {}
     OUTPUT_PORTS: ClassVar[dict[str, Any]] = {}
-    _task: MotionTask | None = None
+    _task: MotionRequest | None = None
 
     def steps(self) -> LeafSteps:
         """The work, as a generator that goes on when the task it yielded is done."""
@@ -135,7 +135,7 @@ class StepsLeaf(Leaf):
                 self._task.cancel()
             self._work.close()
 
-    def follow(self, task: MotionTask) -> LeafSteps:
+    def follow(self, task: MotionRequest) -> LeafSteps:
         """Steps that do a task, for a leaf that handles its PlanningError itself. The task stops with the leaf."""
         try:
             while not task.poll():

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Protocol
 
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.frame import RgbdFrame
-from regrasp.interfaces.task import Task
+from regrasp.interfaces.request import Request
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import RigidTransform
@@ -16,15 +16,15 @@ if TYPE_CHECKING:
 class MotionService(Protocol):
     """Motions of the arms. A request returns a task at once; it fails with PlanningError."""
 
-    def move(self, arm: str, goals: FloatArray, *, margin: float | None = None, tight: bool = True) -> Task[None]:
+    def move(self, arm: str, goals: FloatArray, *, margin: float | None = None, tight: bool = True) -> Request[None]:
         """Bring an arm along a free path to one of the goals (n, 6) rad, `margin` m from everything."""
         ...
 
-    def sleep(self, arm: str) -> Task[None]:
+    def sleep(self, arm: str) -> Request[None]:
         """Bring an arm to its sleep pose."""
         ...
 
-    def straight(self, arm: str, goal: "RigidTransform", *, speed: float | None = None) -> Task[None]:
+    def straight(self, arm: str, goal: "RigidTransform", *, speed: float | None = None) -> Request[None]:
         """Move the tool in a straight line to `goal` (world_from_tool), unchecked; `speed` in (0, 1]."""
         ...
 
@@ -35,11 +35,11 @@ class MotionService(Protocol):
         *,
         checked: bool = True,
         without: "Collection[Box]" = (),
-    ) -> Task[None]:
+    ) -> Request[None]:
         """Move the tool straight by `displacement` (3,) m in the world; `checked`: if only boxes `without` are met."""
         ...
 
-    def close(self, arm: str, thickness: float) -> Task[float]:
+    def close(self, arm: str, thickness: float) -> Request[float]:
         """Close the jaw on a thing of `thickness` m; the answer is the gap (m) at which it holds."""
         ...
 
@@ -47,7 +47,7 @@ class MotionService(Protocol):
         """Tell the jaw to open, without waiting for it."""
         ...
 
-    def release(self, arm: str, gap: float) -> Task[None]:
+    def release(self, arm: str, gap: float) -> Request[None]:
         """Open the jaw; done once it stands `gap` m open."""
         ...
 

@@ -12,8 +12,8 @@ from regrasp.interfaces.trajectory import Trajectory
 from regrasp.motion.failure import GraspEmptyError, PlanningError
 from regrasp.motion.grasping.gap_test import GapParameters, GripWatch
 from regrasp.motion.planning.timing import TimingParameters, time_path
+from regrasp.motion.request import MotionRequest
 from regrasp.motion.robots.arm_watch import ArmWatch, ArmWatchParameters, remaining_waypoints
-from regrasp.motion.task import MotionTask
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ class Execution:
         self._speed_share = dict.fromkeys(arms, 1.0)  # of the speed asked for; less for an arm that fell behind
         self._out_of_order: dict[str, PlanningError] = {}
 
-    def task(self, arm: str, steps: Iterator[None]) -> MotionTask:
+    def request(self, arm: str, steps: Iterator[None]) -> MotionRequest:
         """The steps as a task of an arm. It raises the arm's cause at its first poll if that is out of order."""
 
         def guarded() -> Iterator[None]:
@@ -83,7 +83,7 @@ class Execution:
                 raise self._out_of_order[arm]
             yield from steps
 
-        return MotionTask(guarded(), lambda: self.halt(arm))
+        return MotionRequest(guarded(), lambda: self.halt(arm))
 
     def halt(self, arm: str) -> None:
         """Stop an arm where it is."""

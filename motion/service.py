@@ -1,7 +1,7 @@
 """What the leaves of every task ask of the arms: plan, wait for the plan's latency, follow, stop.
 
-A request returns a `MotionTask` at once; `poll` it every tick. Nothing here reads a wall clock: a plan costs its stated
-latency on the simulated clock.
+Each method returns a `MotionRequest` at once; `poll` it every tick. Nothing here reads a wall clock: a plan costs its
+stated latency on the simulated clock.
 """
 
 from collections.abc import Callable, Collection, Generator, Iterator, Mapping, Sequence
@@ -14,17 +14,17 @@ from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.cell import Box, KnownCell
 from regrasp.interfaces.devices import Arm, Clock, Gripper
-from regrasp.interfaces.task import Task
+from regrasp.interfaces.request import Request
 from regrasp.motion.execution import Execution, ExecutionParameters
 from regrasp.motion.failure import PlanningError
 from regrasp.motion.grasping.approach import Cylinder, PickParameters, find_approaches, pick_candidates, points_beyond
 from regrasp.motion.grasping.grasps import Grasp
 from regrasp.motion.planning.planner import PlannerParameters, plan
 from regrasp.motion.planning.straight import straight_line
+from regrasp.motion.request import MotionRequest
 from regrasp.motion.robots.arm_offsets import JointOffsetParameters, joint_offsets
 from regrasp.motion.scene.collision import Clearances, CollisionModel
 from regrasp.motion.scene.planning_scene import NO_POINTS, PlanningScene, PlanningSceneParameters
-from regrasp.motion.task import MotionTask
 
 # Points (n, 3) m in the world that a camera saw from that second on; None while there is no such picture.
 PointCloudSource = Callable[[float], FloatArray | None]
@@ -68,7 +68,7 @@ class Motion(PlanningScene):
         for arm in self.arms:
             self.model(arm).free(self.joints(arm), 0.0)
 
-    def move(self, arm: str, goals: FloatArray, *, margin: float | None = None, tight: bool = True) -> MotionTask:
+    def move(self, arm: str, goals: FloatArray, *, margin: float | None = None, tight: bool = True) -> MotionRequest:
         """Plan a path to one of the goals (n, 6) rad and follow it, `margin` m from everything (default: as set).
 
         `tight`: with a smaller margin where nothing else is found.
@@ -78,13 +78,13 @@ class Motion(PlanningScene):
             path = self._plan(self.start_model(arm), self.joints(arm), goals, margin, tight)
             yield from self.execution.follow(arm, path, 1.0)
 
-        return self.execution.task(arm, steps())
+        return self.execution.request(arm, steps())
 
-    def sleep(self, arm: str) -> MotionTask:
+    def sleep(self, arm: str) -> MotionRequest:
         """Bring an arm to its sleep pose, out of the cameras' and the other arms' way."""
         return self.move(arm, np.array([self.known.arm(arm).sleep]))
 
-    def straight(self, arm: str, goal: RigidTransform, *, speed: float | None = None) -> MotionTask:
+    def straight(self, arm: str, goal: RigidTransform, *, speed: float | None = None) -> MotionRequest:
         """Move the tool in a straight line to `goal` (world_from_tool). Whether the way is free is not checked.
 
         `speed` in (0, 1] of the joints' limits; default: `approach_speed`.
@@ -94,7 +94,7 @@ class Motion(PlanningScene):
             path = straight_line(self.kinematics[arm], self.joints(arm), goal)
             yield from self.execution.follow(arm, path, self.parameters.approach_speed if speed is None else speed)
 
-        return self.execution.task(arm, steps())
+        return self.execution.request(arm, steps())
 
     def shift(
         self,
@@ -103,7 +103,7 @@ class Motion(PlanningScene):
         *,
         checked: bool = True,
         without: Collection[Box] = (),
-    ) -> MotionTask:
+    ) -> MotionRequest:
         """Move the tool straight by `displacement` (3,) m in the world, without turning it.
 
         `checked`: only if the arm meets nothing but the boxes `without`. A motion that begins in a box cannot be
@@ -120,7 +120,7 @@ class Motion(PlanningScene):
                 self._check_shift(model, path, float(np.linalg.norm(displacement)))
             yield from self.execution.follow(arm, path, self.parameters.approach_speed)
 
-        return self.execution.task(arm, steps())
+        return self.execution.request(arm, steps())
 
     def pick(
         self,
@@ -132,7 +132,7 @@ class Motion(PlanningScene):
         clear_of: FloatArray | None = None,
         without: Collection[Box] = (),
         point_cloud: PointCloudSource | None = None,
-    ) -> MotionTask:
+    ) -> MotionRequest:
         """Open the jaw and bring it round a cylinder; the jaw stays open.
 
         The cylinder lies `shallow` metres nearer to the finger tips than the pads' middle. The arm keeps clear of the
@@ -159,23 +159,23 @@ class Motion(PlanningScene):
             yield from self.execution.follow(arm, approach, self.parameters.approach_speed)
             self.keep_clear(NO_POINTS)
 
-        return self.execution.task(arm, steps())
+        return self.execution.request(arm, steps())
 
-    def close(self, arm: str, thickness: float) -> Task[float]:
+    def close(self, arm: str, thickness: float) -> Request[float]:
         """Close the jaw on a thing of `thickness` m; the answer is the gap (m) between the pads that hold it.
 
         It fails with GraspEmptyError when it closes on nothing, with GRIPPER_FAILED when it does not move. When it is
         cancelled the jaw keeps its force.
         """
-        return Task(self.execution.close_jaw(arm, thickness))
+        return Request(self.execution.close_jaw(arm, thickness))
 
     def open_jaw(self, arm: str) -> None:
         """Tell the jaw to open, without waiting for it."""
         self.grippers[arm].open(self.parameters.execution.jaw.open_gap)
 
-    def release(self, arm: str, gap: float) -> MotionTask:
+    def release(self, arm: str, gap: float) -> MotionRequest:
         """Open the jaw; done once it stands `gap` m open."""
-        return self.execution.task(arm, self.execution.open_jaw(arm, gap))
+        return self.execution.request(arm, self.execution.open_jaw(arm, gap))
 
     def stop(self) -> None:
         """Stop all arms."""

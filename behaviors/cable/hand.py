@@ -8,7 +8,7 @@ from regrasp.behaviors.cable.services import CableServices
 from regrasp.behaviors.leaf import LeafFailed, LeafSteps, StepsLeaf
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cable.cause import CableCause
-from regrasp.interfaces.task import Task
+from regrasp.interfaces.request import Request
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import RigidTransform
@@ -36,7 +36,7 @@ class CableLeaf(StepsLeaf):
         """The camera that looks for a lost end."""
         return self.services.known.cable.search
 
-    def ask(self, task: Task[T]) -> Generator[Task[None] | None, None, T]:
+    def ask(self, task: Request[T]) -> Generator[Request[None] | None, None, T]:
         """Steps that do a task and return its answer. The task stops with the leaf."""
         try:
             while not task.poll():

@@ -7,7 +7,7 @@ from typing import ClassVar
 from regrasp.behaviors.cable.hand import CableLeaf
 from regrasp.interfaces.cable.motion import View
 from regrasp.interfaces.cable.sight import Sightings
-from regrasp.interfaces.task import Task
+from regrasp.interfaces.request import Request
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class LookLeaf(CableLeaf):
         """The arm that carries the camera."""
         return self.services.known.search_mount.arm
 
-    def go_and_look(self, view: View, seconds: float) -> Generator[Task[None] | None, None, Sightings]:
+    def go_and_look(self, view: View, seconds: float) -> Generator[Request[None] | None, None, Sightings]:
         """Move the camera to a view, look for `seconds`, and map the obstacles that it sees.
 
         Raises PlanningError to the caller when no motion leads there.

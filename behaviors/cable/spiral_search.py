@@ -13,7 +13,7 @@ from regrasp.interfaces.cable.cause import CableCause
 from regrasp.interfaces.cable.motion import Viewpoint
 from regrasp.interfaces.cable.sight import Estimate
 from regrasp.interfaces.cause import CauseCode
-from regrasp.interfaces.task import Task
+from regrasp.interfaces.request import Request
 from regrasp.motion.failure import PlanningError
 
 if TYPE_CHECKING:
@@ -87,7 +87,7 @@ class SpiralSearch(LookLeaf):
             yield from self.go_to_sleep(self.search_arm)
             raise LeafFailed(CauseCode.CAMERA_FAILED, f"{trouble}; the {self.overview} camera shows no connector")
 
-    def _look_from(self, world_from_camera: "RigidTransform") -> Generator[Task[None] | None, None, list[Estimate]]:
+    def _look_from(self, world_from_camera: "RigidTransform") -> Generator[Request[None] | None, None, list[Estimate]]:
         """Estimates from a viewpoint, and from nearer after a weak detection. Raises PlanningError out of reach."""
         view = self.services.motion.view(world_from_camera)
         looked = yield from self.go_and_look(view, self.get_input("look_seconds"))
@@ -98,7 +98,7 @@ class SpiralSearch(LookLeaf):
 
     def _look_there(
         self, world_from_camera: "RigidTransform", place: FloatArray
-    ) -> Generator[Task[None] | None, None, list[Estimate]]:
+    ) -> Generator[Request[None] | None, None, list[Estimate]]:
         """Estimates from where a weak detection at `place` (3,) m shows better; none where nothing can look at it."""
         self.say("glimpsed", position=place.round(3).tolist())
         try:

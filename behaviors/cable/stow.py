@@ -12,7 +12,7 @@ from regrasp.behaviors.leaf import LeafFailed, LeafSteps
 from regrasp.interfaces.cable.cause import CableCause
 from regrasp.interfaces.cable.sight import Estimate
 from regrasp.interfaces.cause import CauseCode
-from regrasp.interfaces.task import Task
+from regrasp.interfaces.request import Request
 from regrasp.motion.failure import PlanningError
 
 
@@ -70,7 +70,7 @@ class LookAtStow(LookLeaf):
             if not evidence.detected:
                 self._lost(evidence.sentence)
 
-    def _look_from_the_other(self, trouble: str) -> Generator[Task[None] | None, None, list[Estimate]]:
+    def _look_from_the_other(self, trouble: str) -> Generator[Request[None] | None, None, list[Estimate]]:
         motion, perception = self.services.motion, self.services.perception
         self.say(f"the {self.search} camera looks at the clip", why=trouble)
         if (other := perception.trouble(self.search)) is not None:

@@ -7,8 +7,8 @@ from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cable.motion import Grip, View, Viewpoint
 from regrasp.interfaces.cable.sight import Estimate, InHand, NoEstimate, Sightings, TrackHealth, TrackState
 from regrasp.interfaces.evidence import Evidence
+from regrasp.interfaces.request import Request
 from regrasp.interfaces.services import MotionService, PerceptionService
-from regrasp.interfaces.task import Task
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import RigidTransform
@@ -30,7 +30,7 @@ class CableMotionService(MotionService, Protocol):
 
     def pick_plug(
         self, plug: "RigidTransform", *, point_cloud: Callable[[float], FloatArray | None] | None = None
-    ) -> Task[None]:
+    ) -> Request[None]:
         """Bring the open jaw round the plugged connector, corrected by points (n, 3) m that a camera sees of the arm.
 
         `point_cloud` gives those of a picture from that second on, None while there is none.
@@ -39,11 +39,11 @@ class CableMotionService(MotionService, Protocol):
 
     def pick_loose(
         self, world_from_connector: "RigidTransform", *, point_cloud: Callable[[float], FloatArray | None] | None = None
-    ) -> Task[None]:
+    ) -> Request[None]:
         """As `pick_plug`, where the connector hangs at its cable, of which the arm keeps clear."""
         ...
 
-    def grip(self, world_from_connector: "RigidTransform") -> Task[Grip]:
+    def grip(self, world_from_connector: "RigidTransform") -> Request[Grip]:
         """Close the jaw on the connector; fails with GraspEmptyError when it closes on nothing."""
         ...
 
@@ -51,27 +51,27 @@ class CableMotionService(MotionService, Protocol):
         """Begin to watch by the pads whether the hand holds the connector."""
         ...
 
-    def pull_out(self, plug: "RigidTransform") -> Task[None]:
+    def pull_out(self, plug: "RigidTransform") -> Request[None]:
         """Draw the gripped plug out of its socket, and away from the panel."""
         ...
 
-    def carry_to_clip(self, held: "RigidTransform") -> Task[None]:
+    def carry_to_clip(self, held: "RigidTransform") -> Request[None]:
         """Bring the held connector before the clip."""
         ...
 
-    def insert(self, held: "RigidTransform") -> Task[None]:
+    def insert(self, held: "RigidTransform") -> Request[None]:
         """Bring the held connector straight into the clip."""
         ...
 
-    def let_go(self) -> Task[None]:
+    def let_go(self) -> Request[None]:
         """Open the jaw; done once it stands wider than a connector."""
         ...
 
-    def draw_back(self) -> Task[str]:
+    def draw_back(self) -> Request[str]:
         """Draw the hand straight back as far as is free. The answer is '', or why no distance was."""
         ...
 
-    def leave_clip(self) -> Task[None]:
+    def leave_clip(self) -> Request[None]:
         """Bring the hand to its sleep pose without sweeping the stowed end out of its clip."""
         ...
 
@@ -94,7 +94,7 @@ class CableMotionService(MotionService, Protocol):
         """
         ...
 
-    def go_to_view(self, view: View) -> Task[None]:
+    def go_to_view(self, view: View) -> Request[None]:
         """Bring the camera to a view."""
         ...
 
@@ -119,7 +119,7 @@ class CablePerceptionService(PerceptionService, Protocol):
         settle: float = 0.0,
         later: bool = False,
         on_mapped: Callable[[], None] | None = None,
-    ) -> Task[Sightings]:
+    ) -> Request[Sightings]:
         """Look every tick for `seconds` after `settle` seconds; the answer holds one result a frame.
 
         A frame of the very first moment counts unless only `later` ones shall. With `on_mapped` the obstacles in view

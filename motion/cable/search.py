@@ -15,9 +15,9 @@ from regrasp.interfaces.wall_time import counts_as
 from regrasp.motion.cable.viewing import ViewingParameters, approached, outline, views_of
 from regrasp.motion.cable.viewpoints import closer_views, spiral
 from regrasp.motion.failure import PlanningError
+from regrasp.motion.request import MotionRequest
 from regrasp.motion.scene.collision import CollisionModel
 from regrasp.motion.service import Motion, MotionParameters
-from regrasp.motion.task import MotionTask
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class SearchMotion(Motion):
                 return View(pose, goals)
         raise PlanningError(CauseCode.OUT_OF_REACH, "no free place from which the whole connector shows")
 
-    def go_to_view(self, view: View) -> MotionTask:
+    def go_to_view(self, view: View) -> MotionRequest:
         """Bring the camera that searches to a view."""
         return self.move(self.search_arm, view.joints, margin=self.parameters.viewing.margin, tight=False)
 

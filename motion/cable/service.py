@@ -14,7 +14,7 @@ from regrasp.interfaces.cable.motion import Grip
 from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.cell import Box
 from regrasp.interfaces.devices import Arm, Clock, Gripper
-from regrasp.interfaces.task import Task
+from regrasp.interfaces.request import Request
 from regrasp.motion.cable.cable_shape import cable_course, connector_points
 from regrasp.motion.cable.carry_paths import CarryPathParameters, can_continue, carry_paths, first_free
 from regrasp.motion.cable.held import connector_spheres
@@ -23,11 +23,11 @@ from regrasp.motion.cable.seating import SeatingParameters, poses_before, seated
 from regrasp.motion.failure import PlanningError
 from regrasp.motion.grasping.approach import pick_candidates
 from regrasp.motion.grasping.gap_test import GripWatch
+from regrasp.motion.request import MotionRequest
 from regrasp.motion.robots.spheres import JAW_OPENING
 from regrasp.motion.scene.collision import CollisionModel
 from regrasp.motion.scene.planning_scene import NO_POINTS
 from regrasp.motion.service import PointCloudSource
-from regrasp.motion.task import MotionTask
 
 T = TypeVar("T")
 
@@ -92,29 +92,29 @@ class CableMotion(SearchMotion):
         *,
         checked: bool = True,
         without: Collection[Box] = (),
-    ) -> MotionTask:
+    ) -> MotionRequest:
         """As in every task; the clip's bracket may be touched, too."""
         return super().shift(arm, displacement, checked=checked, without=[*without, *self.known.cable.clip.bracket])
 
-    def pick_plug(self, plug: RigidTransform, *, point_cloud: PointCloudSource | None = None) -> MotionTask:
+    def pick_plug(self, plug: RigidTransform, *, point_cloud: PointCloudSource | None = None) -> MotionRequest:
         """`pick` the connector where it is plugged in, world_from_connector: a panel is near."""
         return self._pick_connector(plug, self.parameters.unplug.shallow, None, point_cloud)
 
     def pick_loose(
         self, world_from_connector: RigidTransform, *, point_cloud: PointCloudSource | None = None
-    ) -> MotionTask:
+    ) -> MotionRequest:
         """`pick` the connector where it hangs at the end of its cable, of which the arm keeps clear."""
         cable = cable_course(self.known, world_from_connector)
         return self._pick_connector(world_from_connector, 0.0, cable, point_cloud)
 
-    def grip(self, world_from_connector: RigidTransform) -> Task[Grip]:
+    def grip(self, world_from_connector: RigidTransform) -> Request[Grip]:
         """Close the hand's jaw on the connector; the answer is what it holds then. It fails as `close` does."""
 
         def steps() -> Generator[None, None, Grip]:
             gap = yield from self._done(self.close(self.hand, 2 * self.known.cable.connector.radius))
             return Grip(gap, self.tool(self.hand).inv() * world_from_connector)
 
-        return Task(steps())
+        return Request(steps())
 
     def watch_grip(self) -> GripWatch:
         """Begin to watch by the hand's pads whether it holds the connector."""
@@ -122,7 +122,7 @@ class CableMotion(SearchMotion):
             self.grippers[self.hand], 2 * self.known.cable.connector.radius, self.parameters.execution.jaw.grip.gap
         )
 
-    def pull_out(self, plug: RigidTransform) -> MotionTask:
+    def pull_out(self, plug: RigidTransform) -> MotionRequest:
         """Draw the gripped plug (world_from_connector) out along its axis, and then away from the panel, to -x."""
         values = self.parameters.unplug
 
@@ -141,7 +141,7 @@ class CableMotion(SearchMotion):
         *,
         onward: Sequence[RigidTransform] = (),
         speed: float,
-    ) -> MotionTask:
+    ) -> MotionRequest:
         """Bring what `arm` holds (tool_from_connector) to one of the goals (world_from_tool), the first preferred.
 
         Along the shapes that the cable takes by itself where that is free, else straight or in a flat arch, else along
@@ -163,9 +163,9 @@ class CableMotion(SearchMotion):
                 path = self._plan(model, q, np.array(ends).reshape(-1, 6))
             yield from self.execution.follow(arm, path, speed)
 
-        return self.execution.task(arm, steps())
+        return self.execution.request(arm, steps())
 
-    def carry_to_clip(self, held: RigidTransform) -> MotionTask:
+    def carry_to_clip(self, held: RigidTransform) -> MotionRequest:
         """Bring the held connector (tool_from_connector) before the clip, from where the hand can go in and back out.
 
         It fails with OUT_OF_REACH when no hand pose there is free.
@@ -184,7 +184,7 @@ class CableMotion(SearchMotion):
 
         return self._task(self.hand, steps())
 
-    def insert(self, held: RigidTransform) -> MotionTask:
+    def insert(self, held: RigidTransform) -> MotionRequest:
         """Bring the held connector (tool_from_connector) straight into the clip, with the roll that turns it least."""
         seating = self.parameters.seating
 
@@ -194,12 +194,12 @@ class CableMotion(SearchMotion):
 
         return self._task(self.hand, steps())
 
-    def let_go(self) -> MotionTask:
+    def let_go(self) -> MotionRequest:
         """Open the hand's jaw; done once it stands wider than a connector."""
         gap = 2 * self.known.cable.connector.radius + self.parameters.execution.jaw.slack
         return self.release(self.hand, gap)
 
-    def draw_back(self) -> Task[str]:
+    def draw_back(self) -> Request[str]:
         """Draw the hand straight back as far as is free. The answer is '', or why no distance was."""
 
         def steps() -> Generator[None, None, str]:
@@ -216,7 +216,7 @@ class CableMotion(SearchMotion):
 
         return self._task(self.hand, steps())
 
-    def leave_clip(self) -> MotionTask:
+    def leave_clip(self) -> MotionRequest:
         """Bring the hand to its sleep pose without sweeping the stowed end out of its clip."""
         seat, cable = self.known.cable.clip.world_from_seat, self.known.cable
 
@@ -241,7 +241,7 @@ class CableMotion(SearchMotion):
         shallow: float,
         cable: FloatArray | None,
         point_cloud: PointCloudSource | None,
-    ) -> MotionTask:
+    ) -> MotionRequest:
         return self.pick(
             self.hand,
             world_from_connector,
@@ -252,11 +252,11 @@ class CableMotion(SearchMotion):
             point_cloud=point_cloud,
         )
 
-    def _task(self, arm: str, steps: Generator[None, None, T] | Iterator[None]) -> Task[T]:
+    def _task(self, arm: str, steps: Generator[None, None, T] | Iterator[None]) -> Request[T]:
         """Steps that do other tasks of `arm`, as one. Each of those fails if the arm is out of order."""
-        return Task(steps, lambda: self.execution.halt(arm))
+        return Request(steps, lambda: self.execution.halt(arm))
 
-    def _done(self, task: Task[T]) -> Generator[None, None, T]:
+    def _done(self, task: Request[T]) -> Generator[None, None, T]:
         """Steps that do a task and return its answer."""
         while not task.poll():
             yield

@@ -20,7 +20,7 @@ from regrasp.interfaces.cable.sight import (
 from regrasp.interfaces.devices import Camera, Clock
 from regrasp.interfaces.evidence import Evidence
 from regrasp.interfaces.frame import RgbdFrame
-from regrasp.interfaces.task import Task
+from regrasp.interfaces.request import Request
 from regrasp.interfaces.wall_time import counts_as
 from regrasp.perception.cable.in_hand import InHandParameters, connector_axis, connector_in_hand
 from regrasp.perception.cable.watching import FrameRule, watched
@@ -108,7 +108,7 @@ class CablePerception(Perception):
         settle: float = 0.0,
         later: bool = False,
         on_mapped: Callable[[], None] | None = None,
-    ) -> Task[Sightings]:
+    ) -> Request[Sightings]:
         """Look through a camera at every tick, from the next on, for `seconds` after `settle` seconds.
 
         Frames exposed in the last `seconds` count, each once. One of their very first moment does unless only `later`

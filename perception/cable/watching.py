@@ -8,7 +8,7 @@ import numpy as np
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cable.sight import Estimate, NoEstimate, Sightings
 from regrasp.interfaces.devices import Clock
-from regrasp.interfaces.task import Task
+from regrasp.interfaces.request import Request
 
 
 class Eyes(Protocol):
@@ -57,7 +57,7 @@ def watched(
     rule: FrameRule,
     on_mapped: Callable[[], None] | None = None,
     frames_before_mapping: int = 3,
-) -> Task[Sightings]:
+) -> Request[Sightings]:
     """Look through a camera at every tick, from the next on, until the `rule` ends.
 
     With `on_mapped` the obstacles before the camera are mapped at the frame of that number, if the camera is trusted
@@ -81,4 +81,4 @@ def watched(
                 weak_detections.append(result.weak_detection)
         return Sightings(estimates, weak_detections)
 
-    return Task(steps(), part="perception")
+    return Request(steps(), part="perception")

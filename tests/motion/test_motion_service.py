@@ -13,8 +13,8 @@ from regrasp.interfaces.cell import KnownCell, pose_along
 from regrasp.interfaces.frame import Intrinsics, RgbdFrame
 from regrasp.motion.execution import ExecutionParameters, JawParameters
 from regrasp.motion.failure import PlanningError
+from regrasp.motion.request import MotionRequest
 from regrasp.motion.service import Motion, MotionParameters
-from regrasp.motion.task import MotionTask
 
 Points = NDArray[np.float64]
 PARAMETERS = MotionParameters()
@@ -67,7 +67,7 @@ def test_the_nearest_to_hand_of_several_goals_is_reached(rig: Rig) -> None:
 
 @pytest.mark.parametrize("work", [lambda m: m.move("right", READY[None]), lambda m: m.shift("right", [0.0, 0.0, 0.05])])
 def test_an_arm_that_does_not_follow_is_led_on_slower_and_then_given_up(
-    rig: Rig, work: Callable[[Motion], MotionTask]
+    rig: Rig, work: Callable[[Motion], MotionRequest]
 ) -> None:
     rig.arms["right"].at = ASIDE
     rig.arms["right"].stuck = 0.0

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.devices import TICK as TICK
 from regrasp.interfaces.reading import GripperReading, JointReading
-from regrasp.interfaces.task import Task
+from regrasp.interfaces.request import Request
 from regrasp.interfaces.trajectory import Trajectory
 from regrasp.motion.cable.service import CableMotion
 
@@ -104,7 +104,7 @@ class Rig:
             self.known, self.arms, self.grippers, self.clock, seed=0, on_anomaly=self.remarks.append
         )
 
-    def run(self, task: Task[Any], seconds: float = 60.0) -> None:
+    def run(self, task: Request[Any], seconds: float = 60.0) -> None:
         """Poll a task at every tick until it is done."""
         end = self.clock.t + seconds
         while not task.poll():

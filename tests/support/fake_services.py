@@ -24,7 +24,7 @@ from regrasp.interfaces.devices import TICK
 from regrasp.interfaces.evidence import Evidence
 from regrasp.interfaces.frame import RgbdFrame
 from regrasp.interfaces.reading import GripperReading
-from regrasp.interfaces.task import Task
+from regrasp.interfaces.request import Request
 from regrasp.motion.cable.viewing import ViewingParameters, approached, views_of
 from regrasp.motion.cable.viewpoints import spiral
 from regrasp.motion.execution import Execution
@@ -100,15 +100,15 @@ class FakeMotion:
         self.stopped = 0
         self.reachable: Callable[[RigidTransform], bool] = lambda pose: True
 
-    def work(self, arm: str) -> Task[None]:
+    def work(self, arm: str) -> Request[None]:
         """Any motion of an arm."""
-        return Task(self._steps(), lambda: self.cancelled.append(arm))
+        return Request(self._steps(), lambda: self.cancelled.append(arm))
 
-    def move(self, arm: str, goals: Vector, *, margin: float | None = None, tight: bool = True) -> Task[None]:
+    def move(self, arm: str, goals: Vector, *, margin: float | None = None, tight: bool = True) -> Request[None]:
         self.moves.append((arm, goals))
         return self.work(arm)
 
-    def sleep(self, arm: str) -> Task[None]:
+    def sleep(self, arm: str) -> Request[None]:
         return self.move(arm, np.array([self.known.arm(arm).sleep]))
 
     def shift(
@@ -118,20 +118,20 @@ class FakeMotion:
         *,
         checked: bool = True,
         without: Collection[Box] = (),
-    ) -> Task[None]:
+    ) -> Request[None]:
         self.shifts.append((arm, np.asarray(displacement)))
         return self.work(arm)
 
-    def straight(self, arm: str, goal: RigidTransform, *, speed: float | None = None) -> Task[None]:
+    def straight(self, arm: str, goal: RigidTransform, *, speed: float | None = None) -> Request[None]:
         return self.work(arm)
 
-    def close(self, arm: str, thickness: float) -> Task[float]:
-        return Task(self.execution.close_jaw(arm, thickness))
+    def close(self, arm: str, thickness: float) -> Request[float]:
+        return Request(self.execution.close_jaw(arm, thickness))
 
     def open_jaw(self, arm: str) -> None:
         self.grippers[arm].open(0.05)
 
-    def release(self, arm: str, gap: float) -> Task[None]:
+    def release(self, arm: str, gap: float) -> Request[None]:
         self.grippers[arm].open(0.05)
         return self.work(arm)
 
@@ -150,37 +150,39 @@ class FakeMotion:
     def keep_clear(self, points: Vector) -> None:
         pass
 
-    def pick_plug(self, plug: RigidTransform, *, point_cloud: PointCloud | None = None) -> Task[None]:
+    def pick_plug(self, plug: RigidTransform, *, point_cloud: PointCloud | None = None) -> Request[None]:
         return self.work(self.known.cable.hand)
 
-    def pick_loose(self, world_from_connector: RigidTransform, *, point_cloud: PointCloud | None = None) -> Task[None]:
+    def pick_loose(
+        self, world_from_connector: RigidTransform, *, point_cloud: PointCloud | None = None
+    ) -> Request[None]:
         return self.work(self.known.cable.hand)
 
-    def grip(self, world_from_connector: RigidTransform) -> Task[Grip]:
+    def grip(self, world_from_connector: RigidTransform) -> Request[Grip]:
         def steps() -> Generator[None, None, Grip]:
             closing = self.close(self.known.cable.hand, 2 * self.known.cable.connector.radius)
             while not closing.poll():
                 yield
             return Grip(closing.answer, self.hand.inv() * world_from_connector)
 
-        return Task(steps())
+        return Request(steps())
 
     def watch_grip(self) -> GripWatch:
         return GripWatch(self.grippers[self.known.cable.hand], 2 * self.known.cable.connector.radius)
 
-    def pull_out(self, plug: RigidTransform) -> Task[None]:
+    def pull_out(self, plug: RigidTransform) -> Request[None]:
         return self.work(self.known.cable.hand)
 
-    def carry_to_clip(self, held: RigidTransform) -> Task[None]:
+    def carry_to_clip(self, held: RigidTransform) -> Request[None]:
         return self.work(self.known.cable.hand)
 
-    def insert(self, held: RigidTransform) -> Task[None]:
+    def insert(self, held: RigidTransform) -> Request[None]:
         return self.work(self.known.cable.hand)
 
-    def let_go(self) -> Task[None]:
+    def let_go(self) -> Request[None]:
         return self.release(self.known.cable.hand, 0.025)
 
-    def draw_back(self) -> Task[str]:
+    def draw_back(self) -> Request[str]:
         back = self.shift(self.known.cable.hand, [-0.1, 0.0, 0.0])
 
         def steps() -> Generator[None, None, str]:
@@ -191,9 +193,9 @@ class FakeMotion:
                 return str(error)
             return ""
 
-        return Task(steps(), back.cancel)
+        return Request(steps(), back.cancel)
 
-    def leave_clip(self) -> Task[None]:
+    def leave_clip(self) -> Request[None]:
         return self.sleep(self.known.cable.hand)
 
     def search_views(self, last_seen: Vector | None) -> tuple[Vector, Iterator[Viewpoint]]:
@@ -211,7 +213,7 @@ class FakeMotion:
     def best_view(self, world_from_connector: RigidTransform, taken: Sequence[Vector] = ()) -> View:
         return self._first_view([world_from_connector])
 
-    def go_to_view(self, view: View) -> Task[None]:
+    def go_to_view(self, view: View) -> Request[None]:
         return self.move(self.known.search_mount.arm, view.joints)
 
     def _first_view(self, views: Sequence[RigidTransform]) -> View:
@@ -300,7 +302,7 @@ class FakePerception:
         settle: float = 0.0,
         later: bool = False,
         on_mapped: Callable[[], None] | None = None,
-    ) -> Task[Sightings]:
+    ) -> Request[Sightings]:
         return watched(self, self.clock, camera, FrameRule(self.clock.t, seconds, settle, later), on_mapped)
 
     def fuse(self, estimates: Sequence[Estimate]) -> Estimate:

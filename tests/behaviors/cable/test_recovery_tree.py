@@ -22,7 +22,7 @@ from regrasp.behaviors.keys import causes
 from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.cause import Cause, ServiceError
 from regrasp.interfaces.frame import Intrinsics, RgbdFrame
-from regrasp.interfaces.task import Task
+from regrasp.interfaces.request import Request
 from regrasp.trees import in_tree_order, load_tree
 
 Make = Callable[..., "Play"]
@@ -37,13 +37,13 @@ class BusyMotion(FakeMotion):
         super().__init__(clock, known)
         self.at_work: list[str] = []
 
-    def work(self, arm: str) -> Task[None]:
+    def work(self, arm: str) -> Request[None]:
         def steps() -> Iterator[None]:
             self.at_work.append(arm)
             yield from self._steps()
             self.at_work.remove(arm)
 
-        return Task(steps(), lambda: self.at_work.remove(arm) if arm in self.at_work else None)
+        return Request(steps(), lambda: self.at_work.remove(arm) if arm in self.at_work else None)
 
     def stop(self) -> None:
         super().stop()
@@ -170,7 +170,7 @@ def test_every_failed_leaf_names_a_cause(play: Make, monkeypatch: pytest.MonkeyP
     whole = play(2, trouble == "not found")
     attempts = Attempts(whole.root, causes, whole.clock.now)
     if trouble == "no hand":
-        monkeypatch.setattr(whole.motion, "pick_plug", lambda *_, **__: Task(iter([None])))
+        monkeypatch.setattr(whole.motion, "pick_plug", lambda *_, **__: Request(iter([None])))
         monkeypatch.setattr(whole.hand, "close", lambda force: setattr(whole.hand, "gap", 0.0))
     elif trouble == "dark cameras":
         monkeypatch.setattr(whole.eyes, "trouble", lambda camera: f"the {camera} camera is dark")

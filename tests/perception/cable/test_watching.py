@@ -7,7 +7,7 @@ from fake_services import Clock, FakePerception, seen, unseen
 from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.cable.sight import Estimate, NoEstimate, Sightings
 from regrasp.interfaces.devices import TICK
-from regrasp.interfaces.task import Task
+from regrasp.interfaces.request import Request
 
 PLACE = np.array([0.35, 0.1, 0.2])
 
@@ -19,7 +19,7 @@ def eyes(known: CableKnown) -> FakePerception:
     return eyes
 
 
-def done(eyes: FakePerception, task: Task[Sightings]) -> Sightings:
+def done(eyes: FakePerception, task: Request[Sightings]) -> Sightings:
     """Its answer, after as many ticks as it takes."""
     while not task.poll():
         eyes.clock.t += TICK

@@ -8,7 +8,7 @@ from regrasp.interfaces.wall_time import Part, counts_as
 T = TypeVar("T")
 
 
-class Task(Generic[T]):
+class Request(Generic[T]):
     """Work under way; every `poll` does one step of it.
 
     `steps` yields where it waits for the next tick, and may return an answer. `cancel` calls `stop`. The steps' time
