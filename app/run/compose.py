@@ -13,8 +13,8 @@ from regrasp.app.scenario.load import Scenario
 from regrasp.app.scenario.sampling import draw_faults, draw_obstacles
 from regrasp.app.task.judge import Judge
 from regrasp.app.task.task import Task
+from regrasp.behaviors import registry
 from regrasp.behaviors.keys import causes
-from regrasp.behaviors.registry import leaves_of
 from regrasp.behaviors.services import Services
 from regrasp.interfaces.cell import Cell
 from regrasp.interfaces.scene import SceneSetup
@@ -55,6 +55,7 @@ def build_services(world: World[Any], seed: int, log: Any) -> Services:
     cell: Cell = world.cell
     grippers = {name: arm.gripper for name, arm in world.arms.items()}
     motion = Motion(cell.known, world.arms, grippers, world, planner_seed(seed), on_anomaly=anomaly_log(log))
+    motion.warm_up()
     perception = Perception(cell.known, world.cameras, world, motion.camera_pose, motion.spheres)
     return Services(cell.known, world, motion, perception, log)
 
@@ -75,7 +76,7 @@ def assemble(scenario: Scenario, world: World[Any], seed: int, log: Any) -> Epis
     py_trees.blackboard.Blackboard.clear()
     services = task.services()(world, seed, log)
     break_services(services, world.faults, world.now)
-    leaves = leaves_of(task.name)
+    leaves = registry.leaves_of(task.name)
     tree = py_trees.trees.BehaviourTree(load_tree(scenario.tree, leaves, scenario.inputs))
     graph = read_graph(scenario.tree, leaves, scenario.inputs)
     types = {node.path: node.type for node in graph.walk() if node.kind != "subtree"}

@@ -3,11 +3,12 @@
 import contextlib
 import signal
 import time
+from importlib import import_module
 from typing import Any, ClassVar
 
+import own_leaves
 from py_trees.common import Status
 
-from regrasp import behaviors
 from regrasp.behaviors.leaf import Leaf
 
 
@@ -56,7 +57,13 @@ class Swallows(Leaf):
         return Status.RUNNING
 
 
-behaviors.LEAVES = {"Hangs": Hangs, "HangsDeaf": HangsDeaf, "Goes": Goes, "Swallows": Swallows}
+def put(path: str, value: Any) -> None:
+    """Set an attribute by its dotted path."""
+    module, _, name = path.rpartition(".")
+    setattr(import_module(module), name, value)
+
+
+own_leaves.put_in({"Hangs": Hangs, "HangsDeaf": HangsDeaf, "Goes": Goes, "Swallows": Swallows}, put)
 
 if __name__ == "__main__":
     from regrasp.app.__main__ import main

@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import ClassVar
 
+import own_leaves
 import pytest
 from py_trees.common import Status
 from py_trees.ports import BehaviourWithPorts, PortInformation
@@ -46,7 +47,7 @@ class Wait(BehaviourWithPorts):  # type: ignore[misc]  # py_trees is untyped to 
 
 def write_scenario(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Write mine.yaml and tree.xml into `folder` and make it the current one."""
-    monkeypatch.setattr("regrasp.behaviors.LEAVES", {"Wait": Wait}, raising=False)
+    own_leaves.put_in({"Wait": Wait}, monkeypatch.setattr)
     monkeypatch.chdir(folder)
     (folder / "tree.xml").write_text(TREE)
     (folder / "mine.yaml").write_text(SCENARIO)

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
+import own_leaves
 import py_trees
 import pytest
 from py_trees.common import Status
@@ -100,8 +101,7 @@ def ends(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[tuple[bool, float]]]:
         close(world)
 
     monkeypatch.setattr(World, "close", watched)
-    monkeypatch.setattr("regrasp.behaviors.LEAVES", LEAVES)
-    monkeypatch.setattr("regrasp.app.run.compose.LEAVES", LEAVES)
+    own_leaves.put_in(LEAVES, monkeypatch.setattr)
     yield found
     py_trees.blackboard.Blackboard.clear()
 

@@ -1,6 +1,7 @@
 import json
 from pathlib import Path
 
+import own_leaves
 import pytest
 import yaml
 from hypothesis import HealthCheck, example, given, settings
@@ -249,7 +250,7 @@ def test_findings_of_all_files_come_at_once(scenario: Path) -> None:
 def test_a_tree_that_names_a_socket_which_the_cell_has_not_is_a_finding_in_the_tree(
     scenario: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("regrasp.behaviors.LEAVES", {"Unplug": Unplug})
+    own_leaves.put_in({"Unplug": Unplug}, monkeypatch.setattr)
     tree = scenario.parent / "tree.xml"
     tree.write_text(
         tree.read_text().replace('<Wait name="settle" seconds="0.1"/>', '<Unplug name="u" socket="bck_4"/>')

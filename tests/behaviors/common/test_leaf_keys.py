@@ -120,7 +120,7 @@ def test_causes_are_told_in_turn_and_gone_with_the_blackboard(services: Any) -> 
 def test_a_key_that_a_leaf_does_not_declare_is_a_programming_error(services: Any) -> None:
     with pytest.raises(TypeError, match="Pull writes toy/width, which it does not declare; name it in WRITES"):
         Pull("pull").write(WIDTH, 1.0)
-    with pytest.raises(TypeError, match="Pull clears toy/width, which it does not declare; name it in WRITES"):
+    with pytest.raises(TypeError, match="Pull clears toy/width, which it does not declare; name it in CLEARS"):
         Pull("pull").clear(WIDTH)
     with pytest.raises(TypeError, match="Grip reads toy/width, which it does not declare; name it in NEEDS or READS"):
         Grip("grip").read(WIDTH)
