@@ -110,7 +110,7 @@ def test_where_few_readings_are_the_axis_is_the_networks_own(detector: Detector)
 
 
 def test_what_has_another_colour_than_the_cells_connector_is_not_it(known: CableKnown) -> None:
-    blue = known.model_copy(update={"connector": known.cable.connector.model_copy(update={"color": (0.1, 0.1, 0.9)})})
+    blue = known.with_cable(connector=known.cable.connector.model_copy(update={"color": (0.1, 0.1, 0.9)}))
     frame = view(Cylinder(MIDDLE, axis_at(30.0)))
     assert Detector(blue).detect(frame) == []
     result = Detector(blue).estimate(frame, EYE)

@@ -15,7 +15,7 @@ from regrasp.perception.pose.segmentation import NotSeen
 
 Vector = NDArray[np.float64]
 EYE = RigidTransform.identity()  # the camera's optical frame is the world
-known = SimpleNamespace(connector=CONNECTOR)
+known = SimpleNamespace(cable=SimpleNamespace(connector=CONNECTOR))
 estimate = Rgbd(cast(CableKnown, known)).estimate
 MIDDLE = np.array([0.0, 0.0, 0.75])
 

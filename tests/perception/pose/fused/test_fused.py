@@ -174,7 +174,7 @@ def test_connectors_and_cables_of_other_colours(
     known: CableKnown, panels: list[Thing], hue: float, cable: tuple[float, float, float]
 ) -> None:
     color = colorsys.hsv_to_rgb(hue, 0.9, 0.75)
-    dyed = Fused(known.model_copy(update={"connector": known.cable.connector.model_copy(update={"color": color})}))
+    dyed = Fused(known.with_cable(connector=known.cable.connector.model_copy(update={"color": color})))
     result = dyed.estimate(seen([*panels, *plug(color=color, cable=cable)]), REAR_POSE, axis=-LEFTWARDS)
     position, angle = off(result)
     assert (position < 0.003, angle < 4.0) == (True, True), (position, angle)
