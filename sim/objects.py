@@ -16,22 +16,26 @@ class TaskObjects:
     While a world is built, it calls once, in this order:
 
     1. `build_fixed`, after the cell's boxes and before the obstacles,
-    2. `build_moving`, after the arms and before the cameras,
-    3. `forbidden`,
-    4. `effects`.
+    2. `build_moving`, after the arms,
+    3. `lay_out`, before the cameras,
+    4. `forbidden`,
+    5. `effects`.
 
     Every physics step has the order: the arms' servos, the effects of faults, `before_step`, the step, `after_step`;
     then, at the contact interval, the contacts' forces and `update_triggers`, and at last the cameras' exposures.
 
-    Objects belong to one world: they may keep what `build_moving` gives them.
+    Objects belong to one world: they may keep what these calls give them.
     """
 
     def build_fixed(self, engine: Engine) -> Mapping[str, int]:
         """Create the bodies that stand still; their ids by name, which no box of the cell has."""
         return {}
 
-    def build_moving(self, engine: Engine, fixed: Mapping[str, int], arms: Mapping[str, SimArm]) -> None:
-        """Create the bodies that move, filter their collisions, and bring them to where the run begins.
+    def build_moving(self, engine: Engine, arms: Mapping[str, SimArm]) -> None:
+        """Create the bodies that move."""
+
+    def lay_out(self, engine: Engine, fixed: Mapping[str, int]) -> None:
+        """Filter the moving bodies' collisions, and bring them to where the run begins.
 
         `fixed` holds the ids of all fixed bodies by name: the cell's boxes, the task's, and `obstacle NAME`. For the
         way to the beginning it may step the engine, whose clock starts afterwards; the arms hold still.

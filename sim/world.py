@@ -62,8 +62,9 @@ class World(Generic[ObjectsT]):
         self.fixed_bodies = self._scene.fixed_bodies
         self._devices = Devices(self._engine, cell, seed, parameters.devices)
         self.arms, self.cameras = self._devices.arms, self._devices.cameras
+        objects.build_moving(self._engine, self.arms)
         self._stand_arms_on_floor()
-        objects.build_moving(self._engine, self.fixed_bodies, self.arms)
+        objects.lay_out(self._engine, self.fixed_bodies)
         forbidden = {**self._scene.forbidden, **objects.forbidden()}
         self._contacts = ContactWatch(self.client, self.arms, forbidden)
         self.contact_peaks = self._contacts.peaks

@@ -68,10 +68,13 @@ class CableObjects(TaskObjects):
         """See `TaskObjects`: the clip's bracket and the sockets."""
         return build_fixtures(engine.client, self.cell.known.cable)
 
-    def build_moving(self, engine: Engine, fixed: Mapping[str, int], arms: Mapping[str, SimArm]) -> None:
-        """See `TaskObjects`: the cable, laid into its socket or on its stand."""
+    def build_moving(self, engine: Engine, arms: Mapping[str, SimArm]) -> None:
+        """See `TaskObjects`: the cable."""
         self._client, self._arms = engine.client, arms
         self.cable = self._build_cable(engine)
+
+    def lay_out(self, engine: Engine, fixed: Mapping[str, int]) -> None:
+        """See `TaskObjects`: the cable comes to rest in its socket or on its stand."""
         self._filter_collisions(engine, fixed)
         self.socket = self._plug(engine)
         self.clip = self._build_clip(engine)

@@ -48,9 +48,13 @@ class Diary(TaskObjects):
         self._note("build_fixed")
         return {"shelf": build_box(engine.client, Box(name="shelf", center=(0.0, 1.0, 0.5), size=(0.1, 0.1, 0.1)))}
 
-    def build_moving(self, engine: Engine, fixed: Mapping[str, int], arms: Mapping[str, SimArm]) -> None:
+    def build_moving(self, engine: Engine, arms: Mapping[str, SimArm]) -> None:
         self._note("build_moving")
-        self.fixed, self.arms = dict(fixed), list(arms)
+        self.arms = list(arms)
+
+    def lay_out(self, engine: Engine, fixed: Mapping[str, int]) -> None:
+        self._note("lay_out")
+        self.fixed = dict(fixed)
         engine.step()  # on the way to the beginning
 
     def forbidden(self) -> Mapping[int, str]:
@@ -76,7 +80,7 @@ def test_hooks_are_called_in_their_order(solo: Cell) -> None:
     diary = Diary()
     setup = SceneSetup((OBSTACLE,), (NEVER,), (Prop("ball", (0.03,), (0.0, 1.0, 0.0)),))
     world = World(solo, "zero", 1, diary, setup)
-    assert diary.called == ["build_fixed", "build_moving", "forbidden", "effects", "update_triggers"]
+    assert diary.called == ["build_fixed", "build_moving", "lay_out", "forbidden", "effects", "update_triggers"]
     assert world.now() == 0.0
     boxes = len(solo.known.boxes)
     # after the shelf come an obstacle, a prop and the arm
@@ -111,10 +115,13 @@ class Ball(TaskObjects):
     def __init__(self) -> None:
         self.began: dict[str, float] = {}
 
-    def build_moving(self, engine: Engine, fixed: Mapping[str, int], arms: Mapping[str, SimArm]) -> None:
-        self._client, self._floor = engine.client, fixed["floor"]
+    def build_moving(self, engine: Engine, arms: Mapping[str, SimArm]) -> None:
+        self._client = engine.client
         shape = p.createCollisionShape(p.GEOM_SPHERE, radius=RADIUS, physicsClientId=engine.client)
         self.body = p.createMultiBody(MASS, shape, -1, [0.3, 0.3, 0.2], physicsClientId=engine.client)
+
+    def lay_out(self, engine: Engine, fixed: Mapping[str, int]) -> None:
+        self._floor = fixed["floor"]
 
     def effects(self) -> TaskEffects:
         def pushed(fault: BallPushed, world: FaultTarget, _: np.random.Generator) -> Effect:
@@ -171,7 +178,7 @@ class Vice(TaskObjects):
     def __init__(self, untouchable: bool) -> None:
         self._untouchable = untouchable
 
-    def build_moving(self, engine: Engine, fixed: Mapping[str, int], arms: Mapping[str, SimArm]) -> None:
+    def build_moving(self, engine: Engine, arms: Mapping[str, SimArm]) -> None:
         x, y, z = arms[ARM].tool_pose().translation.tolist()
         self.body = build_box(engine.client, Box(name="vice", center=(x, y, z), size=(0.02, 0.02, 0.02)))
 

@@ -236,7 +236,8 @@ def test_trees_check_tells_every_finding_of_every_file(tmp_path: Path) -> None:
 
 def test_trees_leaves_says_what_a_tree_may_hold() -> None:
     everything = invoke("trees", "leaves").stdout
-    for text in ("Wait", "    seconds        input, float above 0, required", "Sequence           Ticks its", "SubTree"):
+    seconds = "    seconds        input, float above 0, required"
+    for text in ("Wait", seconds, "Sequence           Ticks its", "SubTree"):
         assert text in everything
     one = invoke("trees", "leaves", "Retry").stdout.splitlines()
     assert one == [
