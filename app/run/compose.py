@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import py_trees
@@ -16,13 +16,14 @@ from regrasp.app.task.task import Task
 from regrasp.behaviors import registry
 from regrasp.behaviors.keys import causes
 from regrasp.behaviors.services import Services
-from regrasp.interfaces.cell import Cell
 from regrasp.interfaces.scene import SceneSetup
 from regrasp.motion.service import Motion
 from regrasp.perception.service import Perception
 from regrasp.sim.render.renderer import RendererName
 from regrasp.sim.world import World
 from regrasp.trees import load_tree, read_graph
+
+ServicesT = TypeVar("ServicesT", bound=Services)
 
 
 @dataclass
@@ -48,26 +49,36 @@ def build_world(scenario: Scenario, seed: int, renderer: RendererName = "softwar
 
 
 def build_services(world: World[Any], seed: int, log: Any) -> Services:
-    """Motion and perception on the world's devices, as every task has them. `log` is a structlog logger.
+    """Motion and perception as every task has them, see `connected`."""
+    return connected(Services, Motion, Perception, world, seed, log)
 
-    They get the known part of the cell only, and no ground truth.
+
+def connected(
+    services: Callable[..., ServicesT],
+    motion: Callable[..., Motion],
+    perception: Callable[..., Perception],
+    world: World[Any],
+    seed: int,
+    log: Any,
+) -> ServicesT:
+    """Services of these classes on the world's devices. `log` is a structlog logger.
+
+    They get the known part of the cell only, and no ground truth. What a motion compiles is loaded now. The planner's
+    seeds begin at a thousand times the run's; each plan takes the next one.
     """
-    cell: Cell = world.cell
+    known = world.cell.known
     grippers = {name: arm.gripper for name, arm in world.arms.items()}
-    motion = Motion(cell.known, world.arms, grippers, world, planner_seed(seed), on_anomaly=anomaly_log(log))
-    motion.warm_up()
-    perception = Perception(cell.known, world.cameras, world, motion.camera_pose, motion.spheres)
-    return Services(cell.known, world, motion, perception, log)
-
-
-def planner_seed(seed: int) -> int:
-    """Where the planner's seeds begin in the run with this seed; each plan takes the next one."""
-    return seed * 1000
-
-
-def anomaly_log(log: Any) -> Callable[[str], None]:
-    """Writes a warning into the log when an arm does not follow; see `Execution`."""
-    return lambda sentence: log.warning("does not follow", why=sentence)
+    arms = motion(
+        known,
+        world.arms,
+        grippers,
+        world,
+        seed * 1000,
+        on_anomaly=lambda sentence: log.warning("does not follow", why=sentence),
+    )
+    arms.warm_up()
+    sight = perception(known, world.cameras, world, arms.camera_pose, arms.spheres)
+    return services(known, world, arms, sight, log)
 
 
 def assemble(scenario: Scenario, world: World[Any], seed: int, log: Any) -> Episode:

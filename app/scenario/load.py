@@ -217,6 +217,8 @@ class _Source:
         file, errors = read_as(document, model)
         told = words_of_others(document, find.task_named(model.TASK)) if errors and model.TASK else {}
         errors = [_retold(error, told.get(error.path)) for error in errors]
+        if not model.TASK:  # the task is not known: nor are its expectations and faults
+            errors = [error for error in errors if error.path[:1] not in (("expect",), ("faults",))]
         errors = [error for error in errors if not self._is_for_cases(case, error)]
         self.note((self._told(error) for error in errors), case)
         if not case:

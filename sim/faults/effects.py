@@ -75,8 +75,9 @@ def effect_of(
     Raises:
         KeyError: the fault names an arm or a camera that the world does not have.
     """
-    if type(fault) in of_task:
-        return of_task[type(fault)](fault, world, rng)
+    for kind in type(fault).__mro__:  # a scenario's fault is of a class derived from the task's
+        if kind in of_task:
+            return of_task[kind](fault, world, rng)
     match fault:
         case f.JawFault():
             return _jaw(fault, world)
