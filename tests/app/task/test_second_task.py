@@ -1,4 +1,4 @@
-"""A second task, in tests/second_task, that no file of the engine knows: run, explained, and kept apart from the first."""
+"""A second task, in tests/second_task, that no file of the engine knows: run, explained, told from the first."""
 
 import json
 import os
