@@ -32,7 +32,7 @@ def calibrate(
         Path | None, typer.Option(metavar="DIR", help="Draw the corners and their residuals, a PNG a view.")
     ] = None,
     cell: Annotated[str, typer.Option(help="Rendered: the cell with the camera.")] = "thesis",
-    camera: Annotated[str, typer.Option(help="Rendered: which of its cameras.")] = "rear",
+    camera: Annotated[str | None, typer.Option(help="Rendered: which of its cameras; by default the first.")] = None,
     views: Annotated[int, typer.Option(min=5, max=200, help="Rendered: how many.")] = 20,
     seed: Annotated[int, typer.Option(min=0, max=MAX_SEED, help="Rendered: draws where the board is held.")] = 0,
 ) -> None:
@@ -67,9 +67,9 @@ def calibrate(
         steps.run_calibration(steps.pictures_in(images), board, shown(images), out, draw, None)
         return
     cameras = load_cell(resolve("cell", cell, Path()), laid_out=False).known.cameras
-    spec = next((c for c in cameras if c.name == camera), None)
+    spec = next((c for c in cameras if camera in (None, c.name)), None)
     if spec is None:
-        message = f"no camera {quoted(camera)}; {nearest(camera, [c.name for c in cameras])}"
+        message = f"no camera {quoted(camera or '')}; {nearest(camera or '', [c.name for c in cameras])}"
         raise Findings([Finding("--camera", 0, message)])
     steps.run_calibration(
         steps.rendered_pictures(spec, board, views, seed), board, "--views", out, draw, spec.intrinsics

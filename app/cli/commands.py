@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from regrasp.app.cli import calibrate, migrate, records, run, scenarios, trees
+from regrasp.app.cli import calibrate, migrate, records, run, scenarios, snapshot, trees
 from regrasp.app.cli.options import EXIT_BAD_INPUT, EXIT_UNMET
 from regrasp.app.files.findings import Findings
 from regrasp.app.interrupts import EXIT_INTERRUPTED
@@ -64,6 +64,7 @@ app.add_typer(trees.app, name="trees")
 study = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Run many episodes or scenes, and count.")
 app.add_typer(study, name="study")
 calibrate.add_to(app)
+snapshot.add_to(app)
 migrate.add_to(app)
 for task in tasks():
     if task.commands is not None:

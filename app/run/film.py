@@ -1,4 +1,4 @@
-"""Films a run: overview, rear and wrist camera side by side, the active leaf and the clock."""
+"""Films a run: overview and the cell's first two cameras side by side, the active leaf and the clock."""
 
 import sys
 from collections import deque
@@ -32,6 +32,7 @@ class FilmParameters:
     overview: FixedMount = field(  # behind and above the right arm
         default_factory=lambda: FixedMount(position=(-0.55, -0.75, 0.85), pitch_down_deg=30.0, yaw_deg=38.0)
     )
+    cameras: int = 2  # that are shown, at most; the picture has room for two
     shrink: int = 2  # of the cameras' pictures, which are shown this much smaller
     overview_fov: float = 0.95  # rad, horizontal; the whole cell is in the picture
     max_waiting: int = 8  # frames that wait to be drawn before the run waits for them
@@ -85,7 +86,8 @@ class Film:
         if self._writer is None or world.now() * self._parameters.rate < self._frames - 1e-6:
             return
         self._frames += 1
-        previews = [world.cameras[name].deferred_preview(self._parameters.shrink) for name in ("rear", "wrist")]
+        shown = [*world.cameras.items()][: self._parameters.cameras]
+        previews = [(name, camera.deferred_preview(self._parameters.shrink)) for name, camera in shown]
         lines = [
             f"{world.now():6.1f} s",
             f"{leaf}",
@@ -101,12 +103,12 @@ class Film:
         writer: VideoWriter,
         poses: Callable[[], NDArray[np.float32]],
         light: LightState,
-        previews: list[Preview],
+        previews: list[tuple[str, Preview]],
         lines: list[str],
     ) -> None:
         renderer = self._renderer.result()
-        rear, wrist = (None if preview is None else preview(renderer) for preview in previews)
-        writer.write(compose(render_overview(renderer, poses(), light, self._parameters), rear, wrist, lines))
+        cameras = [(name, None if preview is None else preview(renderer)) for name, preview in previews]
+        writer.write(compose(render_overview(renderer, poses(), light, self._parameters), cameras, lines))
 
     def _wait(self, count: int) -> None:
         """Wait until no more than `count` frames wait to be drawn. Raises, once, what went wrong in the thread."""

@@ -23,18 +23,20 @@ _CAMERA_SIZE = (424, 240)
 _INK, PAPER = (235, 235, 235), 24  # of 255: light letters on a dark ground
 
 
-def compose(overview: RgbImage | None, rear: RgbImage | None, wrist: RgbImage | None, lines: Sequence[str]) -> RgbImage:
-    """One video frame (544, 1280, 3) uint8 RGB: overview on the left, rear and wrist on the right, text below.
+def compose(
+    overview: RgbImage | None, cameras: Sequence[tuple[str, RgbImage | None]], lines: Sequence[str]
+) -> RgbImage:
+    """One video frame (544, 1280, 3) uint8 RGB: overview on the left, up to two cameras on the right, text below.
 
     Images are (H, W, 3) uint8 RGB of any size and are scaled to fit; None leaves the place dark. Up to four lines are
     shown, in two columns.
     """
     frame: RgbImage = np.full((SIZE[1], SIZE[0], 3), PAPER, np.uint8)
     _place(frame, overview, (0, 0), OVERVIEW_SIZE)
-    for row, (label, image) in enumerate({"rear camera": rear, "wrist camera": wrist}.items()):
+    for row, (name, image) in enumerate(cameras[:2]):
         left, top = OVERVIEW_SIZE[0], row * _CAMERA_SIZE[1]
         _place(frame, image, (left, top), _CAMERA_SIZE)
-        write_text(frame, label, (left + 8, top + 20), 0.5)
+        write_text(frame, f"{name} camera", (left + 8, top + 20), 0.5)
     for i, line in enumerate(lines[:4]):
         column, row = divmod(i, 2)
         write_text(frame, line, (16 + column * SIZE[0] // 2, OVERVIEW_SIZE[1] + 25 + 27 * row), 0.6)

@@ -28,7 +28,9 @@ def colors(path: Path) -> list[tuple[int, int, int]]:
 
 def test_each_picture_has_its_place() -> None:
     frame = compose(
-        image(*OVERVIEW_SIZE, (200, 0, 0)), image(848, 480, (0, 200, 0)), image(848, 480, (0, 0, 200)), ["look"]
+        image(*OVERVIEW_SIZE, (200, 0, 0)),
+        [("rear", image(848, 480, (0, 200, 0))), ("wrist", image(848, 480, (0, 0, 200)))],
+        ["look"],
     )
     assert frame.shape == (SIZE[1], SIZE[0], 3)
     assert tuple(frame[240, 400]) == (200, 0, 0)
@@ -38,15 +40,15 @@ def test_each_picture_has_its_place() -> None:
 
 def test_text_has_contrast_in_the_band_and_on_the_pictures() -> None:
     white = image(848, 480, (255, 255, 255))
-    frame = compose(white, white, None, ["look  12.3 s", "phase", "tall_obstacle", "seed 3"])
+    frame = compose(white, [("rear", white), ("wrist", None)], ["look  12.3 s", "phase", "tall_obstacle", "seed 3"])
     for part in (frame[480:, :600], frame[480:, 640:], frame[4:24, 860:980]):
         assert int(part.max()) - int(part.min()) > 150
-    bare = compose(white, white, None, [])
+    bare = compose(white, [("rear", white), ("wrist", None)], [])
     assert not np.array_equal(frame, bare)
 
 
 def test_other_shapes_are_fitted_and_missing_pictures_left_dark() -> None:
-    frame = compose(image(100, 400, (200, 0, 0)), None, image(64, 48, (0, 0, 200)), ["ü" * 300])
+    frame = compose(image(100, 400, (200, 0, 0)), [("rear", None), ("wrist", image(64, 48, (0, 0, 200)))], ["ü" * 300])
     assert tuple(frame[240, OVERVIEW_SIZE[0] // 2]) == (200, 0, 0)
     assert tuple(frame[240, 100]) == tuple(frame[120, 1100]) == (24, 24, 24)
 

@@ -1,4 +1,4 @@
-"""`regrasp perceive` and `regrasp snapshot`."""
+"""`regrasp perceive`."""
 
 import re
 from collections.abc import Sequence
@@ -7,13 +7,11 @@ from typing import TYPE_CHECKING, Annotated, TypeVar
 
 import typer
 
-from regrasp.app.cli.options import Sets
 from regrasp.app.files.findings import Finding, Findings, real_path, shown
 from regrasp.app.files.resources import resolve
 from regrasp.app.interrupts import late_imports
 from regrasp.app.records import folders
-from regrasp.interfaces.quote import nearest, quoted
-from regrasp.interfaces.seed import MAX_SEED
+from regrasp.interfaces.quote import quoted
 
 if TYPE_CHECKING:
     from regrasp.interfaces.fields import Color
@@ -21,14 +19,11 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 DRAWING_SUFFIXES = (".png", ".jpg", ".jpeg")  # of a drawing
-# A snapshot writes some of these. A camera pose that an earlier one left would not belong to the new pictures.
-SNAPSHOT_FILES = ("rgb.png", "rgb_001.png", "depth.png", "depth_001.png", "intrinsics.yaml", "camera_pose.yaml")
 
 
 def add_to(app: typer.Typer) -> None:
-    """Add the commands to `app`."""
+    """Add the command to `app`."""
     app.command("perceive")(perceive)
-    app.command("snapshot")(snapshot)
 
 
 def perceive(
@@ -173,43 +168,3 @@ def _color(text: str, wrong: list[Finding], min_saturation: float = 0.2) -> "Col
         )
         return None
     return red, green, blue
-
-
-def snapshot(
-    scenario: Annotated[str, typer.Argument(help="A shipped scenario's name, or a path to a .yaml file.")],
-    out: Annotated[Path, typer.Option(metavar="DIR", help="A folder for the files.")],
-    camera: Annotated[str, typer.Option(metavar="NAME", help="The cell's camera: rear or wrist.")] = "rear",
-    frames: Annotated[int, typer.Option(min=1, max=100, help="How many.")] = 1,
-    seed: Annotated[
-        int | None, typer.Option(min=0, max=MAX_SEED, help="Draws every error and noise; default the scenario's.")
-    ] = None,
-    sets: Sets = None,
-) -> None:
-    """Write a scenario's first camera frames as files.
-
-    rgb.png, depth.png (16 bit, millimetres) and intrinsics.yaml. Of a camera that stands still camera_pose.yaml, too:
-    where the robot believes it to be. Several frames are rgb_001.png, depth_001.png, and so on.
-
-    \b
-    Example:
-      regrasp snapshot no_obstacle --seed 3 --frames 4 --out four
-      regrasp snapshot no_obstacle --set cell=thesis_tags --out tags
-    """
-    from regrasp.app.scenario.load import load_scenario
-
-    wrong = folders.folder_findings(out)
-    if there := [name for name in SNAPSHOT_FILES if (out / name).exists()]:
-        wrong.append(Finding(shown(out), 0, f"already holds {', '.join(there)}; name another folder"))
-    loaded = load_scenario(scenario, [*(sets or []), *([] if seed is None else [f"seed={seed}"])], None)
-    names = [c.name for c in loaded.cell.known.cameras]
-    if camera not in names:
-        wrong.append(Finding("--camera", 0, f"no camera {quoted(camera)}; {nearest(camera, names)}"))
-    if wrong:
-        raise Findings(wrong)
-    with late_imports():
-        from regrasp.app.frames.snapshot import (
-            write_snapshot,
-        )  # brings the planner, the compiler and the physics: seconds
-
-    write_snapshot(loaded, camera, frames, out)
-    typer.echo(f"written to {shown(out)}")
