@@ -53,13 +53,15 @@ class Key(Generic[T]):
         TypeError: a default that can be changed, such as a list.
     """
 
-    name: str  # such as cable/held
+    name: str  # such as button/place
     about: str
     default: T | _Nothing = NOTHING
 
     def __post_init__(self) -> None:
         if not _NAME.fullmatch(self.name):
-            raise ValueError(f"a key's name is words with slashes between them, such as cable/held, not {self.name!r}")
+            raise ValueError(
+                f"a key's name is words with slashes between them, such as button/place, not {self.name!r}"
+            )
         if not isinstance(self.default, Hashable):
             raise TypeError(f"the default of {self.name} can be changed, and all readers would share it; take a tuple")
 
@@ -70,7 +72,7 @@ class Key(Generic[T]):
 
     @property
     def text(self) -> str:
-        """How messages name the key: cable/held (tool_from_connector)."""
+        """How messages name the key: button/place (its middle, m, in the world)."""
         return f"{self.name} ({self.about})"
 
 

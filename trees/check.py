@@ -31,7 +31,7 @@ def check_tree(
     """All findings, in line order, at most `max_findings`; a file without findings loads.
 
     `leaves` maps a tag to its class, by default those that are installed. `names` holds, for each kind of object in the
-    cell, the names that a port may take, {"socket": ["back_1", ...]}; without it names are not checked. `task` is the
+    cell, the names that a port may take, {"shelf": ["upper", ...]}; without it names are not checked. `task` is the
     scenario's; without it the tree's leaves must be of one task.
 
     Raises:

@@ -19,7 +19,7 @@ from regrasp.behaviors.keys import Keys, declared
 from regrasp.interfaces.quote import nearest
 
 Accepts = Any  # a type, or the words that may stand there as a tuple of strings
-# The names in a cell by kind of object: {"socket": ["back_1", "back_2"]}. A mapping in place of the list gives for each
+# The names in a cell by kind of object: {"shelf": ["upper", "lower"]}. A mapping in place of the list gives for each
 # name the reason why it cannot be used here; "" means that it can.
 CellNames = Mapping[str, Collection[str]]
 ANY_STATUS = frozenset({Status.SUCCESS, Status.FAILURE, Status.RUNNING})
