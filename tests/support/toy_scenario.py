@@ -37,7 +37,7 @@ TREE = """\
 """
 
 
-class Wait(BehaviourWithPorts, register=False):  # type: ignore[misc]  # py_trees is untyped to mypy here
+class Wait(BehaviourWithPorts, register=False):  # type: ignore[misc, call-arg]  # py_trees is untyped to mypy here
     INPUT_PORTS: ClassVar[dict[str, PortInformation]] = {"seconds": PortInformation(data_type=float)}
     OUTPUT_PORTS: ClassVar[dict[str, PortInformation]] = {}
 

@@ -145,7 +145,7 @@ def test_what_base_classes_declare_is_declared_with_it() -> None:
 
 def test_a_key_is_refused_that_could_not_work() -> None:
     for name in ("", "/held", "toy/", "toy.held", "toy//held"):
-        with pytest.raises(ValueError, match="such as cable/held"):
+        with pytest.raises(ValueError, match="such as button/place"):
             Key(name, "")
     with pytest.raises(TypeError, match="the default of toy/list can be changed"):
         Key("toy/list", "", default=[])
