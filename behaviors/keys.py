@@ -12,9 +12,9 @@
         READS = (HELD,)      # and in work: if self.read(HELD, None) is None: ...
         CLEARS = (HELD,)     # and in work: self.clear(HELD)
 
-The check of a tree file finds a leaf whose key nothing can have written before its first tick. Values are immutable:
-who changes one writes a new one. A key's name begins with its task's, and its place on the blackboard is none that a
-port of a tree file can be wired to.
+The check of a tree file finds a leaf whose key nothing can have written before its first tick. Nobody changes a value
+that is written: who wants another writes a new one. By convention a key's name begins with its task's. Its place on the
+blackboard is none that a port of a tree file can be wired to.
 """
 
 import re

@@ -2,7 +2,7 @@
 
 from collections.abc import Generator
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeVar
 
 from py_trees.common import Status
 from py_trees.ports import BehaviourWithPorts, PortInformation
@@ -10,10 +10,11 @@ from py_trees.ports import BehaviourWithPorts, PortInformation
 from regrasp.behaviors.keys import CAUSES, Keys, MissingKeyError, WithKeys
 from regrasp.behaviors.services import Services
 from regrasp.interfaces.cause import Cause, CauseCode, ServiceError
+from regrasp.interfaces.request import Request
 from regrasp.motion.failure import PlanningError
-from regrasp.motion.request import MotionRequest
 
-LeafSteps = Generator[MotionRequest | None, None, None]
+T = TypeVar("T")
+LeafSteps = Generator[Request[Any] | None, None, None]
 
 
 class LeafFailed(Exception):  # noqa: N818 - it names the leaf's outcome
@@ -98,29 +99,30 @@ class Leaf(WithServices, BehaviourWithPorts):
 
 
 class StepsLeaf(Leaf):
-    """A leaf whose work is a sequence: `steps()` yields a `MotionRequest` to be done, or None to wait for a tick.
+    """A leaf whose work is a sequence: `steps()` yields a `Request` to be done, or None to wait for a tick.
 
-    It ends in SUCCESS when the steps end, and in FAILURE when they raise `LeafFailed` or a task raises PlanningError.
+    It ends in SUCCESS when the steps end, and in FAILURE when they raise `LeafFailed` or a request raises
+    PlanningError.
     """
 
     INPUT_PORTS: ClassVar[dict[str, Any]] = {}
     OUTPUT_PORTS: ClassVar[dict[str, Any]] = {}
-    _task: MotionRequest | None = None
+    _request: Request[Any] | None = None
 
     def steps(self) -> LeafSteps:
-        """The work, as a generator that goes on when the task it yielded is done."""
+        """The work, as a generator that goes on when the request that it yielded is done."""
         raise NotImplementedError
 
     def initialise(self) -> None:
         """Begin anew."""
-        self._work, self._task = self.steps(), None
+        self._work, self._request = self.steps(), None
 
     def work(self) -> Status:
-        """Poll the task under way; when it is done take the next step."""
+        """Poll the request under way; when it is done take the next step."""
         try:
-            while self._task is None or self._task.poll():
-                self._task = next(self._work)
-                if self._task is None:
+            while self._request is None or self._request.poll():
+                self._request = next(self._work)
+                if self._request is None:
                     return Status.RUNNING
         except StopIteration:
             return Status.SUCCESS
@@ -131,18 +133,22 @@ class StepsLeaf(Leaf):
     def terminate(self, new_status: Status) -> None:
         """Stop the arm if this leaf was RUNNING; one that had ended has nothing to stop."""
         if self.status is Status.RUNNING and new_status is Status.INVALID:
-            if self._task is not None:
-                self._task.cancel()
+            if self._request is not None:
+                self._request.cancel()
             self._work.close()
 
-    def follow(self, task: MotionRequest) -> LeafSteps:
-        """Steps that do a task, for a leaf that handles its PlanningError itself. The task stops with the leaf."""
+    def ask(self, request: Request[T]) -> Generator[Request[Any] | None, None, T]:
+        """Steps that do a request and return its answer, for a leaf that needs it, or that handles its PlanningError.
+
+        The request stops with the leaf.
+        """
         try:
-            while not task.poll():
+            while not request.poll():
                 yield None
         except GeneratorExit:
-            task.cancel()
+            request.cancel()
             raise
+        return request.answer
 
     def wait(self, seconds: float) -> LeafSteps:
         """Steps that let so many simulated seconds pass."""

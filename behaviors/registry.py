@@ -13,7 +13,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.ports import PortsMixin
 
 from regrasp.behaviors.common import LEAVES as COMMON
-from regrasp.interfaces.plugins import installed, load
+from regrasp.interfaces.plugins import PluginError, installed, load
 
 GROUP = "regrasp.leaves"
 TASKS = "regrasp.tasks"
@@ -45,8 +45,8 @@ def leaf_set(name: str) -> Mapping[str, type[Any]]:
     """The leaf classes of the set of that name.
 
     Raises:
+        PluginError: it cannot be imported.
         TypeError: it is no mapping of names to classes of leaves.
-        Exception: what its import raises.
     """
     classes: Mapping[str, type[Any]] = dict(load(GROUP, name))
     for leaf, made in classes.items():
@@ -106,8 +106,8 @@ def _gathered(sets: Iterable[str]) -> Leaves:
             continue
         try:
             classes = leaf_set(name)
-        except Exception as error:  # another package's: told where a tree names a leaf that is not found
-            found.broken[name] = f"{type(error).__name__}: {error}"
+        except (PluginError, TypeError, ValueError) as error:  # told where a tree names a leaf that is not found
+            found.broken[name] = str(error)
             continue
         new = {leaf: made for leaf, made in classes.items() if leaf not in found}
         found |= new

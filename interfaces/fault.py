@@ -27,9 +27,9 @@ PositiveFraction = Annotated[float, Field(gt=0, le=1)]
 
 
 class When(Model):
-    """When a fault begins: exactly one of `at`, `node` and `phase`. Each fault begins once.
+    """When a fault begins: exactly one of `at` and `node`. Each fault begins once.
 
-    A task may add its phases, and shares of its progress as ranges whose names stand in `SHARES`.
+    A task may add its phases as `phase`, a Literal, and shares of its progress as ranges whose names stand in `SHARES`.
     """
 
     SHARES: ClassVar[tuple[str, ...]] = ()
@@ -47,13 +47,10 @@ class When(Model):
         description="With `node`: seconds after it is entered; drawn from this range.",
         examples=[[0.5, 1.5]],
     )
-    phase: str | None = Field(
-        default=None, description="A phase of the task begins, by ground truth.", examples=["lost"]
-    )
 
     @model_validator(mode="after")
     def _one(self) -> Self:
-        choices = ("at", *self.SHARES, "node", "phase")
+        choices = ["at", *self.SHARES, "node", *(["phase"] if "phase" in type(self).model_fields else [])]
         given = [name for name in choices if getattr(self, name) is not None]
         if len(given) != 1:
             told = " and ".join(given) or "nothing"

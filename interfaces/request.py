@@ -31,7 +31,7 @@ class Request(Generic[T]):
         return self._step()
 
     def cancel(self) -> None:
-        """Stop where it is; the task counts as done."""
+        """Stop where it is; the request counts as done."""
         self._steps = iter(())
         self._stop()
 

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 class MotionService(Protocol):
-    """Motions of the arms. A request returns a task at once; it fails with PlanningError."""
+    """Motions of the arms. Each returns a request at once, which fails with PlanningError."""
 
     def move(self, arm: str, goals: FloatArray, *, margin: float | None = None, tight: bool = True) -> Request[None]:
         """Bring an arm along a free path to one of the goals (n, 6) rad, `margin` m from everything."""
@@ -36,7 +36,8 @@ class MotionService(Protocol):
         checked: bool = True,
         without: "Collection[Box]" = (),
     ) -> Request[None]:
-        """Move the tool straight by `displacement` (3,) m in the world; `checked`: if only boxes `without` are met."""
+        """Move the tool straight by `displacement` (3,) m in the world; `checked`: not if the arm
+        would touch anything but the boxes `without`."""
         ...
 
     def close(self, arm: str, thickness: float) -> Request[float]:

@@ -56,8 +56,8 @@ class ExecutionParameters:
 class Execution:
     """Carries out motions of the arms on the simulated clock; planning one takes `latency` s.
 
-    An arm or jaw that fails is out of order: from then on every task of it fails with the same cause. `on_anomaly` is
-    told, in a sentence, of an arm or a jaw that does not follow.
+    An arm or jaw that fails is out of order: from then on every request to it fails with the same cause. `on_anomaly`
+    is told, in a sentence, of an arm or a jaw that does not follow.
     """
 
     def __init__(
@@ -76,7 +76,7 @@ class Execution:
         self._out_of_order: dict[str, PlanningError] = {}
 
     def request(self, arm: str, steps: Iterator[None]) -> MotionRequest:
-        """The steps as a task of an arm. It raises the arm's cause at its first poll if that is out of order."""
+        """The steps as a request to an arm. It raises the arm's cause at its first poll if that is out of order."""
 
         def guarded() -> Iterator[None]:
             if arm in self._out_of_order:

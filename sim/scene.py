@@ -16,12 +16,17 @@ class Scene:
 
     `fixed_bodies` holds the ids of all but the props by name: the boxes' names, those that the task gives, and
     `obstacle NAME`. `forbidden` names the bodies that no arm must touch: boxes and obstacles.
+
+    Raises:
+        ValueError: a body of the task has the name of a box.
     """
 
     def __init__(self, engine: Engine, known: KnownCell, objects: TaskObjects, setup: SceneSetup) -> None:
         self._client = engine.client
         boxes = {box.name: build_box(self._client, box) for box in known.boxes}
         of_task = objects.build_fixed(engine)
+        if twice := boxes.keys() & of_task.keys():
+            raise ValueError(f"a box of the cell and a body of the task are both named {', '.join(sorted(twice))}")
         obstacles = self._build_obstacles(setup.obstacles)
         self._props = [build_prop(self._client, prop) for prop in setup.props]
         self.fixed_bodies: dict[str, int] = {**boxes, **of_task, **obstacles}

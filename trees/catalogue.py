@@ -26,7 +26,7 @@ def describe(tag: str, kind: ElementKind, full: bool = False) -> Iterator[str]:
         yield f"    {'returns':<14} {', '.join(sorted(status.value.lower() for status in kind.returns))}"
     for name, attribute in kind.attributes.items():
         yield f"    {name:<14} {_attribute(attribute)}"
-    for use, keys in (("needs", kind.needs), ("reads", kind.reads), ("writes", kind.writes)):
+    for use, keys in (("needs", kind.needs), ("reads", kind.reads), ("writes", kind.writes), ("clears", kind.clears)):
         yield from (f"    {key.name:<14} {use}: {key.about}" for key in keys if key is not CAUSES)  # any leaf's
 
 

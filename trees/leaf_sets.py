@@ -1,10 +1,11 @@
 """The installed leaves that a tree file names, and the task that they belong to."""
 
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from regrasp.interfaces.quote import cut
-from regrasp.trees.element import Element
+from regrasp.trees.element import Element, TreeSyntaxError, read_elements
 from regrasp.trees.vocabulary import BUILT_IN
 
 if TYPE_CHECKING:
@@ -46,3 +47,13 @@ def not_imported(leaves: Mapping[str, type]) -> str:
     return "".join(
         f", and the leaf set {cut(name)} cannot be imported ({cut(why, 200)})" for name, why in broken.items()
     )
+
+
+def task_of(path: Path) -> str | None:
+    """The task of a tree file's first leaf that belongs to one; None without one, and if the file cannot be read."""
+    try:
+        root = read_elements(path)
+    except (OSError, TreeSyntaxError):  # a finding of the check
+        return None
+    tasks = installed_leaves(root).tasks
+    return next((tasks[element.tag] for element in root.walk() if element.tag in tasks), None)

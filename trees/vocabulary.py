@@ -85,6 +85,7 @@ class ElementKind:
     needs: Keys = ()
     reads: Keys = ()
     writes: Keys = ()
+    clears: Keys = ()  # which are no writers
 
 
 _MEMORY = {"memory": Attribute(("true", "false"), takes_key=False, about="true: go on at the child that was running")}
@@ -179,6 +180,7 @@ def _leaf_kind(tag: str, leaf: Any, names: CellNames) -> ElementKind:
         needs=needs,
         reads=declared(leaf, "READS"),
         writes=declared(leaf, "WRITES"),
+        clears=declared(leaf, "CLEARS"),
     )
 
 

@@ -67,8 +67,11 @@ calibrate.add_to(app)
 snapshot.add_to(app)
 migrate.add_to(app)
 for task in tasks():
-    if task.commands is not None:
-        task.commands()(app, study)
+    try:
+        if task.commands is not None:
+            task.commands()(app, study)
+    except Exception as error:  # another package's code: the other commands go on
+        typer.echo(f"warning: the task {task.name} adds no commands: {printable(str(error))}", err=True)
 
 
 def _version(wanted: bool) -> None:

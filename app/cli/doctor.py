@@ -6,7 +6,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from ctypes.util import find_library
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -15,7 +15,9 @@ from regrasp.app.files.findings import Findings
 from regrasp.app.files.resources import shipped
 from regrasp.app.records import folders
 from regrasp.app.task import find
+from regrasp.app.task.part import Part
 from regrasp.behaviors.registry import leaf_set
+from regrasp.interfaces.plugins import PluginError
 
 if TYPE_CHECKING:
     from regrasp.sim.world import World
@@ -68,15 +70,18 @@ def package(name: str) -> Check:
 
 
 def task(name: str) -> Check:
-    """Whether the task can be loaded, with its leaves."""
+    """Whether the task can be loaded, with its leaves and all its parts."""
     try:
-        about = find.task_named(name).about
+        task = find.task_named(name)
+        for field in fields(task):
+            if isinstance(part := getattr(task, field.name), Part):
+                part()
         leaf_set(name)
     except Findings as error:
-        return Check(f"task {name}", "wrong", error.items[0].message)
-    except Exception as error:  # any error of its package is what the user must read
-        return Check(f"task {name}", "wrong", f"its leaves cannot be loaded: {type(error).__name__}: {error}")
-    return Check(f"task {name}", "ok", about)
+        return Check(f"task {name}", "wrong", str(error.items[0]))
+    except (PluginError, TypeError, ValueError) as error:
+        return Check(f"task {name}", "wrong", f"its leaves cannot be loaded: {error}")
+    return Check(f"task {name}", "ok", task.about)
 
 
 def output_folder(out: Path) -> Check:

@@ -99,7 +99,7 @@ def print_schema(
         bool, typer.Option("--markdown", help="A reference to read: each field, its meaning and an example.")
     ] = False,
     task: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Of which task; by default the first by the alphabet.")
+        str | None, typer.Option(metavar="NAME", help="Of which task; not needed while there is only one.")
     ] = None,
 ) -> None:
     """Print what a scenario file may say.
@@ -121,7 +121,11 @@ def print_schema(
     from regrasp.app.scenario.schema import json_schema, scenario_model
     from regrasp.app.task import find
 
-    chosen = find.task_named(task or find.names()[0], ("--task", 0))
+    known = find.names()
+    if task is None and len(known) > 1:
+        message = f"there are the tasks {' and '.join(known)}, and each has a schema of its own; name one"
+        raise Findings([Finding("--task", 0, message)])
+    chosen = find.task_named(task or known[0], ("--task", 0))
     if as_markdown:
         typer.echo(markdown(scenario_model(chosen).model_json_schema()))
     else:

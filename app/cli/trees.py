@@ -104,13 +104,13 @@ def check_trees(
     Exit code: 0 no findings, 2 findings, one a line:
       file:line: what is wrong; what would be right
     """
-    from regrasp.app.scenario.tree_file import check_tree_file, names_of
+    from regrasp.app.scenario.tree_file import check_tree_file
 
     found: list[Finding] = []
     names = trees or list(shipped("tree"))
     for name in names:
         try:
-            check_tree_file(resolve("tree", name, Path()), names=names_of(None))
+            check_tree_file(resolve("tree", name, Path()))
         except Findings as error:
             found += error.items
     if found:

@@ -43,6 +43,7 @@ class Record:
         seed: int,
         case: str = DEFAULT_CASE,
         copies: Mapping[str, str] | None = None,
+        task: str = "",
     ) -> None:
         """Create the folder, with `copies` (name to text) of what is run.
 
@@ -55,6 +56,7 @@ class Record:
         self._scenario = scenario
         self._seed = seed
         self._case = case
+        self._task = task
         self.events: TextIO = io.StringIO()
         self.ticks: TextIO = io.StringIO()
         self._at_work: BinaryIO = io.BytesIO()
@@ -126,7 +128,9 @@ class Record:
             code = CauseCode.WALL_LIMIT if isinstance(error, WallLimit) else CauseCode.INTERRUPTED
             cause = Cause(code, "stopped from outside before the run could end")
             outcome: Outcome = "wall_limit" if isinstance(error, WallLimit) else "interrupted"
-            return Result(self._scenario, self._seed, outcome, succeeded=False, case=self._case, cause=cause)
+            return Result(
+                self._scenario, self._seed, outcome, succeeded=False, task=self._task, case=self._case, cause=cause
+            )
         message = f"{type(error).__name__}: {error}" if error else "the run ended without a result"
         cause = Cause(CauseCode.INTERNAL_ERROR, message)
         trace = "".join(traceback.format_exception(error)) if error else None
@@ -135,6 +139,7 @@ class Record:
             self._seed,
             "internal_error",
             succeeded=False,
+            task=self._task,
             case=self._case,
             cause=cause,
             traceback=trace,

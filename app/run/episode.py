@@ -21,6 +21,7 @@ from regrasp.app.run.observers import Observers
 from regrasp.app.run.tick_log import TickLog, active_leaf, note_leaf_at_work, running_leaf
 from regrasp.app.scenario.copies import copies
 from regrasp.app.scenario.load import Scenario
+from regrasp.app.task.expectation import Expectation
 from regrasp.behaviors.keys import causes
 from regrasp.interfaces.cause import Cause, CauseCode
 from regrasp.interfaces.devices import TICK
@@ -56,13 +57,17 @@ def run_episode(
     A KeyboardInterrupt, inside a leaf or from an observer, ends the run cleanly. An exception inside a leaf ends it
     with the cause `internal_error`, and its traceback goes into the record.
     """
-    with measured("start") as wall, Record(out, scenario.name, seed, scenario.case, copies(scenario, seed)) as record:
+    with (
+        measured("start") as wall,
+        Record(out, scenario.name, seed, scenario.case, copies(scenario, seed), scenario.file.TASK) as record,
+    ):
         world = build_world(scenario, seed, renderer, gui)
         try:
             log = record.logger(world.now, observers.event)
             log.info(
                 "begin",
                 scenario=scenario.name,
+                task=scenario.file.TASK,
                 case=scenario.case,
                 seed=seed,
                 gravity=scenario.file.gravity,
@@ -86,9 +91,9 @@ def run_episode(
                 wall.switch("film" if video else "record")
             ticks.finalise()
             episode.attempts.finalise()
-            result = _result(episode, scenario, seed, ending, wall)
+            result = _result(episode, scenario, seed, ending, wall, log)
             peaks = {pair: round(force, 2) for pair, force in world.contact_peaks.items()}  # N
-            log.info("end", outcome=ending.outcome, succeeded=result.succeeded, contact_peaks=peaks)
+            log.info("end", outcome=result.outcome, succeeded=result.succeeded, contact_peaks=peaks)
             record.finish(result)
         finally:
             world.close()
@@ -174,10 +179,10 @@ def _unfinished(episode: Episode, leaf: py_trees.behaviour.Behaviour | None = No
 
 
 def _broken(episode: Episode, error: Exception, log: Any) -> Ending:
-    """The ending by an exception, most likely from a leaf."""
+    """The ending by an exception in a tick: of a leaf, or of the judge that watches."""
     node = _raising(error, episode.tree.root)
     cause = Cause(CauseCode.INTERNAL_ERROR, f"{type(error).__name__}: {error}", _path(node, episode.tree.root))
-    log.error("exception in a leaf", node=cause.node, exc_info=error)
+    log.error("exception in a tick", node=cause.node, exc_info=error)
     chain = episode.attempts.chain_to(node, "raised", f"raised {cause.message}")
     if node is not None and not node.children:
         episode.attempts.raised(node, cause)
@@ -214,29 +219,38 @@ def _raising(error: BaseException, root: py_trees.behaviour.Behaviour) -> py_tre
     return found
 
 
-def _result(episode: Episode, scenario: Scenario, seed: int, ending: Ending, wall: WallTime) -> Result:
+def _result(episode: Episode, scenario: Scenario, seed: int, ending: Ending, wall: WallTime, log: Any) -> Result:
     wall.switch("record")
     seconds = sum(wall.seconds.values())
-    judge = episode.judge
-    expectations = judge.expectations(ending.outcome, ending.cause.code if ending.cause else None)
+    judge, task = episode.judge, episode.task
+    expectations: tuple[Expectation, ...] = ()
+    measured, belief = dict[str, Any](), None
+    try:
+        expectations = judge.expectations(ending.outcome, ending.cause.code if ending.cause else None)
+        measured, belief = judge.measured(), task.belief()(episode.services)
+    except Exception as error:  # another package's code: the record is kept
+        message = f"the judge of the task {task.name} raised {type(error).__name__}: {error}"
+        log.error("exception in the judge", exc_info=error)
+        cause = Cause(CauseCode.INTERNAL_ERROR, message)
+        ending = Ending("internal_error", cause, None, "".join(traceback.format_exception(error)))
     return Result(
         scenario.name,
         seed,
         ending.outcome,
-        succeeded=all(e.met for e in expectations),
-        task=episode.task.name,
+        succeeded=ending.outcome != "internal_error" and all(e.met for e in expectations),
+        task=task.name,
         case=scenario.case,
         cause=ending.cause,
         chain=ending.chain,
         traceback=ending.traceback,
         expectations=expectations,
-        measured=judge.measured(),
+        measured=measured,
         sim_seconds=episode.world.now(),
         wall_seconds=seconds,
         real_time_factor=episode.world.now() / seconds,
         longest_tick=round(wall.longest_lap, 3),
         wall_by_part={part: round(spent, 3) for part, spent in wall.seconds.items()},
         renderer=episode.world.renderer.name,
-        belief=episode.task.belief()(episode.services),
+        belief=belief,
         attempts=tuple(episode.attempts.made),
     )

@@ -1,4 +1,4 @@
-"""Video frames (overview, both cameras, a few lines of text), and their encoding as a film."""
+"""Video frames (overview, up to two cameras, a few lines of text), and their encoding as a film."""
 
 import contextlib
 import subprocess

@@ -106,12 +106,19 @@ def _on_base(top: Document, folder: Path) -> Document:
 
 
 def _take_old_keys(document: Document) -> None:
-    """Move what stood elsewhere before cells had sections, with a warning."""
+    """Move what stood elsewhere before cells had sections, with a warning; what cannot move is a finding."""
     for old, new in find.old_cell_keys().items():
-        path = tuple(old.split("."))
-        if value_at(document.value, path[:-1]) is not None and path in document.places:
-            _warn(document.place(path), old, new)
-            document.move(path, tuple(new.split(".")))
+        path, target = tuple(old.split(".")), tuple(new.split("."))
+        if value_at(document.value, path[:-1]) is None or path not in document.places:
+            continue
+        if target in document.places or not isinstance(value_at(document.value, target[:-1]) or {}, dict):
+            found = Finding(
+                *document.place(path), f"{old} is an old key, and {new} cannot take it; write it there alone"
+            )
+            document.findings.append(found)
+            continue
+        _warn(document.place(path), old, new)
+        document.move(path, target)
 
 
 def _with_new_key(assignment: Assignment) -> Assignment:
@@ -155,7 +162,8 @@ def _left_out(document: Document, model: type[Cell], task: "Task") -> Iterator[F
         for name in find.names():
             if name != task.name and name in held:
                 held.pop(name)
-        if task.name in kind.model_fields and task.name not in held:
+        section = kind.model_fields.get(task.name)
+        if section is not None and section.is_required() and task.name not in held:
             cells = " or ".join(quoted(cell) for cell in _cells_with(task.name))
             right = f"take the cell {cells}, or add it" if cells else "add it"
             message = f"the task {task.name} needs a section {half}.{task.name}, and this cell has none; {right}"

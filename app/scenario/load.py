@@ -1,5 +1,6 @@
 """Reads and checks scenario files with all their cases, their cells and their trees."""
 
+import contextlib
 from collections.abc import Callable, Collection, Hashable, Iterable, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, replace
@@ -20,8 +21,8 @@ from regrasp.app.scenario.old_words import warn_of_old_words
 from regrasp.app.scenario.other_tasks import words_of_others
 from regrasp.app.scenario.placement import check_obstacles
 from regrasp.app.scenario.references import check_names, check_tree_inputs, tree_text
-from regrasp.app.scenario.schema import ScenarioFile, scenario_model
-from regrasp.app.scenario.tree_file import check_tree_file, names_of
+from regrasp.app.scenario.schema import ScenarioFile, scenario_model, unknown_task_model
+from regrasp.app.scenario.tree_file import check_tree_for
 from regrasp.app.task import find
 from regrasp.interfaces.cell import Cell
 from regrasp.interfaces.quote import MAX_QUOTE, cut, nearest, quoted
@@ -129,7 +130,7 @@ class _Source:
         except Findings as error:
             raise Findings([*wrong, *error.items]) from None
         self.note(self._document.findings)
-        _, errors = read_as(self._document, self._model(None))  # gives misspelt keys their right names
+        _, errors = read_as(self._document, self._model(self._first_task()))  # gives misspelt keys their right names
         self.note(error.finding for error in errors if error.is_misspelt)
         of_vary = [a for a in assignments if f"{a.key}.".startswith("vary.")]
         self._fixed = [a for a in assignments if a not in of_vary]
@@ -175,15 +176,15 @@ class _Source:
             catch_findings(apply_assignments, document, [a for a in assignments if not a.key.startswith("cell.")])[1],
             case,
         )
-        warn_of_old_words(document)
         task = self._task(case, document, of_cell)
+        warn_of_old_words(document, task.old_outcomes if task else {})
         file = self._read(case, document, {a.path[0] for a in assignments}, self._model(task))
         cell, tree = self._cell_and_tree(case, document, of_cell, task)
         inputs, obstacles, faults = (
             repr(value_at(document.value, (key,))) for key in ("inputs", "obstacles", "faults")
         )
         self._once(case, check_tree_inputs, (tree, inputs, id(cell)), document, tree, cell, task)
-        self._once(case, check_names, (tree, obstacles, faults, id(cell)), document, tree, cell)
+        self._once(case, check_names, (tree, obstacles, faults, id(cell), task), document, tree, cell, task)
         gravity = repr(value_at(document.value, ("gravity",)))
         self._once(case, check_obstacles, (obstacles, gravity, id(cell)), document, cell, task)
         if not (file and cell and tree):
@@ -195,17 +196,33 @@ class _Source:
         """The task that the scenario names, or the only one whose section its cell holds; None if that is wrong."""
         place = document.place(("task",))
         name = value_at(document.value, ("task",))
+        if case == "" and ("task",) in self._varied:
+            return None
         if isinstance(name, str):
             return self._once(case, find.task_named, (name, place), name, place)
         cell, laid = repr(value_at(document.value, ("cell",))), repr([(a.key, a.new.value) for a in of_cell])
         args = (document, self.path.parent, of_cell)
         return self._once(case, _task_of_cell, (cell, document.place(("cell",)), laid), *args)
 
+    def _first_task(self) -> "Task | None":
+        """The task of the file as it is written, or of the first values of `vary`; None if that is wrong."""
+        names: dict[str, Any] = {}
+        for key in ("task", "cell"):
+            varied = value_at(self._document.value, ("vary", key))
+            names[key] = value_at(self._document.value, (key,)) or (varied[0] if isinstance(varied, list) else None)
+        with contextlib.suppress(Findings):
+            if isinstance(names["task"], str):
+                return find.task_named(names["task"])
+            if isinstance(names["cell"], str):
+                tasks = tasks_of(resolve("cell", names["cell"], self.path.parent))
+                return find.task_named(tasks[0]) if len(tasks) == 1 else None
+        return None
+
     def _model(self, task: "Task | None") -> type[ScenarioFile]:
-        """The model of the task's files; while that is not known and there are several, that of every task."""
+        """The model of the task's files; while that is not known and there are several, that of any task."""
         if task is None and len(found := [*find.tasks()]) == 1:
             task = found[0]
-        return ScenarioFile if task is None else scenario_model(task)
+        return unknown_task_model() if task is None else scenario_model(task)
 
     def _read(
         self, case: str, document: Document, changed: Collection[str | int], model: type[ScenarioFile]
@@ -217,8 +234,6 @@ class _Source:
         file, errors = read_as(document, model)
         told = words_of_others(document, find.task_named(model.TASK)) if errors and model.TASK else {}
         errors = [_retold(error, told.get(error.path)) for error in errors]
-        if not model.TASK:  # the task is not known: nor are its expectations and faults
-            errors = [error for error in errors if error.path[:1] not in (("expect",), ("faults",))]
         errors = [error for error in errors if not self._is_for_cases(case, error)]
         self.note((self._told(error) for error in errors), case)
         if not case:
@@ -239,7 +254,7 @@ class _Source:
         name = repr(value_at(document.value, ("tree",)))
         tree = self._once(case, _named, (name, tree_at), document, "tree", folder)
         if tree:
-            self._once(case, check_tree_file, (tree, tree_at, id(cell), task), tree, tree_at, *_of_task(cell, task))
+            self._once(case, check_tree_for, (tree, tree_at, id(cell), task), tree, tree_at, cell, task)
         return cell, tree
 
     def _told(self, error: Error) -> Finding:
@@ -300,16 +315,11 @@ def _task_of_cell(document: Document, folder: Path, assignments: Sequence[Assign
     if len(tasks) == 1:
         return find.task_named(tasks[0])
     if tasks:
-        message = f"the cell {shown(path)} has sections of the tasks {' and '.join(tasks)}; write task: {tasks[0]}"
+        message = f"the cell {shown(path)} has sections of the tasks {' and '.join(tasks)}; write one of them as task:"
     else:
-        right = f"add one, such as known.{known[0]}, or write task: with one of {', '.join(known)}"
+        right = f"add that of your task, known.NAME, or write task: with one of {', '.join(known)}"
         message = f"the cell {shown(path)} has no task's section; {right}"
     raise Findings([Finding(*place, message)])
-
-
-def _of_task(cell: Cell | None, task: "Task | None") -> tuple[dict[str, dict[str, str]], str | None]:
-    """The names that a tree may refer to, and the name of the task, for `check_tree_file`."""
-    return names_of(cell, task), None if task is None else task.name
 
 
 def description(path: Path) -> str:

@@ -2,7 +2,7 @@
 
 import contextlib
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import yaml
@@ -20,10 +20,9 @@ class OldWordWarning(FutureWarning):
     """A file uses a word that has been replaced."""
 
 
-def warn_of_old_words(document: Document) -> None:
-    """Issue an `OldWordWarning`, with file and line, for a scenario of schema 1."""
+def warn_of_old_words(document: Document, old: Mapping[str, str]) -> None:
+    """Issue an `OldWordWarning`, with file and line, for a scenario of schema 1; `old` are its task's outcomes then."""
     word = value_at(document.value, _OUTCOME)
-    old = old_outcomes()
     if isinstance(word, str) and word in old:
         place = document.place(_OUTCOME)
         new = f"expect.outcome: {word} is an old word; write outcome: {old[word]}"

@@ -12,6 +12,7 @@ from regrasp.app.files.validation import validated_part
 from regrasp.app.files.yaml_lines import Document
 from regrasp.app.scenario.schema import TreeInput
 from regrasp.app.scenario.tree_file import names_of
+from regrasp.behaviors.registry import Leaves, leaves_of
 from regrasp.interfaces.cell import Cell
 from regrasp.interfaces.fault import JawFault
 from regrasp.interfaces.quote import cut, nearest, quoted
@@ -37,14 +38,14 @@ def check_tree_inputs(document: Document, tree: Path | None, cell: Cell | None, 
     given = {key: tree_text(value) for key, value in values.items() if value is not None}
     if found := [
         Finding(*document.place(("inputs", key)), f"inputs.{cut(key)}: {message}")
-        for key, message in check_inputs(tree, given, names=names_of(cell, task))
+        for key, message in check_inputs(tree, given, _leaves(task), names_of(cell, task))
     ]:
         raise Findings(found)
 
 
-def check_names(document: Document, tree: Path | None, cell: Cell | None) -> None:
+def check_names(document: Document, tree: Path | None, cell: Cell | None, task: "Task | None") -> None:
     """Raises `Findings` if faults name obstacles, arms, cameras, or nodes of the tree, that do not exist."""
-    if found := [*_obstacles(document), *_devices(document, cell), *_nodes(document, tree)]:
+    if found := [*_obstacles(document), *_devices(document, cell), *_nodes(document, tree, task)]:
         raise Findings(found)
 
 
@@ -84,20 +85,25 @@ def _devices(document: Document, cell: Cell | None) -> Iterator[Finding]:
                 yield Finding(*document.place(("faults", i, key)), f"no {key} {quoted(name)}; {right}")
 
 
-def _nodes(document: Document, tree: Path | None) -> Iterator[Finding]:
+def _nodes(document: Document, tree: Path | None, task: "Task | None") -> Iterator[Finding]:
     for i, _ in _faults(document):
         name = value_at(document.value, ("faults", i, "when", "node"))
-        if tree and isinstance(name, str) and (names := _node_names(tree)) and name not in names:
+        if tree and isinstance(name, str) and (names := _node_names(tree, task)) and name not in names:
             alike = [other for other in names if ("/" in other) == ("/" in name)]
             message = f"no node {quoted(name)} in {tree.name}; {nearest(name, alike)}"
             yield Finding(*document.place(("faults", i, "when", "node")), message)
 
 
-def _node_names(tree: Path) -> set[str]:
+def _node_names(tree: Path, task: "Task | None") -> set[str]:
     """Every way to name a node of the tree: its path, or the end of it; none if the file is no valid tree."""
     try:
-        nodes = read_graph(tree).walk()
+        nodes = read_graph(tree, _leaves(task)).walk()
     except (OSError, TreeSyntaxError, ValueError):  # a finding of the tree's own check
         return set()
     steps = [node.path.split("/") for node in nodes if node.kind != "subtree"]
     return {"/".join(names[i:]) for names in steps for i in range(len(names))}
+
+
+def _leaves(task: "Task | None") -> Leaves | None:
+    """The leaves that a tree of the task may name; None while the task is not known."""
+    return None if task is None else leaves_of(task.name)

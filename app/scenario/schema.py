@@ -209,6 +209,18 @@ class ScenarioFile(Model):
 
 
 @cache
+def unknown_task_model() -> type[ScenarioFile]:
+    """The model of files whose task is not known yet: any faults and expectations."""
+    fields: dict[str, Any] = {
+        "faults": (tuple[Any, ...], ScenarioFile.model_fields["faults"]),
+        "expect": (dict[str, Any], _with_default(ScenarioFile.model_fields["expect"], {})),
+    }
+    model: Any = create_model("ScenarioFile", __base__=ScenarioFile, __doc__=ScenarioFile.__doc__ or "", **fields)
+    made: type[ScenarioFile] = model
+    return made
+
+
+@cache
 def scenario_model(task: "Task") -> type[ScenarioFile]:
     """The model of the task's scenario files: with its faults, what they may wait for, its causes and expectations."""
     faults = tuple(_for_task(fault, task) for fault in (*FAULTS, *task.faults()))

@@ -5,7 +5,7 @@ from functools import cache
 from typing import TYPE_CHECKING
 
 from regrasp.app.files.findings import Finding, Findings
-from regrasp.interfaces.plugins import installed, load
+from regrasp.interfaces.plugins import PluginError, installed, load
 from regrasp.interfaces.quote import nearest, quoted
 
 if TYPE_CHECKING:
@@ -18,23 +18,36 @@ GROUP = "regrasp.tasks"
 
 def names() -> list[str]:
     """The names of all tasks; none is imported."""
-    return sorted(installed(GROUP))
+    return [*installed(GROUP)]
 
 
-@cache
 def task_named(name: str, where: "Place | None" = None) -> "Task":
     """The task of that name.
 
-    Raises `Findings`, which stand at `where`, if there is none or it cannot be imported.
+    Raises `Findings`, which stand at `where`, if there is none or it cannot be loaded.
     """
     place = where or ("task", 0)
     if name not in installed(GROUP):
         raise Findings([Finding(*place, f"no task {quoted(name)}; {nearest(name, names())}")])
+    task = _loaded(name)
+    if isinstance(task, str):
+        raise Findings([Finding(*place, f"the task {name} cannot be loaded: {task}")])
+    return task
+
+
+@cache
+def _loaded(name: str) -> "Task | str":
+    """The task, or why it cannot be loaded."""
+    from regrasp.app.task.task import Task
+
     try:
-        task: Task = load(GROUP, name)
-    except Exception as error:
-        message = f"the task {name} cannot be loaded: {type(error).__name__}: {error}; mend its package, or remove it"
-        raise Findings([Finding(*place, message)]) from error
+        task = load(GROUP, name)
+    except PluginError as error:
+        return str(error)
+    if not isinstance(task, Task):
+        return f"it is {type(task).__name__}, not a regrasp.app.task.task.Task; mend its package"
+    if task.name != name:
+        return f"its entry point is named {name}, and itself {task.name!r}; give both one name"
     return task
 
 
@@ -44,7 +57,7 @@ def words_of(task: str) -> "Words":
 
     try:
         return task_named(task).words()
-    except Findings:
+    except Findings:  # the task is gone or broken: its values are told by their names
         return PLAIN
 
 
@@ -64,7 +77,7 @@ def old_cell_keys() -> dict[str, str]:
 
 
 def tasks() -> Iterator["Task"]:
-    """All tasks that can be imported."""
+    """All tasks that can be loaded."""
     for name in names():
         try:
             yield task_named(name)

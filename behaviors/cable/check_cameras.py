@@ -10,7 +10,7 @@ from regrasp.interfaces.cable.cause import CableCause
 
 
 class CheckCameras(CableLeaf):
-    """Looks for `seconds` through the rear camera, then asks the track the thesis's three questions.
+    """Looks for `seconds` through the overview camera, then asks the track the thesis's three questions.
 
     SUCCESS when the connector's frame exists, is fresh and is live; its mean pose is then in the key FOUND. Else
     FAILURE: the connector must be searched for.

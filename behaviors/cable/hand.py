@@ -1,6 +1,5 @@
 """Steps that several of the cable's leaves share: looking, and what the hand does."""
 
-from collections.abc import Generator
 from typing import TYPE_CHECKING, TypeVar
 
 from regrasp.behaviors.cable.keys import HELD
@@ -8,7 +7,6 @@ from regrasp.behaviors.cable.services import CableServices
 from regrasp.behaviors.leaf import LeafFailed, LeafSteps, StepsLeaf
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cable.cause import CableCause
-from regrasp.interfaces.request import Request
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import RigidTransform
@@ -35,16 +33,6 @@ class CableLeaf(StepsLeaf):
     def search(self) -> str:
         """The camera that looks for a lost end."""
         return self.services.known.cable.search
-
-    def ask(self, task: Request[T]) -> Generator[Request[None] | None, None, T]:
-        """Steps that do a task and return its answer. The task stops with the leaf."""
-        try:
-            while not task.poll():
-                yield None
-        except GeneratorExit:
-            task.cancel()
-            raise
-        return task.answer
 
     def overview_points(self, since: float) -> FloatArray | None:
         """Points (n, 3) m in the world that the overview saw from second `since` on; None until a picture comes."""

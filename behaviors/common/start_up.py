@@ -29,7 +29,8 @@ class StartUp(StepsLeaf):
         for camera in perception.fixed_cameras:
             while perception.frame(camera) is None or perception.trouble(camera) is not None:
                 if self.services.clock.now() > end:
-                    raise LeafFailed(CauseCode.CAMERA_FAILED, f"{perception.trouble(camera)}; nothing was mapped")
+                    why = perception.trouble(camera) or f"the {camera} camera shows no picture"
+                    raise LeafFailed(CauseCode.CAMERA_FAILED, f"{why}; nothing was mapped")
                 yield None
         voxels = perception.look_around()
         self.services.take_over_map()

@@ -131,7 +131,7 @@ class CableMotion(SearchMotion):
             yield from self._done(self.shift(self.hand, -values.draw_out * axis, checked=False))
             yield from self._done(self.shift(self.hand, np.array([-values.retreat, 0.0, 0.0]), checked=False))
 
-        return self._task(self.hand, steps())
+        return self._together(self.hand, steps())
 
     def carry(
         self,
@@ -182,7 +182,7 @@ class CableMotion(SearchMotion):
             onward = [RigidTransform.from_translation([x, 0.0, 0.0]) for x in in_and_out]
             yield from self._done(self.carry(self.hand, goals, held, onward=onward, speed=seating.speed_to))
 
-        return self._task(self.hand, steps())
+        return self._together(self.hand, steps())
 
     def insert(self, held: RigidTransform) -> MotionRequest:
         """Bring the held connector (tool_from_connector) straight into the clip, with the roll that turns it least."""
@@ -192,7 +192,7 @@ class CableMotion(SearchMotion):
             goal = seated_pose(self.tool(self.hand), self.known.cable.clip, held, seating.fine_rolls)
             yield from self._done(self.straight(self.hand, goal, speed=seating.speed_in))
 
-        return self._task(self.hand, steps())
+        return self._together(self.hand, steps())
 
     def let_go(self) -> MotionRequest:
         """Open the hand's jaw; done once it stands wider than a connector."""
@@ -214,7 +214,7 @@ class CableMotion(SearchMotion):
                     return ""
             return why
 
-        return self._task(self.hand, steps())
+        return self._together(self.hand, steps())
 
     def leave_clip(self) -> MotionRequest:
         """Bring the hand to its sleep pose without sweeping the stowed end out of its clip."""
@@ -226,7 +226,7 @@ class CableMotion(SearchMotion):
             yield from self._done(self.sleep(self.hand))
             self.keep_clear(NO_POINTS)
 
-        return self._task(self.hand, steps())
+        return self._together(self.hand, steps())
 
     def held_spheres(self, held: RigidTransform) -> FloatArray:
         """Spheres (n, 4) m in the tool frame that stand for a held connector (tool_from_connector); see `model`."""
@@ -252,12 +252,12 @@ class CableMotion(SearchMotion):
             point_cloud=point_cloud,
         )
 
-    def _task(self, arm: str, steps: Generator[None, None, T] | Iterator[None]) -> Request[T]:
-        """Steps that do other tasks of `arm`, as one. Each of those fails if the arm is out of order."""
+    def _together(self, arm: str, steps: Generator[None, None, T] | Iterator[None]) -> Request[T]:
+        """Steps that do other requests to `arm`, as one. Each of those fails if the arm is out of order."""
         return Request(steps, lambda: self.execution.halt(arm))
 
-    def _done(self, task: Request[T]) -> Generator[None, None, T]:
-        """Steps that do a task and return its answer."""
-        while not task.poll():
+    def _done(self, request: Request[T]) -> Generator[None, None, T]:
+        """Steps that do a request and return its answer."""
+        while not request.poll():
             yield
-        return task.answer
+        return request.answer

@@ -24,8 +24,8 @@ class TriggerState:
             if (span := getattr(when, name)) is not None:
                 share = self.shares.get(name)
                 return share is not None and share >= span[0]
-        if when.phase is not None:
-            return when.phase in self.phases
+        if (phase := getattr(when, "phase", None)) is not None:  # of a task that has phases
+            return phase in self.phases
         delay = when.after[0] if when.after else 0.0
         entered = (second for path, second in self.nodes.items() if ends_with_node(path, when.node or ""))
         return any(self.now >= second + delay - 1e-9 for second in entered)

@@ -12,8 +12,8 @@ from regrasp.app.files.findings import Findings
 from regrasp.app.files.resources import shipped
 from regrasp.app.scenario.cell_file import load_cell
 from regrasp.app.scenario.load import cases
-from regrasp.app.scenario.tree_file import check_tree_file
 from regrasp.interfaces.quote import MAX_QUOTE
+from regrasp.trees import check_tree
 
 LONG = ("9" * 5000, "a" * 5000, "{" + "a" * 5000 + "}", "[" + "a, " * 90 + "]")
 MOST_OF_A_MESSAGE = 700  # letters: some words of ours, and some values
@@ -46,10 +46,7 @@ def test_findings_in_trees_and_cells_are_short(tmp_path: Path, monkeypatch: pyte
     found = []
     for text in replaced(TREE, new):
         (tmp_path / "a.xml").write_text(text)
-        try:
-            check_tree_file(Path("a.xml"), names={"socket": [new]})
-        except Findings as error:
-            found += said(error)
+        found += [message for _, message in check_tree(Path("a.xml"), names={"socket": [new]})]
     for text in replaced(shipped("cell")["thesis"].read_text(), new)[::40]:
         (tmp_path / "a.yaml").write_text(text)
         try:

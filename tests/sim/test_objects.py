@@ -102,6 +102,12 @@ def test_without_a_waiting_fault_no_triggers_are_worked_out(solo: Cell) -> None:
     world.close()
 
 
+class BallWhen(When):
+    """A ball's fault may wait until it has landed."""
+
+    phase: Literal["landed"] | None = None
+
+
 class BallPushed(Fault):
     """A push on the ball, upwards: a constant force for 50 ms."""
 
@@ -144,7 +150,7 @@ class Ball(TaskObjects):
 
 
 def test_a_task_s_fault_waits_for_its_phase_and_acts_on_its_objects(solo: Cell) -> None:
-    push = BallPushed(when=When(phase="landed"), impulse=0.3)
+    push = BallPushed(when=BallWhen(phase="landed"), impulse=0.3)
     world = World(solo, "earth", 1, Ball(), SceneSetup(faults=(push,)))
     highest, [fault] = 0.0, world.faults
     for _ in range(40):
