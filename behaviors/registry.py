@@ -107,7 +107,7 @@ def _gathered(sets: Iterable[str]) -> Leaves:
         try:
             classes = leaf_set(name)
         except (PluginError, TypeError, ValueError) as error:  # told where a tree names a leaf that is not found
-            found.broken[name] = str(error)
+            found.broken[name] = str(error) if isinstance(error, PluginError) else f"{type(error).__name__}: {error}"
             continue
         new = {leaf: made for leaf, made in classes.items() if leaf not in found}
         found |= new

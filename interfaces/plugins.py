@@ -9,7 +9,7 @@ from typing import Any
 
 
 class PluginError(Exception):
-    """A part that a package puts in cannot be had. The message says why, and what to do."""
+    """A part that a package puts in cannot be had; the message says why."""
 
 
 @cache
@@ -38,4 +38,4 @@ def load(group: str, name: str) -> Any:
     try:
         return points[0].load()
     except (Exception, SystemExit) as error:  # another package's code: whatever it raises
-        raise PluginError(f"{type(error).__name__}: {error}; mend its package, or remove it") from error
+        raise PluginError(f"{type(error).__name__}: {error}") from error

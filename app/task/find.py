@@ -43,7 +43,7 @@ def _loaded(name: str) -> "Task | str":
     try:
         task = load(GROUP, name)
     except PluginError as error:
-        return str(error)
+        return f"{error}; mend its package, or remove it"
     if not isinstance(task, Task):
         return f"it is {type(task).__name__}, not a regrasp.app.task.task.Task; mend its package"
     if task.name != name:

@@ -166,7 +166,7 @@ def test_an_error_in_a_leaf_is_told_with_its_node_and_traceback(tmp_path: Path, 
     assert read["cause"]["code"] == "internal_error"
     assert read["cause"]["message"] == "ZeroDivisionError: no joint that long"
     assert read["cause"]["node"].endswith("both/breaks")
-    [told] = [e for e in records(tmp_path / "run", "events.jsonl") if e["event"] == "exception in a leaf"]
+    [told] = [e for e in records(tmp_path / "run", "events.jsonl") if e["event"] == "exception in a tick"]
     assert told["node"] == read["cause"]["node"]
     assert "Traceback" in told["exception"]
     assert "in steps" in told["exception"]
@@ -201,7 +201,8 @@ def test_the_record_holds_what_it_takes_to_run_the_same_again(tmp_path: Path) ->
     run_episode(made, tmp_path / "run", seed=4)
     again = load_scenario(str(tmp_path / "run/scenario.yaml"))
     assert again.cell == made.cell
-    assert again.file == made.file.model_copy(update={"cell": "cell.yaml", "tree": "tree.xml", "seed": 4})
+    named = {"task": "cable", "cell": "cell.yaml", "tree": "tree.xml", "seed": 4}
+    assert again.file == made.file.model_copy(update=named)
     run_episode(again, tmp_path / "again", seed=4)
     assert (tmp_path / "again/ticks.jsonl").read_bytes() == (tmp_path / "run/ticks.jsonl").read_bytes()
 

@@ -13,9 +13,9 @@ PRESS = str(HERE / "press.yaml")
 LINES = 250  # choice: what a task may cost that is to be tried in an afternoon
 
 
-def regrasp(*arguments: str) -> subprocess.CompletedProcess[str]:
-    """The command line, with the second task installed."""
-    path = os.pathsep.join(filter(None, (str(HERE), os.environ.get("PYTHONPATH"))))
+def regrasp(*arguments: str, folder: Path | None = None) -> subprocess.CompletedProcess[str]:
+    """The command line, with the second task installed, and what is in `folder`."""
+    path = os.pathsep.join(filter(None, (str(HERE), str(folder or ""), os.environ.get("PYTHONPATH"))))
     return subprocess.run(
         [sys.executable, "-m", "regrasp", *arguments],
         env=os.environ | {"PYTHONPATH": path},
@@ -83,7 +83,7 @@ def test_a_cell_without_the_tasks_section_is_told_which_has_one(tmp_path: Path) 
     (tmp_path / "cell.yaml").write_text((HERE / "cell.yaml").read_text().replace("  button:", "  buton:"))
     checked = regrasp("scenarios", "check", PRESS, "--set", f"cell={tmp_path / 'cell.yaml'}")
     [line] = checked.stderr.splitlines()
-    assert "has no task's section; add one, such as known.button" in line
+    assert "has no task's section; add that of your task, known.NAME, or write task: with one of button, cable" in line
 
 
 def test_a_tree_of_two_tasks_leaves_is_told_without_a_scenario(tmp_path: Path) -> None:
@@ -110,3 +110,46 @@ def test_what_needs_a_key_that_nothing_writes_is_told(tmp_path: Path) -> None:
 def test_a_check_brings_no_simulation() -> None:
     checked = regrasp("scenarios", "check", PRESS)
     assert (checked.returncode, checked.stderr) == (0, "")  # PyBullet would greet there
+
+
+BROKEN = {
+    "no task": ("TASK = 3", "the task broken cannot be loaded: it is int, not a regrasp.app.task.task.Task"),
+    "does not import": ("import nowhere", "ModuleNotFoundError: No module named 'nowhere'; mend its package"),
+    "ends the program": ("raise SystemExit(5)", "SystemExit: 5; mend its package"),
+    "has another name": (
+        "from regrasp.app.task.task import Task\nTASK = Task(name='other', about='')",
+        "its entry point is named broken, and itself 'other'",
+    ),
+    "has a part that is missing": (
+        "from regrasp.app.task.part import Part\nfrom regrasp.app.task.task import Task\n"
+        "TASK = Task(name='broken', about='', expect=Part('broken:Nope'), commands=Part('broken:nope'))",
+        "broken:Nope: this part of a task cannot be loaded: AttributeError",
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", BROKEN)
+def test_a_broken_task_is_told_and_stops_no_other(tmp_path: Path, kind: str) -> None:
+    module, told = BROKEN[kind]
+    (tmp_path / "broken-1.0.dist-info").mkdir()
+    (tmp_path / "broken-1.0.dist-info" / "METADATA").write_text("Metadata-Version: 2.1\nName: broken\nVersion: 1.0\n")
+    entry = "[regrasp.tasks]\nbroken = broken:TASK\n"
+    (tmp_path / "broken-1.0.dist-info" / "entry_points.txt").write_text(entry)
+    (tmp_path / "broken.py").write_text(module)
+    right = regrasp("scenarios", "check", "no_obstacle", "--set", "expect.slipps=1", folder=tmp_path)
+    assert "unknown key 'slipps'; did you mean 'slips'?" in right.stderr
+    assert "Traceback" not in right.stderr
+    wrong = regrasp("scenarios", "check", PRESS, "--set", "task=broken", folder=tmp_path)
+    assert wrong.returncode == 2
+    assert told in wrong.stderr
+    assert "Traceback" not in wrong.stderr
+
+
+def test_two_packages_with_one_task_are_told(tmp_path: Path) -> None:
+    (tmp_path / "twice-1.0.dist-info").mkdir()
+    (tmp_path / "twice-1.0.dist-info" / "METADATA").write_text("Metadata-Version: 2.1\nName: twice\nVersion: 1.0\n")
+    entry = "[regrasp.tasks]\nbutton = twice:TASK\n"
+    (tmp_path / "twice-1.0.dist-info" / "entry_points.txt").write_text(entry)
+    checked = regrasp("scenarios", "check", PRESS, folder=tmp_path)
+    assert checked.returncode == 2
+    assert "2 packages put it in, " in checked.stderr

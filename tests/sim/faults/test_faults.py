@@ -17,10 +17,11 @@ OPEN_FOR = 1.0  # s
 
 
 class PrintWhen(When):
-    """Of a task with a share of progress."""
+    """Of a task with a share of progress, and phases."""
 
     SHARES: ClassVar[tuple[str, ...]] = ("printed",)
     printed: FractionRange | None = None
+    phase: str | None = None
 
 
 def opens(seconds: float | None = OPEN_FOR, **when: object) -> JawOpens:
