@@ -68,7 +68,7 @@ class Perception:
     ) -> None:
         self.parameters = parameters
         self._known, self._cameras, self._clock = known, cameras, clock
-        self._pose_of, self._arm_spheres = pose_of, arm_spheres
+        self.pose_of, self._arm_spheres = pose_of, arm_spheres
         self._health = {name: CameraHealth(name, parameters.health) for name in cameras}
         region = np.array(parameters.region_lower), np.array(parameters.region_upper)
         self.occupancy = Occupancy(*region, known.solids(), self._spared(), parameters.occupancy)
@@ -160,4 +160,4 @@ class Perception:
     def _register(self, frame: RgbdFrame) -> Registration:
         """A frame's camera, corrected by the known boxes."""
         errors = expected_errors(self._known, frame.camera, self.parameters.registration)
-        return register(frame, self._pose_of(frame), self._known.boxes, errors, self.parameters.registration)
+        return register(frame, self.pose_of(frame), self._known.boxes, errors, self.parameters.registration)

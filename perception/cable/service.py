@@ -95,7 +95,7 @@ class CablePerception(Perception):
         if camera in self._results and self._results[camera][0] == newest.number:
             return self._results[camera][1]
         near = self.track.position(self._clock.now())
-        result = self._technique.estimate(newest, self._pose_of(newest), axis=self._axis, near=near)
+        result = self._technique.estimate(newest, self.pose_of(newest), axis=self._axis, near=near)
         self._results[camera] = (newest.number, result)
         self.track.feed(result)
         return result

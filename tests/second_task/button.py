@@ -66,7 +66,7 @@ class ButtonPerception(Perception):
             return None
         mask = color_mask(frame.rgb, SegmentationParameters.for_color(button.color)) > 0
         points = deproject(frame.depth, mask, frame.intrinsics)
-        return None if len(points) < 30 else np.asarray(self._pose_of(frame).apply(np.median(points, axis=0)))
+        return None if len(points) < 30 else np.asarray(self.pose_of(frame).apply(np.median(points, axis=0)))
 
 
 class ButtonMotion(Motion):

@@ -195,6 +195,20 @@ def test_wherever_a_leaf_raises_the_arms_rest_and_the_record_says_so(
     assert at_rest(ends)
 
 
+def test_a_judge_that_raises_leaves_a_whole_record(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(self: object) -> dict[str, object]:
+        raise ZeroDivisionError("no slips")
+
+    monkeypatch.setattr("regrasp.app.tasks.cable.judge.CableJudge.measured", broken)
+    run_episode(scenario(tmp_path, '<GivesUp name="reach"/>', "limits.sim_seconds=0.8"), tmp_path / "run", seed=4)
+    result = read_record(tmp_path / "run").result
+    assert result is not None
+    assert (result.task, result.outcome, result.succeeded) == ("cable", "internal_error", False)
+    assert result.cause is not None
+    assert result.cause.message == "the judge of the task cable raised ZeroDivisionError: no slips"
+    assert [attempt.path for attempt in result.attempts] == ["reach"]
+
+
 def test_the_record_holds_what_it_takes_to_run_the_same_again(tmp_path: Path) -> None:
     body, change = '<GivesUp name="reach"/>', "cell.hidden.errors.arm_tool=0.0"
     made = scenario(tmp_path, body, "limits.sim_seconds=0.8", change, "gravity=earth")

@@ -61,6 +61,14 @@ def test_a_fault_of_its_own_ends_it_with_a_cause_of_its_own(tmp_path: Path) -> N
             "faults=[{type: cable_snags, when: {at: [1, 2]}}]",
             "'cable_snags' is a fault of the task cable, and this scenario's is button",
         ),
+        (
+            "faults=[{type: jaw_opens, arm: solo, when: {phase: lost}}]",
+            "faults.0.when.phase is of the task cable, and this scenario's is button; there are after, at, node",
+        ),
+        (
+            "expect={outcome: failure, cause: slipped}",
+            "expect.cause: 'slipped' is a cause of the task cable, and this scenario's is button",
+        ),
         ("tree=recovery", "is a leaf of the task cable, and the scenario's task is button"),
         ("task=buton", "no task 'buton'; did you mean 'button'?"),
         ("faults=[{type: jaw_opens, when: {at: [1, 2]}}]", "no arm 'right'; there are solo"),
