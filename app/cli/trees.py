@@ -7,7 +7,7 @@ import typer
 
 from regrasp.app.files.findings import Finding, Findings
 from regrasp.app.files.resources import resolve, shipped
-from regrasp.interfaces.quote import nearest, quoted
+from regrasp.interfaces.quote import nearest, printable, quoted
 
 app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="List, check, show and export behaviour trees.")
 
@@ -128,12 +128,15 @@ def list_leaves(name: Annotated[str | None, typer.Argument(help="One element, in
     Example:
       regrasp trees leaves SpiralSearch
     """
-    from regrasp.behaviors import LEAVES
+    from regrasp.behaviors.registry import all_leaves
     from regrasp.trees.catalogue import all_elements, describe
 
-    known = all_elements(LEAVES)
+    leaves = all_leaves()
+    known = all_elements(leaves)
     if name is not None and name not in known:
         raise Findings([Finding(name, 0, f"no element {quoted(name)}; {nearest(name, known)}")])
     for tag, kind in known.items():
         if name in (None, tag):
             typer.echo("\n".join(describe(tag, kind, full=name is not None)))
+    for broken, why in leaves.broken.items():
+        typer.echo(f"warning: the leaf set {printable(broken)} cannot be imported: {printable(why)}", err=True)

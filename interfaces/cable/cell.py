@@ -10,8 +10,7 @@ from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cell import Box, Cell, KnownCell, WristMount, pose_along
 from regrasp.interfaces.fields import Color, Direction, Force, Friction, Length, Mass, Model, Size, Vector
 from regrasp.interfaces.hidden_world import HiddenWorld
-from regrasp.interfaces.tag import TAG_DICTIONARY as TAG_DICTIONARY
-from regrasp.interfaces.tag import Tag as Tag
+from regrasp.interfaces.tag import Tag
 
 
 class Socket(Model):

@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from regrasp.interfaces.arrays import FloatArray
-from regrasp.interfaces.cable.cell import TAG_DICTIONARY, CableKnown, Clip, Connector, Tag
+from regrasp.interfaces.cable.cell import CableKnown, Clip, Connector
 from regrasp.interfaces.cell import WristMount
 from regrasp.interfaces.frame import Intrinsics, RgbdFrame
 from regrasp.interfaces.geometry import skew
+from regrasp.interfaces.tag import TAG_DICTIONARY, Tag
 from regrasp.perception.camera.model import pixel_rays, project
 from regrasp.perception.camera.registration import FIXED_CAMERA_ERRORS, WRIST_CAMERA_ERRORS, CameraErrors
 from regrasp.perception.pose.estimate import Estimate, NoEstimate

@@ -9,8 +9,9 @@ from hypothesis import assume, example, given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from regrasp.interfaces.cable.cell import CableCell, Socket, Tag
+from regrasp.interfaces.cable.cell import CableCell, Socket
 from regrasp.interfaces.cell import FixedMount, WristMount, pose_along
+from regrasp.interfaces.tag import Tag
 
 LENGTH = 1e-9  # metres
 coordinates = st.floats(-2.0, 2.0)

@@ -27,8 +27,9 @@ from regrasp.app.tasks.cable.cells import cable_cell
 from regrasp.app.tasks.cable.studies.demo import SCENARIOS
 from regrasp.app.tasks.cable.studies.planner_bench import print_planner_bench
 from regrasp.behaviors import LEAVES
-from regrasp.interfaces.cable.cell import TAG_DICTIONARY, CableCell
+from regrasp.interfaces.cable.cell import CableCell
 from regrasp.interfaces.frame import RgbdFrame
+from regrasp.interfaces.tag import TAG_DICTIONARY
 from regrasp.perception.camera.color import SegmentationParameters, color_mask
 from regrasp.perception.camera.registration import FIXED_CAMERA_ERRORS, register
 from regrasp.perception.pose.detector import Detector, letterboxed, network_input, pixel_sizes, shipped_network

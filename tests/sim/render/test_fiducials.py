@@ -8,8 +8,8 @@ import pybullet as p
 import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from regrasp.interfaces.cable.cell import TAG_DICTIONARY, Tag
 from regrasp.interfaces.frame import Intrinsics
+from regrasp.interfaces.tag import TAG_DICTIONARY, Tag
 from regrasp.sim.cameras.board import board_pictures, board_poses
 from regrasp.sim.render.fiducials import MAX_PARTS, compound_visual, tag_boxes
 from regrasp.sim.render.picture import LightState
