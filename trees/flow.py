@@ -75,8 +75,12 @@ def _unwritten(reader: Wire, known: Mapping[str, ElementKind]) -> str:
     """The sentence about a reader whose key nothing writes."""
     if reader.key is None:
         return f"{reader.what} reads {cut(reader.path)}, which no port writes; wire an output to it"
-    own = reader.what.partition(" ")[0]
-    tags = [tag for tag, kind in known.items() if tag != own and reader.path in (key.path for key in kind.writes)]
+    path = reader.path
+    tags = [
+        tag
+        for tag, kind in known.items()
+        if path in (key.path for key in kind.writes) and path not in (key.path for key in kind.needs)
+    ]
     right = f"tick {' or '.join(tags)} before it" if tags else "no leaf that is known does, so remove it"
     return f"{reader.what} needs {reader.key.text}, which nothing in this tree writes; {right}"
 
