@@ -46,7 +46,7 @@ PULL, GRIP, DROP, REGRIP = '<Pull name="pull"/>', '<Grip name="grip"/>', '<Drop 
 
 def test_a_key_that_nothing_writes_is_a_finding_that_names_the_leaves_which_do(tmp_path: Path) -> None:
     assert check(tmp_path, PULL) == [
-        (2, f"Pull {NEEDS}in this tree writes; tick Grip or Regrip or Drop before it"),
+        (2, f"Pull {NEEDS}in this tree writes; tick Grip or Drop before it"),
     ]
 
 
