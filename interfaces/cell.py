@@ -4,10 +4,10 @@ It is read from a YAML file under `scenarios/cells/`. Units are SI. The world fr
 bases, midway between them: x points forward to the panels, y left, z up.
 """
 
-from typing import Annotated
+from typing import Annotated, Self
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from regrasp.interfaces.fields import (
@@ -110,6 +110,19 @@ class Latencies(Model):
     plan: Seconds  # for a motion plan
 
 
+class Region(Model):
+    """A box along the world's axes by two corners, m."""
+
+    lower: Vector
+    upper: Vector
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        if any(low >= high for low, high in zip(self.lower, self.upper, strict=True)):
+            raise ValueError("lower is not below upper in x, y and z; exchange what is the wrong way round")
+        return self
+
+
 class KnownCell(Model):
     """What the robot's software is told about the cell. A task adds its section under the task's name."""
 
@@ -117,6 +130,7 @@ class KnownCell(Model):
     arms: tuple[ArmSpec, ...]
     cameras: tuple[CameraSpec, ...]
     latencies: Latencies
+    mapped: Region | None = None  # where obstacles are mapped; left out: before the arms, see `PerceptionParameters`
 
     def solids(self) -> list[Box]:
         """All fixed and known obstacles, as boxes along the world's axes."""

@@ -24,7 +24,8 @@ from regrasp.perception.tracking.stillness import Stillness, StillnessParameters
 class PerceptionParameters:
     """The mapped region, what counts as a new obstacle, and the parameters of the parts."""
 
-    # World frame, m. Where obstacles may matter: in the thesis's cell the space that the arms share with the cable.
+    # World frame, m. Where obstacles may matter if the cell does not say: in the thesis's cell the space that the arms
+    # share with what they handle.
     region_lower: tuple[float, float, float] = (0.16, -0.44, 0.01)
     region_upper: tuple[float, float, float] = (0.50, 0.44, 0.62)
     min_new_voxels: int = 80  # of a new obstacle: the front of a piece of 9 cm
@@ -70,8 +71,12 @@ class Perception:
         self._known, self._cameras, self._clock = known, cameras, clock
         self.pose_of, self._arm_spheres = pose_of, arm_spheres
         self._health = {name: CameraHealth(name, parameters.health) for name in cameras}
-        region = np.array(parameters.region_lower), np.array(parameters.region_upper)
-        self.occupancy = Occupancy(*region, known.solids(), self._spared(), parameters.occupancy)
+        lower, upper = parameters.region_lower, parameters.region_upper
+        if known.mapped is not None:
+            lower, upper = known.mapped.lower, known.mapped.upper
+        self.occupancy = Occupancy(
+            np.array(lower), np.array(upper), known.solids(), self._spared(), parameters.occupancy
+        )
 
     @property
     def fixed_cameras(self) -> tuple[str, ...]:

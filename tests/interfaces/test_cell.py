@@ -126,9 +126,14 @@ def _odd_rate(data: Any) -> None:
     data["hidden"]["step_rate"] = 500
 
 
+def _upside_down(data: Any) -> None:
+    data["known"]["mapped"] = {"lower": [0, 0, 0.5], "upper": [1, 1, 0.2]}
+
+
 @pytest.mark.parametrize(
     ("spoil", "message"),
     [
+        (_upside_down, "lower is not below upper"),
         (_misspell, "Extra inputs"),
         (_no_direction, "a direction must not be zero"),
         (_too_many_links, "less than or equal to 30"),

@@ -6,7 +6,7 @@ from raycast import BLACK, PURPLE, REAR_POSE, WOOD, Block, Cylinder, Sensor, ren
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.cable.cell import CableKnown
-from regrasp.interfaces.cell import KnownCell
+from regrasp.interfaces.cell import KnownCell, Region
 from regrasp.interfaces.frame import Intrinsics, RgbdFrame
 from regrasp.perception.cable.service import CablePerception
 from regrasp.perception.mapping.occupancy import Spheres
@@ -103,6 +103,16 @@ def test_a_wrong_depth_scale_moves_no_obstacle(known: CableKnown) -> None:
     eyes.map_obstacles("rear")
     front = float(np.median(eyes.occupancy.occupied_points(guessed=False)[:, 0]))
     assert front == pytest.approx(FOAM.lower[0], abs=0.010)  # uncorrected 0.018 behind
+
+
+def test_a_cell_may_say_where_obstacles_are_mapped(known: CableKnown) -> None:
+    eye = Eye()
+    eye.show(seen(FOAM), number=1, stamp=0.0)
+    middle = float(0.5 * (FOAM.lower[1] + FOAM.upper[1]))
+    half = known.model_copy(update={"mapped": Region(lower=(0.16, middle, 0.01), upper=(0.5, 0.44, 0.62))})
+    eyes = perception(half, eye)
+    assert eyes.map_obstacles("rear") > 0
+    assert float(eyes.occupancy.occupied_points()[:, 1].min()) > middle
 
 
 def test_a_surface_is_seen_where_it_is_in_the_next_picture(known: CableKnown) -> None:
