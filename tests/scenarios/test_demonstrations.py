@@ -56,7 +56,7 @@ def check_result(folder: Path, scenario: str, expected: set[str]) -> None:
     """result.json has what a reader asks of it, and says that all came out."""
     read = json.loads((folder / "result.json").read_text())
     assert list(read) == FIELDS
-    assert (read["schema"], read["scenario"], read["seed"]) == (2, scenario, 0)
+    assert (read["schema"], read["scenario"], read["seed"]) == (3, scenario, 0)
     assert (read["outcome"], read["succeeded"], read["cause"]) == ("success", True, None)
     assert {e["name"] for e in read["expectations"]} == expected
     assert all(set(e) == {"name", "met", "value", "limit"} and e["met"] is True for e in read["expectations"])
