@@ -1,0 +1,157 @@
+"""The parts of a robot file. SI units; angles in rad."""
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from regrasp.interfaces.fields import Color, Force, Friction, JointAngle, Length, Model, Number, Size, Vector
+
+LinkName = Annotated[str, Field(min_length=1, max_length=80)]
+Sphere = tuple[Number, Number, Number, Annotated[float, Field(gt=0, le=2)]]  # centre and radius, m
+
+
+class Source(Model):
+    """A URDF or xacro file: of an installed Python package, or beside the robot file.
+
+    `ros_packages` says which folder of the same place stands for a ROS package in `package://` addresses.
+    """
+
+    path: str
+    package: str | None = None
+    arguments: dict[str, str] = {}  # of the xacro file
+    ros_packages: dict[str, str] = {}
+
+
+class Placed(Model):
+    """A frame that is fixed to a link: `xyz` m and roll, pitch, yaw (URDF's order) rad in the link's frame."""
+
+    link: LinkName
+    xyz: Vector = (0.0, 0.0, 0.0)
+    rpy: tuple[JointAngle, JointAngle, JointAngle] = (0.0, 0.0, 0.0)
+
+
+class Joint(Model):
+    """A joint that is driven. What is left out comes from the URDF.
+
+    Units are rad, rad/s, rad/s2 and N m; of a sliding joint m, m/s, m/s2 and N.
+    """
+
+    name: Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$", max_length=40)]
+    urdf: str | None = None  # its name there, if that is another
+    sign: Literal[1, -1] = 1  # -1: we count the other way round
+    lower: Number | None = None
+    upper: Number | None = None
+    speed: Annotated[float, Field(gt=0, le=100)] | None = None
+    acceleration: Annotated[float, Field(gt=0, le=1000)]  # a URDF has none
+    torque: Annotated[float, Field(gt=0, le=1e5)] | None = None
+    lever: Annotated[float, Field(gt=0, le=10)] | None = None  # m that the far end moves by a rad, about
+
+    @property
+    def in_urdf(self) -> str:
+        """Its name in the URDF."""
+        return self.urdf or self.name
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        if self.lower is not None and self.upper is not None and self.lower >= self.upper:
+            raise ValueError(f"lower {self.lower:g} is not below upper {self.upper:g}; exchange them")
+        return self
+
+
+class Rail(Model):
+    """A rail or lift under the base: one more joint, the first. The base's place in a cell is that of its zero.
+
+    The `carriage` and the `beam` are boxes of these sizes, m, whose middles lie on the rail's line; the beam is as
+    long as the way of the carriage and stays where it is.
+    """
+
+    name: Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$", max_length=40)] = "rail"
+    axis: Literal["x", "y", "z"] = "y"  # of the base's frame
+    lower: Number
+    upper: Number
+    speed: Annotated[float, Field(gt=0, le=10)]
+    acceleration: Annotated[float, Field(gt=0, le=100)]
+    force: Force
+    carriage: Size
+    beam: tuple[Length, Length]  # its width and height
+    below: Length = 0.02  # m from the base's origin down to the carriage's middle
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        if self.lower >= self.upper:
+            raise ValueError(f"lower {self.lower:g} is not below upper {self.upper:g}; exchange them")
+        return self
+
+
+class Pads(Model):
+    """Rubber pads that are added to two fingers, as boxes; the URDF has none."""
+
+    links: tuple[LinkName, LinkName]  # of the left and the right finger, whose faces look at each other
+    face: Number  # m from a finger link's origin to its inner face, against the way it opens
+    ahead: Number  # m from a finger link's origin to the pad's middle, along the finger
+    length: Length  # along the finger
+    height: Length
+    thickness: Annotated[float, Field(ge=1e-4, le=0.02)]
+
+
+class _Gripper(Model):
+    """What all two-finger grippers have."""
+
+    opening: Annotated[float, Field(gt=0, le=1)]  # m between the pads at most
+    closed: Annotated[float, Field(ge=0, le=1)] = 0.0  # m between the pads at the lower stop
+    force: Force  # N of each finger at most
+    speed: Annotated[float, Field(ge=1e-3, le=10)]  # m/s of each finger
+    friction: Friction  # of the pads
+
+
+class ParallelGripper(_Gripper):
+    """Two sliding fingers that one drive moves: the URDF's joints have opposite signs, the left one opens upwards."""
+
+    type: Literal["parallel"]
+    joints: tuple[str, str]  # of the left and the right finger
+    pads: Pads
+    spin: tuple[str, ...] = ()  # joints of the URDF that turn for show, and are held
+
+
+class LinkageGripper(_Gripper):
+    """Two fingers on linkages: one joint is driven, and the others follow it by the `mimic` tags of the URDF."""
+
+    type: Literal["linkage"]
+    joint: str  # the driven one; it closes upwards
+    pads: tuple[LinkName, LinkName]  # left and right
+    thickness: Annotated[float, Field(ge=0, le=0.05)]  # m of a pad: its link's origin lies in its middle
+
+
+Gripper = Annotated[ParallelGripper | LinkageGripper, Field(discriminator="type")]
+
+
+class Attached(Model):
+    """A gripper that has a URDF of its own. Its links and joints get the `prefix`."""
+
+    urdf: Source
+    at: Placed  # the gripper's root link in the arm
+    prefix: str = ""
+
+
+class Calibration(Model):
+    """How an arm's encoders err: constant offsets of its joints, drawn so that the tool errs as the cell says.
+
+    The stated error is the tool's mean over the `poses`.
+    """
+
+    poses: tuple[tuple[JointAngle, ...], ...]
+    encoder_step: Annotated[float, Field(gt=0, le=0.1)] = 1e-4  # rad
+
+
+class Footprint(Model):
+    """The box that the base fills, whatever the joints are: centre and full size, m, in the base's frame."""
+
+    center: Vector
+    size: Size
+
+
+class Paint(Model):
+    """Colours in place of the URDF's."""
+
+    links: Color
+    pads: Color = (0.12, 0.12, 0.12)

@@ -1,0 +1,447 @@
+"""A robot: what its file says, and the kinematic chain, limits and body that follow from its URDF."""
+
+import xml.etree.ElementTree as ET
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from regrasp.interfaces.arrays import FloatArray, Mask
+from regrasp.interfaces.fields import JointAngle, Model, Number
+from regrasp.interfaces.quote import nearest, quoted
+from regrasp.interfaces.robot import urdf
+from regrasp.interfaces.robot.parts import (
+    Attached,
+    Calibration,
+    Footprint,
+    Gripper,
+    Joint,
+    LinkageGripper,
+    LinkName,
+    Paint,
+    Placed,
+    Rail,
+    Source,
+    Sphere,
+)
+from regrasp.interfaces.robot.urdf import DECIMALS, RobotError, UrdfJoint, UrdfTree, snapped
+
+BEAM, CARRIAGE = "rail_beam", "rail_carriage"  # links of a rail
+_CARRIAGE_MASS, _CARRIAGE_INERTIA = 10.0, 0.1  # kg, kg m2; choice: a drive as strong as a rail's moves it anyhow
+# kg and kg m2 of links without inertia: frames, to which PyBullet would give 1 kg and 1 kg m2
+_FRAME_MASS, _FRAME_INERTIA = 1e-3, 1e-6
+_OPENINGS = 201  # places at which a linkage's opening is worked out; between them it is interpolated
+
+
+@dataclass(frozen=True, eq=False)
+class Chain:
+    """The joints from the base to the tool, by axes and offsets at zero (product of exponentials).
+
+    Link 0 is the base, link i + 1 moves with joint i. At zero all link frames are parallel to the base's; each has
+    its origin on its joint's axis. `origins` (n, 3) m are those of the joints in the link before, `axes` (n, 3) unit
+    vectors, `slides` (n,) says which joints are prismatic. Limits are (n,), rad or m and their derivatives; `torques`
+    are N m or N, `levers` m that the far end moves by a rad, about.
+    """
+
+    names: tuple[str, ...]
+    origins: FloatArray
+    axes: FloatArray
+    slides: Mask
+    lower: FloatArray
+    upper: FloatArray
+    speeds: FloatArray
+    accelerations: FloatArray
+    torques: FloatArray
+    levers: FloatArray
+    last_from_tool: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+
+class Robot(Model):
+    """Contents of a robot file. `folder` is where it lies; the reader sets it."""
+
+    title: str
+    urdf: Source
+    base: LinkName
+    joints: Annotated[tuple[Joint, ...], Field(min_length=1, max_length=12)]
+    tool: Placed  # x along the fingers, y the direction in which they close
+    mount: Placed | None = None  # where a camera is fixed: x is where it looks, z its up
+    gripper: Gripper
+    attached: Attached | None = None
+    rail: Rail | None = None
+    sleep: tuple[JointAngle, ...]
+    calibration: Calibration
+    footprint: Footprint
+    spheres: dict[LinkName, tuple[Sphere, ...]]  # by link, in its frame
+    # Pairs of links that can meet; links not named together are kept apart by the joints' limits.
+    self_collision: tuple[tuple[LinkName, LinkName], ...]
+    still: tuple[LinkName, ...] = ()  # links that turn on the spot, which nothing around can meet
+    paint: Paint | None = None
+    draw: Annotated[str, Field(pattern="^(visual|collision)$")] = "visual"  # which of the URDF's meshes are drawn
+    braking: Annotated[float, Field(gt=0, le=1000)] | None = None  # rad/s2 or m/s2; None: the joints' acceleration
+    folder: str = ""
+
+    def element(self) -> ET.Element:
+        """The whole URDF: arm, gripper and rail; mesh files are absolute paths. A new tree each time.
+
+        Raises RobotError: a source cannot be read.
+        """
+        root = _at("urdf", self.urdf, self.folder)
+        if self.attached is not None:
+            part = _at("attached", self.attached.urdf, self.folder)
+            urdf.attach(root, urdf.prefixed(part, self.attached.prefix), self.attached.at, "gripper_mount")
+        if self.rail is not None:
+            _add_rail(root, self.rail, self.base)
+        for link in root.findall("link"):
+            if link.find("inertial") is None:
+                urdf.add_inertia(link, _FRAME_MASS, _FRAME_INERTIA)
+        return root
+
+    @cached_property
+    def tree(self) -> UrdfTree:
+        """Links and joints of `element`."""
+        return UrdfTree(self.element())
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """The names of all driven joints, the rail's first."""
+        return (*([self.rail.name] if self.rail else []), *(joint.name for joint in self.joints))
+
+    @property
+    def urdf_joints(self) -> tuple[str, ...]:
+        """Their names in the URDF."""
+        return (*([self.rail.name] if self.rail else []), *(joint.in_urdf for joint in self.joints))
+
+    @property
+    def root(self) -> str:
+        """The link that stands still."""
+        return self.base if self.rail is None else BEAM
+
+    @cached_property
+    def signs(self) -> FloatArray:
+        """1 or -1 (n,): what turns our joint positions into those of the URDF."""
+        return np.array([*([1.0] if self.rail else []), *(float(joint.sign) for joint in self.joints)])
+
+    @cached_property
+    def asleep(self) -> FloatArray:
+        """The sleep pose (n,)."""
+        return np.array(self.sleep, float)
+
+    @cached_property
+    def chain(self) -> Chain:
+        """The joints from the base to the tool.
+
+        Raises RobotError: the tool's link or a joint is not in the URDF, or the URDF has other joints on the way.
+        """
+        joints = self._joints_to_tool()
+        zero = np.array([self._root_frame() @ self.tree.frame(joint.child) for joint in joints])
+        origins = np.round(np.diff(zero[:, :3, 3], axis=0, prepend=np.zeros((1, 3))), DECIMALS) + 0.0
+        axes = np.array([pose[:3, :3] @ joint.axis for pose, joint in zip(zero, joints, strict=True)])
+        slides = np.array([joint.kind == "prismatic" for joint in joints])
+        last_from_tool = self._in_body(self.tool)[1]
+        lower, upper, speeds, accelerations, torques = self._limits(joints)
+        return Chain(
+            names=self.joint_names,
+            origins=origins,
+            axes=_unit(axes * self.signs[:, None]),
+            slides=slides,
+            lower=lower,
+            upper=upper,
+            speeds=speeds,
+            accelerations=accelerations,
+            torques=torques,
+            levers=self._given_levers(_levers(origins, last_from_tool, slides)),
+            last_from_tool=last_from_tool,
+        )
+
+    @cached_property
+    def mounted(self) -> tuple[int, FloatArray]:
+        """The chain's link that carries a camera, and link_from_mount (4, 4). Raises RobotError without a mount."""
+        if self.mount is None:
+            raise RobotError(("mount",), f"the robot {self.title} has no mount for a camera; give it one")
+        return self._in_body(self.mount)
+
+    @cached_property
+    def body(self) -> "Body":
+        """Its spheres in the chain's links."""
+        return Body.of(self)
+
+    def link_place(self, link: str, opening: float | None = None) -> tuple[int, FloatArray]:
+        """The chain's link that moves a link of the URDF, and chain_link_from_link (4, 4).
+
+        The jaw stands `opening` m open (default: fully). Raises RobotError if the URDF has no such link.
+        """
+        jaw = self.gripper_positions(self.gripper.opening if opening is None else opening)
+        return self._placed(link, np.eye(4), jaw)
+
+    def gripper_positions(self, opening: float) -> dict[str, float]:
+        """Positions of the URDF's gripper joints with the pads `opening` m apart."""
+        gripper = self.gripper
+        if isinstance(gripper, LinkageGripper):
+            return self.linkage.positions(opening)
+        finger = finger_position(opening, gripper.pads.face, gripper.pads.thickness)
+        return dict(zip(gripper.joints, (finger, -finger), strict=True))
+
+    @cached_property
+    def linkage(self) -> "Linkage":
+        """How the jaw of a linkage gripper opens."""
+        assert isinstance(self.gripper, LinkageGripper)
+        return Linkage.of(self.tree, self.gripper)
+
+    def _in_body(self, frame: Placed) -> tuple[int, FloatArray]:
+        return self._placed(frame.link, urdf.pose_of(frame.xyz, frame.rpy), {})
+
+    def _placed(self, link: str, link_from_frame: FloatArray, jaw: Mapping[str, float]) -> tuple[int, FloatArray]:
+        try:
+            way = self.tree.way_to(link)
+        except KeyError:
+            raise RobotError((), f"the URDF has no link {quoted(link)}; {nearest(link, self.tree.links)}") from None
+        driven, pose, index, origin = set(self.urdf_joints), self._root_frame(), 0, np.zeros(3)
+        for joint in way:
+            pose = pose @ joint.moved(jaw.get(joint.name, 0.0))
+            if joint.name in driven:
+                index, origin = self.urdf_joints.index(joint.name) + 1, pose[:3, 3].copy()
+        pose = pose @ link_from_frame
+        pose[:3, :3] = snapped(pose[:3, :3])
+        pose[:3, 3] = np.round(pose[:3, 3] - origin, DECIMALS) + 0.0
+        return index, pose
+
+    def _root_frame(self) -> FloatArray:
+        """base_from_root (4, 4) at zero: what lies between the URDF's root and the base does not count."""
+        return np.asarray(np.linalg.inv(self.tree.frame(self.base)))
+
+    def _joints_to_tool(self) -> list[UrdfJoint]:
+        tree = self.tree
+        for i, joint in enumerate(self.joints):
+            if joint.in_urdf not in tree.joints:
+                right = nearest(joint.in_urdf, [name for name, known in tree.joints.items() if known.kind != "fixed"])
+                path = ("joints", i, "urdf" if joint.urdf else "name")
+                raise RobotError(path, f"the URDF has no joint {quoted(joint.in_urdf)}; {right}")
+        for key, link in (("tool", self.tool.link), ("base", self.base)):
+            if link not in tree.links:
+                path = (key, "link") if key == "tool" else (key,)
+                raise RobotError(path, f"the URDF has no link {quoted(link)}; {nearest(link, tree.links)}")
+        way = [joint for joint in tree.way_to(self.tool.link) if joint.kind != "fixed"]
+        if [joint.name for joint in way] != [*self.urdf_joints]:
+            there, here = ", ".join(joint.name for joint in way) or "none", ", ".join(self.urdf_joints)
+            raise RobotError(("joints",), f"the joints that move the tool are {there}, in this order, not {here}")
+        return way
+
+    def _limits(self, joints: list[UrdfJoint]) -> FloatArray:
+        """Lower and upper limits, speeds, accelerations and torques (5, n)."""
+        rows = [] if self.rail is None else [_rail_limits(self.rail)]
+        for i, (joint, known) in enumerate(zip(self.joints, joints[len(rows) :], strict=True)):
+            rows.append(_limits(i, joint, known))
+        return np.array(rows).T
+
+    def _given_levers(self, levers: FloatArray) -> FloatArray:
+        given = [*([None] if self.rail else []), *(joint.lever for joint in self.joints)]
+        return np.array([own if own else lever for own, lever in zip(given, levers, strict=True)])
+
+
+@dataclass(frozen=True, eq=False)
+class Linkage:
+    """A linkage gripper's `openings` (k,) m, falling, over its driven joint's `driven` positions (k,) rad."""
+
+    driven: FloatArray
+    openings: FloatArray
+    followers: dict[str, tuple[float, float]]  # multiplier and offset of each joint, the driven one with (1, 0)
+
+    @classmethod
+    def of(cls, tree: UrdfTree, gripper: LinkageGripper) -> "Linkage":
+        """Raises RobotError: the URDF lacks the joint or a pad, or the jaw does not close."""
+        if gripper.joint not in tree.joints:
+            right = nearest(gripper.joint, list(tree.joints))
+            raise RobotError(("gripper", "joint"), f"the URDF has no joint {quoted(gripper.joint)}; {right}")
+        for side, pad in enumerate(gripper.pads):
+            if pad not in tree.links:
+                right = nearest(pad, tree.links)
+                raise RobotError(("gripper", "pads", side), f"the URDF has no link {quoted(pad)}; {right}")
+        followers = {
+            name: joint.mimic[1:]
+            for name, joint in tree.joints.items()
+            if joint.mimic is not None and joint.mimic[0] == gripper.joint
+        }
+        followers[gripper.joint] = (1.0, 0.0)
+        limits = tree.joints[gripper.joint].limits
+        driven = np.linspace(limits.get("lower", 0.0), limits.get("upper", 0.0), _OPENINGS)
+        openings = np.array([_pad_gap(tree, gripper, followers, q) for q in driven])
+        falling = int(np.argmin(openings)) + 1
+        if falling < 2 or np.any(np.diff(openings[:falling]) >= 0):
+            message = f"the pads do not come nearer to each other while {gripper.joint} rises; name the joint that does"
+            raise RobotError(("gripper", "joint"), message)
+        return cls(driven[:falling], openings[:falling], followers)
+
+    def position(self, opening: float) -> float:
+        """The driven joint's position, rad, with the pads `opening` m apart."""
+        return float(np.interp(-opening, -self.openings, self.driven))
+
+    def opening(self, position: float) -> float:
+        """The pads' distance, m, with the driven joint at `position` rad."""
+        return float(np.interp(position, self.driven, self.openings))
+
+    def positions(self, opening: float) -> dict[str, float]:
+        """The positions of all its joints, rad."""
+        driven = self.position(opening)
+        return {name: multiplier * driven + offset for name, (multiplier, offset) in self.followers.items()}
+
+
+def _pad_gap(
+    tree: UrdfTree, gripper: LinkageGripper, followers: Mapping[str, tuple[float, float]], driven: float
+) -> float:
+    positions = {name: multiplier * driven + offset for name, (multiplier, offset) in followers.items()}
+    left, right = (tree.frame(pad, positions)[:3, 3] for pad in gripper.pads)
+    return float(np.linalg.norm(left - right)) - gripper.thickness
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A robot's spheres: their chain links (n,), and centre and radius (n, 4), m, there, with the jaw fully open."""
+
+    links: NDArray[np.int64]
+    spheres: FloatArray
+    fingers: FloatArray  # (n, 3) unit vectors along which spheres move as the jaw opens; 0 for those that do not
+    pairs: frozenset[tuple[int, int]]  # rows of spheres that can meet
+    first_moving: int  # the first chain link that something around can meet
+    robot: Robot
+
+    @classmethod
+    def of(cls, robot: Robot) -> "Body":
+        """Raises RobotError: a link of the spheres or of the pairs is not in the URDF."""
+        links, spheres, fingers, rows = [], [], [], {}
+        open_jaw, ways = robot.gripper_positions(robot.gripper.opening), _finger_ways(robot)
+        for name, group in robot.spheres.items():
+            index, pose = _found(robot, name, ("spheres", name), open_jaw)
+            rows[name] = range(len(links), len(links) + len(group))
+            for x, y, z, radius in group:
+                center = np.round(pose[:3, :3] @ (x, y, z) + pose[:3, 3], DECIMALS) + 0.0
+                links.append(index)
+                spheres.append([*center, radius])
+                fingers.append(ways.get(name, np.zeros(3)))
+        for n, names in enumerate(robot.self_collision):
+            for side, name in enumerate(names):
+                if name not in rows:
+                    message = f"{quoted(name)} has no spheres; {nearest(name, list(rows))}"
+                    raise RobotError(("self_collision", n, side), message)
+        pairs = frozenset((i, j) for a, b in robot.self_collision for i in rows[a] for j in rows[b])
+        still = {_found(robot, name, ("still", n), open_jaw)[0] for n, name in enumerate(robot.still)}
+        return cls(
+            np.array(links, np.int64),
+            np.array(spheres, float).reshape(-1, 4),
+            np.array(fingers, float).reshape(-1, 3),
+            pairs,
+            max(still, default=-1) + 1,
+            robot,
+        )
+
+    def at(self, opening: float) -> FloatArray:
+        """`spheres` (n, 4) with the pads `opening` m apart."""
+        moved = self.spheres.copy()
+        if isinstance(self.robot.gripper, LinkageGripper):
+            self._place_linkage(moved, opening)
+        else:
+            moved[:, :3] -= self.fingers * (0.5 * (self.robot.gripper.opening - opening))
+        return moved
+
+    def _place_linkage(self, moved: FloatArray, opening: float) -> None:
+        robot, row = self.robot, 0
+        jaw, movable = robot.gripper_positions(opening), set(robot.linkage.followers)
+        for name, group in robot.spheres.items():
+            if movable & {joint.name for joint in robot.tree.way_to(name)}:
+                pose = robot._placed(name, np.eye(4), jaw)[1]  # noqa: SLF001 - the body is the robot's own
+                local = np.array(group)[:, :3]
+                moved[row : row + len(group), :3] = local @ pose[:3, :3].T + pose[:3, 3]
+            row += len(group)
+
+
+def _found(
+    robot: Robot, link: str, path: tuple[str | int, ...], jaw: Mapping[str, float]
+) -> tuple[int, FloatArray]:
+    try:
+        return robot._placed(link, np.eye(4), jaw)  # noqa: SLF001
+    except RobotError as error:
+        raise RobotError(path, str(error)) from None
+
+
+def _finger_ways(robot: Robot) -> dict[str, FloatArray]:
+    """In which direction (3,) of the last chain link each finger's link moves as a parallel jaw opens."""
+    if isinstance(robot.gripper, LinkageGripper):
+        return {}
+    ways = {}
+    for link in robot.spheres:
+        for name, side in zip(robot.gripper.joints, (1.0, -1.0), strict=True):
+            joint = next((joint for joint in robot.tree.way_to(link) if joint.name == name), None)
+            if joint is not None:
+                ways[link] = side * (robot.link_place(joint.child)[1][:3, :3] @ joint.axis)
+    return ways
+
+
+def finger_position(gap: float, face: float, thickness: float) -> float:
+    """Position, m, of a parallel gripper's left finger joint at which the pads are `gap` m apart; see `Pads`."""
+    return gap / 2 + face + thickness
+
+
+def _at(key: str, source: Source, folder: str) -> ET.Element:
+    try:
+        return urdf.read_urdf(source, Path(folder))
+    except RobotError as error:
+        inside = (key,) if key == "urdf" else (key, "urdf")
+        raise RobotError((*inside, *error.path), str(error)) from None
+
+
+def _add_rail(root: ET.Element, rail: Rail, base: str) -> None:
+    """The beam as the new root, and a carriage on it that carries the base."""
+    beam, carriage = (ET.SubElement(root, "link", name=name) for name in (BEAM, CARRIAGE))
+    along = "xyz".index(rail.axis)
+    size, middle = list((*rail.beam[:1], *rail.beam[:1], rail.beam[1])), [0.0, 0.0, 0.0]
+    size[along] = rail.upper - rail.lower + rail.carriage[along]
+    middle[along] = 0.5 * (rail.lower + rail.upper)
+    middle[2] = -rail.below - 0.5 * (rail.carriage[2] + rail.beam[1])
+    urdf.add_box(beam, ("visual", "collision"), tuple(size), tuple(middle))
+    urdf.add_box(carriage, ("visual", "collision"), rail.carriage, (0.0, 0.0, -rail.below))
+    urdf.add_inertia(carriage, _CARRIAGE_MASS, _CARRIAGE_INERTIA)
+    joint = urdf.add_joint(root, rail.name, "prismatic", BEAM, CARRIAGE)
+    ET.SubElement(joint, "axis", xyz=" ".join("1" if axis == along else "0" for axis in range(3)))
+    ET.SubElement(
+        joint, "limit", lower=repr(rail.lower), upper=repr(rail.upper), velocity=repr(rail.speed), effort=repr(rail.force)
+    )
+    urdf.add_joint(root, "rail_base", "fixed", CARRIAGE, base)
+
+
+def _unit(axes: FloatArray) -> FloatArray:
+    return np.asarray(snapped(axes / np.linalg.norm(axes, axis=1, keepdims=True)))
+
+
+def _limits(i: int, joint: Joint, known: UrdfJoint) -> tuple[float, float, float, float, float]:
+    given = {"lower": joint.lower, "upper": joint.upper, "velocity": joint.speed, "effort": joint.torque}
+    limits = dict(known.limits)
+    if joint.sign < 0 and limits.keys() >= {"lower", "upper"}:  # the URDF counts the other way round
+        limits |= {"lower": -limits["upper"], "upper": -limits["lower"]}
+    values = {key: limits.get(key) if value is None else value for key, value in given.items()}
+    words = {"lower": "lower", "upper": "upper", "velocity": "speed", "effort": "torque"}
+    for key, value in values.items():
+        if value is None:
+            message = f"neither the file nor the URDF says {words[key]} of {joint.name}; write {words[key]}: a number"
+            raise RobotError(("joints", i), message)
+    lower, upper = float(values["lower"] or 0.0), float(values["upper"] or 0.0)
+    if lower >= upper:
+        message = f"{joint.name} turns from {lower:g} to {upper:g} by file and URDF; give lower and upper in order"
+        raise RobotError(("joints", i), message)
+    return lower, upper, float(values["velocity"] or 0.0), joint.acceleration, float(values["effort"] or 0.0)
+
+
+def _rail_limits(rail: Rail) -> tuple[float, float, float, float, float]:
+    return rail.lower, rail.upper, rail.speed, rail.acceleration, rail.force
+
+
+def _levers(origins: FloatArray, last_from_tool: FloatArray, slides: Mask) -> FloatArray:
+    """About how far (n,) m the tool lies from each joint with the arm stretched; 1 for a sliding joint."""
+    lengths = np.append(np.linalg.norm(origins[1:], axis=1), np.linalg.norm(last_from_tool[:3, 3]))
+    return np.asarray(np.where(slides, 1.0, np.cumsum(lengths[::-1])[::-1]))
