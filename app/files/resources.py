@@ -8,15 +8,15 @@ from typing import Literal
 from regrasp.app.files.findings import Finding, Findings, shown, why_no_file
 from regrasp.interfaces.quote import closest, cut, quoted
 
-ResourceKind = Literal["scenario", "cell", "tree"]
-_SUFFIX: dict[ResourceKind, str] = {"scenario": ".yaml", "cell": ".yaml", "tree": ".xml"}
+ResourceKind = Literal["scenario", "cell", "robot", "tree"]
+_SUFFIX: dict[ResourceKind, str] = {"scenario": ".yaml", "cell": ".yaml", "robot": ".yaml", "tree": ".xml"}
 MAX_NAMED = 5  # shipped names that are listed after an unknown one
 MAX_BYTES = 256 * 1024  # of a file that a person writes
 
 
 def shipped(kind: ResourceKind) -> dict[str, Path]:
     """The files of this kind that come with Regrasp, by name and sorted; scenarios of faults come last."""
-    folders = {"scenario": "scenarios", "cell": "scenarios/cells", "tree": "trees"}
+    folders = {"scenario": "scenarios", "cell": "scenarios/cells", "robot": "scenarios/robots", "tree": "trees"}
     folder = Path(str(files("regrasp"))) / folders[kind]
     names = {path.stem: path for path in sorted(folder.glob("*" + _SUFFIX[kind]))}
     if kind == "scenario":

@@ -2,7 +2,7 @@
 
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from regrasp.interfaces.arrays import FloatArray, Mask
-from regrasp.interfaces.fields import JointAngle, Model, Number
+from regrasp.interfaces.fields import JointAngle, Model
 from regrasp.interfaces.quote import nearest, quoted
 from regrasp.interfaces.robot import urdf
 from regrasp.interfaces.robot.parts import (
@@ -63,13 +63,18 @@ class Chain:
     def __len__(self) -> int:
         return len(self.names)
 
+    def without(self, first: int) -> "Chain":
+        """The chain from joint number `first` on; its base is the link before that joint."""
+        rows = {f.name: getattr(self, f.name)[first:] for f in fields(self) if f.name != "last_from_tool"}
+        return replace(self, **rows)
+
 
 class Robot(Model):
     """Contents of a robot file. `folder` is where it lies; the reader sets it."""
 
     title: str
     urdf: Source
-    base: LinkName
+    base_link: LinkName
     joints: Annotated[tuple[Joint, ...], Field(min_length=1, max_length=12)]
     tool: Placed  # x along the fingers, y the direction in which they close
     mount: Placed | None = None  # where a camera is fixed: x is where it looks, z its up
@@ -98,7 +103,7 @@ class Robot(Model):
             part = _at("attached", self.attached.urdf, self.folder)
             urdf.attach(root, urdf.prefixed(part, self.attached.prefix), self.attached.at, "gripper_mount")
         if self.rail is not None:
-            _add_rail(root, self.rail, self.base)
+            _add_rail(root, self.rail, self.base_link)
         for link in root.findall("link"):
             if link.find("inertial") is None:
                 urdf.add_inertia(link, _FRAME_MASS, _FRAME_INERTIA)
@@ -122,7 +127,7 @@ class Robot(Model):
     @property
     def root(self) -> str:
         """The link that stands still."""
-        return self.base if self.rail is None else BEAM
+        return self.base_link if self.rail is None else BEAM
 
     @cached_property
     def signs(self) -> FloatArray:
@@ -215,7 +220,7 @@ class Robot(Model):
 
     def _root_frame(self) -> FloatArray:
         """base_from_root (4, 4) at zero: what lies between the URDF's root and the base does not count."""
-        return np.asarray(np.linalg.inv(self.tree.frame(self.base)))
+        return np.asarray(np.linalg.inv(self.tree.frame(self.base_link)))
 
     def _joints_to_tool(self) -> list[UrdfJoint]:
         tree = self.tree
@@ -224,7 +229,7 @@ class Robot(Model):
                 right = nearest(joint.in_urdf, [name for name, known in tree.joints.items() if known.kind != "fixed"])
                 path = ("joints", i, "urdf" if joint.urdf else "name")
                 raise RobotError(path, f"the URDF has no joint {quoted(joint.in_urdf)}; {right}")
-        for key, link in (("tool", self.tool.link), ("base", self.base)):
+        for key, link in (("tool", self.tool.link), ("base_link", self.base_link)):
             if link not in tree.links:
                 path = (key, "link") if key == "tool" else (key,)
                 raise RobotError(path, f"the URDF has no link {quoted(link)}; {nearest(link, tree.links)}")
@@ -355,17 +360,15 @@ class Body:
         jaw, movable = robot.gripper_positions(opening), set(robot.linkage.followers)
         for name, group in robot.spheres.items():
             if movable & {joint.name for joint in robot.tree.way_to(name)}:
-                pose = robot._placed(name, np.eye(4), jaw)[1]  # noqa: SLF001 - the body is the robot's own
+                pose = robot._placed(name, np.eye(4), jaw)[1]
                 local = np.array(group)[:, :3]
                 moved[row : row + len(group), :3] = local @ pose[:3, :3].T + pose[:3, 3]
             row += len(group)
 
 
-def _found(
-    robot: Robot, link: str, path: tuple[str | int, ...], jaw: Mapping[str, float]
-) -> tuple[int, FloatArray]:
+def _found(robot: Robot, link: str, path: tuple[str | int, ...], jaw: Mapping[str, float]) -> tuple[int, FloatArray]:
     try:
-        return robot._placed(link, np.eye(4), jaw)  # noqa: SLF001
+        return robot._placed(link, np.eye(4), jaw)
     except RobotError as error:
         raise RobotError(path, str(error)) from None
 
@@ -410,7 +413,12 @@ def _add_rail(root: ET.Element, rail: Rail, base: str) -> None:
     joint = urdf.add_joint(root, rail.name, "prismatic", BEAM, CARRIAGE)
     ET.SubElement(joint, "axis", xyz=" ".join("1" if axis == along else "0" for axis in range(3)))
     ET.SubElement(
-        joint, "limit", lower=repr(rail.lower), upper=repr(rail.upper), velocity=repr(rail.speed), effort=repr(rail.force)
+        joint,
+        "limit",
+        lower=repr(rail.lower),
+        upper=repr(rail.upper),
+        velocity=repr(rail.speed),
+        effort=repr(rail.force),
     )
     urdf.add_joint(root, "rail_base", "fixed", CARRIAGE, base)
 

@@ -1,0 +1,1 @@
+"""Robot files: reading and checking them, and the spheres that cover their meshes."""

@@ -1,0 +1,82 @@
+"""Reads and checks robot files."""
+
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from regrasp.app.files.findings import Finding, Findings, shown
+from regrasp.app.files.overrides import merge_into
+from regrasp.app.files.resources import read_text, resolve
+from regrasp.app.files.validation import validated
+from regrasp.app.files.yaml_lines import Document, Place, parse
+from regrasp.interfaces.quote import quoted
+from regrasp.interfaces.robot.robot import Robot
+from regrasp.interfaces.robot.urdf import RobotError
+
+DEFAULT_ROBOT = "vx300s"  # of a cell's arm that names none: the only one when cells named none
+
+
+def load_robot(path: Path, where: Place | None = None) -> Robot:
+    """Read and check a robot file, and the URDF that it names. It may name another as its `base` and add to it.
+
+    Raises `Findings`; if there is no such file, the finding stands at `where`, the place that names the robot.
+    """
+    document = _read(path, where)
+    robot = validated(document, Robot)
+    _check(document, robot)
+    return robot
+
+
+def robot_named(name: str, beside: Path, where: Place) -> dict[str, Any]:
+    """The content of the robot file that a cell in the folder `beside` names. Raises `Findings`, as `load_robot`."""
+    return _content(resolve("robot", name, beside, where).resolve(), where)
+
+
+@cache
+def _content(path: Path, where: Place) -> dict[str, Any]:
+    return load_robot(path, where).model_dump(mode="json", exclude_unset=True)
+
+
+def _read(path: Path, where: Place | None) -> Document:
+    """The document, on top of the robot that it names as its `base`."""
+    document = parse(read_text(path, where), shown(path))
+    value = document.value
+    if isinstance(value, dict) and "folder" not in value and _is_beside(value):
+        value["folder"] = str(path.resolve().parent)
+    if not isinstance(value, dict) or "base" not in value:
+        return document
+    name, place = value.pop("base"), document.place(("base",))
+    if not isinstance(name, str):
+        raise Findings([Finding(*place, f"base is {quoted(name)}; expected the name of a robot or a path to its file")])
+    below = _read(resolve("robot", name, path.parent, place), place)
+    merge_into(below, document)
+    return below
+
+
+def _is_beside(value: dict[str, Any]) -> bool:
+    """Whether a source of the URDF is no file of a package."""
+    attached = value.get("attached")
+    sources = [value.get("urdf"), attached.get("urdf") if isinstance(attached, dict) else None]
+    return any(isinstance(source, dict) and source.get("package") is None for source in sources)
+
+
+def _check(document: Document, robot: Robot) -> None:
+    """Whether the URDF has what the file names. Raises `Findings` with the first thing that it lacks."""
+    try:
+        count = len(robot.chain)
+        if robot.mount is not None:
+            _ = robot.mounted
+        _ = robot.body
+    except RobotError as error:
+        raise Findings([Finding(*document.place(error.path), str(error))]) from None
+    found = []
+    rows = [
+        (("sleep",), robot.sleep),
+        *((("calibration", "poses", i), p) for i, p in enumerate(robot.calibration.poses)),
+    ]
+    for path, row in rows:
+        if len(row) != count:
+            message = f"{len(row)} values; the robot has {count} joints: {', '.join(robot.joint_names)}"
+            found.append(Finding(*document.place(path), message))
+    if found:
+        raise Findings(found)
