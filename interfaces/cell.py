@@ -4,7 +4,7 @@ It is read from a YAML file under `scenarios/cells/`. Units are SI. The world fr
 bases, midway between them: x points forward to the panels, y left, z up.
 """
 
-from typing import Annotated, Self
+from typing import Annotated, Any, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -24,6 +24,7 @@ from regrasp.interfaces.fields import (
 from regrasp.interfaces.frame import Intrinsics
 from regrasp.interfaces.geometry import axes_along
 from regrasp.interfaces.hidden_world import HiddenWorld
+from regrasp.interfaces.robot.robot import Robot
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_-]*$", max_length=40)]
 
@@ -45,12 +46,33 @@ class Box(Model):
     color: Color = (0.6, 0.6, 0.6)
 
 
+def _sleep_of(arm: dict[str, Any]) -> tuple[float, ...]:
+    """The sleep pose of the robot of an arm that is being read; () if that is not valid."""
+    return arm["robot"].sleep if "robot" in arm else ()
+
+
 class ArmSpec(Model):
-    """A ViperX 300 S."""
+    """An arm: a robot, and where it stands."""
 
     name: Name
+    robot: Robot  # in a file the name of a robot or the path of its file
     base: Vector  # position of its base link
-    sleep: tuple[JointAngle, JointAngle, JointAngle, JointAngle, JointAngle, JointAngle]
+    base_rpy_deg: tuple[SignedDegrees, SignedDegrees, SignedDegrees] = (0.0, 0.0, 0.0)  # roll, pitch and yaw
+    sleep: tuple[JointAngle, ...] = Field(default_factory=_sleep_of)  # left out: the robot's
+
+    @model_validator(mode="after")
+    def _all_joints(self) -> Self:
+        if len(self.sleep) != len(self.robot.joint_names):
+            names = ", ".join(self.robot.joint_names)
+            raise ValueError(f"sleep has {len(self.sleep)} values for the joints {names}; write one for each")
+        return self
+
+    @property
+    def world_from_base(self) -> RigidTransform:
+        """Pose of the base link: turned about x by the roll, then about y, then about z, all axes of the world."""
+        if not any(self.base_rpy_deg):
+            return RigidTransform.from_translation(self.base)
+        return RigidTransform.from_components(self.base, Rotation.from_euler("xyz", self.base_rpy_deg, degrees=True))
 
 
 class FixedMount(Model):
@@ -68,14 +90,14 @@ class FixedMount(Model):
 
 
 class WristMount(Model):
-    """A camera on an arm's wrist link (before the last joint), looking along the link's x axis."""
+    """A camera on the mount that an arm's robot has, looking along the mount's x axis."""
 
     arm: str
     offset: tuple[MountOffset, MountOffset, MountOffset]
 
     @property
-    def wrist_from_camera(self) -> RigidTransform:
-        """Pose of the optical frame in the wrist link."""
+    def mount_from_camera(self) -> RigidTransform:
+        """Pose of the optical frame in the mount."""
         return RigidTransform.from_components(self.offset, OPTICAL)
 
 

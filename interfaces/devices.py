@@ -18,7 +18,7 @@ class Clock(Protocol):
 
 
 class Arm(Protocol):
-    """An arm with six position-controlled joints."""
+    """An arm with position-controlled joints."""
 
     name: str
 

@@ -10,9 +10,6 @@ from pydantic import AfterValidator, Field, model_validator
 
 from regrasp.interfaces.fields import Direction, Fraction, Model, Vector
 
-JointName = Literal["waist", "shoulder", "elbow", "forearm_roll", "wrist_angle", "wrist_rotate"]
-JOINT_NAMES: tuple[JointName, ...] = ("waist", "shoulder", "elbow", "forearm_roll", "wrist_angle", "wrist_rotate")
-
 
 def _in_order(span: tuple[float, float]) -> tuple[float, float]:
     if span[0] > span[1]:
@@ -161,7 +158,7 @@ class JointFault(Fault):
     """A fault of one joint."""
 
     arm: str = Field(description="Which arm.", examples=["right"])
-    joint: JointName = Field(description="Which joint.", examples=["elbow"])
+    joint: str = Field(description="Which joint of it, by the name in its robot's file.", examples=["elbow"])
 
 
 class JointStalls(JointFault, Lasting):
@@ -171,10 +168,10 @@ class JointStalls(JointFault, Lasting):
 
 
 class JointLags(JointFault, Lasting):
-    """The joint's drive is weak: it turns no faster than a share of its rated speed, pi rad/s."""
+    """The joint's drive is weak: it turns no faster than a share of its rated speed."""
 
     type: Literal["joint_lags"] = Field(description="This fault.", examples=["joint_lags"])
-    speed_share: PositiveFraction = Field(description="Share of pi rad/s.", examples=[0.15])
+    speed_share: PositiveFraction = Field(description="Share of the rated speed.", examples=[0.15])
 
 
 class EncoderJumps(JointFault):
@@ -182,7 +179,7 @@ class EncoderJumps(JointFault):
 
     type: Literal["encoder_jumps"] = Field(description="This fault.", examples=["encoder_jumps"])
     angle: Annotated[float, Field(ge=-3.2, le=3.2)] = Field(
-        description="Radians by which its readings are too large from then on.", examples=[0.3]
+        description="Radians (metres of a rail) by which its readings are too large from then on.", examples=[0.3]
     )
 
 

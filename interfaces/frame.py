@@ -59,7 +59,7 @@ class RgbdFrame:
         rgb: (H, W, 3) uint8.
         depth: (H, W) float32, metres along the optical axis, 0 where there is no reading.
         intrinsics: Of both images.
-        joints: Encoder readings (6,) rad at the exposure, of the arm that carries the camera; None for a fixed camera.
+        joints: Encoder readings (n,) rad at the exposure, of the arm that carries the camera; None for a fixed camera.
 
     Raises:
         ValueError: an image has another shape or type than the above.

@@ -41,12 +41,12 @@ class Light(Model):
 
 
 class GripperSpec(Model):
-    """The gripper's drive and its rubber pads."""
+    """What is true of the grippers in this world in place of what their robots' files say."""
 
-    pad_thickness: Annotated[float, Field(ge=1e-4, le=0.02)]  # metres
-    max_force: Force  # of each finger
-    speed: Annotated[float, Field(ge=1e-3, le=10)]  # m/s of each finger
-    friction: Friction  # of the pads
+    pad_thickness: Annotated[float, Field(ge=1e-4, le=0.02)] | None = None  # metres, of pads that are added
+    max_force: Force | None = None  # of each finger
+    speed: Annotated[float, Field(ge=1e-3, le=10)] | None = None  # m/s of each finger
+    friction: Friction | None = None  # of the pads
 
 
 class HiddenWorld(Model):
@@ -54,6 +54,6 @@ class HiddenWorld(Model):
 
     step_rate: Annotated[int, Field(ge=240, le=4800, multiple_of=240)]  # physics steps a second
     solver_iterations: Annotated[int, Field(ge=10, le=500)]
-    gripper: GripperSpec
+    gripper: GripperSpec = GripperSpec()
     errors: Errors
     light: Light

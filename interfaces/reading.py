@@ -7,7 +7,7 @@ from regrasp.interfaces.arrays import FloatArray
 
 @dataclass(frozen=True, eq=False)
 class JointReading:
-    """An arm's encoders and drives at `stamp` s: positions (6,) rad, velocities (6,) rad/s, efforts (6,) N m."""
+    """An arm's encoders and drives at `stamp` s: positions (n,) rad, velocities, efforts (n,) N m; a rail's m and N."""
 
     stamp: float
     positions: FloatArray

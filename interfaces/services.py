@@ -17,7 +17,7 @@ class MotionService(Protocol):
     """Motions of the arms. Each returns a request at once, which fails with PlanningError."""
 
     def move(self, arm: str, goals: FloatArray, *, margin: float | None = None, tight: bool = True) -> Request[None]:
-        """Bring an arm along a free path to one of the goals (n, 6) rad, `margin` m from everything."""
+        """Bring an arm along a free path to one of the goals (k, n), `margin` m from everything."""
         ...
 
     def sleep(self, arm: str) -> Request[None]:
@@ -57,7 +57,7 @@ class MotionService(Protocol):
         ...
 
     def joints(self, arm: str) -> FloatArray:
-        """The arm's joints (6,) rad as read."""
+        """The arm's joints (n,) as read."""
         ...
 
     def tool(self, arm: str) -> "RigidTransform":

@@ -11,7 +11,7 @@ from regrasp.interfaces.arrays import FloatArray
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """Samples: `times` (n,) s, from 0 on and strictly increasing; `positions` (n, 6) rad; `velocities` (n, 6) rad/s."""
+    """Samples: `times` (k,) s, from 0 on and strictly increasing; `positions` (k, n); `velocities` (k, n) a second."""
 
     times: FloatArray
     positions: FloatArray
@@ -23,7 +23,7 @@ class Trajectory:
         return float(self.times[-1])
 
     def sample(self, t: float) -> tuple[FloatArray, FloatArray]:
-        r"""Position (6,) rad and velocity (6,) rad/s at second `t`, clamped to the first and last sample.
+        r"""Positions and velocities (n,) at second `t`, clamped to the first and last sample.
 
         Between two samples, `h` seconds apart, the path is a cubic Hermite spline:
 
@@ -39,11 +39,12 @@ class Trajectory:
         begin = self.times[i]
         s = float((t - begin) / (self.times[i + 1] - begin))
         both = np.array((1.0, s, s * s, s * s * s)) @ self._polynomials[i]
-        return both[:6], both[6:]
+        joints = both.size // 2
+        return both[:joints], both[joints:]
 
     @cached_property
     def _polynomials(self) -> FloatArray:
-        """Coefficients (n - 1, 4, 12) of 1, s, s^2 and s^3 in each interval: of the position, then of the velocity."""
+        """Coefficients (k - 1, 4, 2 n) of 1, s, s^2 and s^3 in each interval: of the position, then of the velocity."""
         h = np.diff(self.times)[:, None]
         rise = self.positions[1:] - self.positions[:-1]
         m0, m1 = h * self.velocities[:-1], h * self.velocities[1:]

@@ -8,10 +8,11 @@ import numpy as np
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.devices import Arm, Clock, Gripper
+from regrasp.interfaces.robot.robot import Chain
 from regrasp.interfaces.trajectory import Trajectory
 from regrasp.motion.failure import GraspEmptyError, PlanningError
 from regrasp.motion.grasping.gap_test import GapParameters, GripWatch
-from regrasp.motion.planning.timing import TimingParameters, time_path
+from regrasp.motion.planning.timing import JointLimits, TimingParameters, time_path
 from regrasp.motion.request import MotionRequest
 from regrasp.motion.robots.arm_watch import ArmWatch, ArmWatchParameters, remaining_waypoints
 
@@ -64,6 +65,7 @@ class Execution:
         self,
         arms: Mapping[str, Arm],
         grippers: Mapping[str, Gripper],
+        chains: Mapping[str, Chain],
         clock: Clock,
         latency: float,
         parameters: ExecutionParameters = ExecutionParameters(),
@@ -71,7 +73,8 @@ class Execution:
     ) -> None:
         self.parameters, self._on_anomaly = parameters, on_anomaly
         self._arms, self._grippers, self._clock, self._latency = arms, grippers, clock, latency
-        self._watches = {name: ArmWatch(name, parameters.watch) for name in arms}
+        self._watches = {name: ArmWatch(name, chains[name], parameters.watch) for name in arms}
+        self._limits = {name: JointLimits(chains[name].speeds, chains[name].accelerations) for name in arms}
         self._speed_share = dict.fromkeys(arms, 1.0)  # of the speed asked for; less for an arm that fell behind
         self._out_of_order: dict[str, PlanningError] = {}
 
@@ -97,7 +100,7 @@ class Execution:
         return self._out_of_order[arm]
 
     def follow(self, arm: str, path: FloatArray, speed: float) -> Iterator[None]:
-        """Steps that bring an arm along a joint path (k, 6) rad, at `speed` in (0, 1] of the joints' limits.
+        """Steps that bring an arm along a joint path (k, n), at `speed` in (0, 1] of the joints' limits.
 
         An arm that falls behind is stopped and led on, slower each time. Raises PlanningError ARM_FAILED when it never
         follows or its encoder readings are implausible, and MOTION_BLOCKED when it ends off its goal.
@@ -106,7 +109,7 @@ class Execution:
         if moved is not None:
             raise self.give_up(arm, CauseCode.ARM_FAILED, moved)
         for _ in range(self.parameters.attempts):
-            trajectory = time_path(path, speed * self._speed_share[arm], self.parameters.timing)
+            trajectory = time_path(path, self._limits[arm], speed * self._speed_share[arm], self.parameters.timing)
             yield from self._pause(self._latency)
             trouble, elapsed = yield from self._run(arm, trajectory)
             if trouble is None:
@@ -178,7 +181,7 @@ class Execution:
         return None, trajectory.duration
 
     def _arrive(self, arm: str, goal: FloatArray) -> Iterator[None]:
-        """Wait until the arm rests at `goal` (6,) rad. Raises PlanningError when it does not come there."""
+        """Wait until the arm rests at `goal` (n,). Raises PlanningError when it does not come there."""
         yield from self._pause(self.parameters.settle_time)
         end, tolerance = self._clock.now() + self.parameters.arrival_timeout, self.parameters.goal_tolerance
         while self._goal_error(arm, goal) > tolerance and self._clock.now() < end - 1e-9:

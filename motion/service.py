@@ -60,7 +60,10 @@ class Motion(PlanningScene):
         super().__init__(known, arms, grippers, parameters.scene)
         self.parameters = parameters
         self.planner = plan
-        self.execution = Execution(arms, grippers, clock, known.latencies.plan, parameters.execution, on_anomaly)
+        chains = {name: kin.chain for name, kin in self.kinematics.items()}
+        self.execution = Execution(
+            arms, grippers, chains, clock, known.latencies.plan, parameters.execution, on_anomaly
+        )
         self._clock, self._seed = clock, seed
 
     def warm_up(self) -> None:
@@ -69,7 +72,7 @@ class Motion(PlanningScene):
             self.model(arm).free(self.joints(arm), 0.0)
 
     def move(self, arm: str, goals: FloatArray, *, margin: float | None = None, tight: bool = True) -> MotionRequest:
-        """Plan a path to one of the goals (n, 6) rad and follow it, `margin` m from everything (default: as set).
+        """Plan a path to one of the goals (k, n) and follow it, `margin` m from everything (default: as set).
 
         `tight`: with a smaller margin where nothing else is found.
         """
@@ -145,7 +148,8 @@ class Motion(PlanningScene):
             q, jaw = self.joints(arm), self.parameters.execution.jaw
             self._keep_clear_but_near(clear_of, world_from_cylinder.translation)
             model = self.start_model(arm, opening=jaw.open_gap)
-            candidates = pick_candidates(world_from_cylinder, cylinder, shallow, self.parameters.pick)
+            widest = self.known.arm(arm).robot.gripper.opening
+            candidates = pick_candidates(world_from_cylinder, cylinder, shallow, widest, self.parameters.pick)
             approaches = self._approaches(arm, model, candidates, without)
             self.grippers[arm].open(jaw.open_gap)
             path = self._plan(model, q, np.array([approach[0] for approach in approaches]))
@@ -199,7 +203,7 @@ class Motion(PlanningScene):
         self.keep_clear(NO_POINTS if points is None else points_beyond(points, place, self.parameters.pick.jaw_reach))
 
     def _measure_offsets(self, arm: str, point_cloud: PointCloudSource | None) -> Generator[None, None, FloatArray]:
-        """The encoders' offsets (6,) rad of an arm at rest, by a picture taken from now on; zeros if none comes."""
+        """The encoders' offsets (n,) of an arm at rest, by a picture taken from now on; zeros if none comes."""
         start = self._clock.now()
         while point_cloud is not None and self._clock.now() < start + self.parameters.camera_timeout:
             points = point_cloud(start)
@@ -207,12 +211,12 @@ class Motion(PlanningScene):
                 q, gap = self.joints(arm), self.grippers[arm].reading().gap
                 return joint_offsets(self.kinematics[arm], q, gap, points, self.parameters.joint_offsets)
             yield
-        return np.zeros(6)
+        return np.zeros(len(self.kinematics[arm]))
 
     def _approaches(
         self, arm: str, model: CollisionModel, candidates: Sequence[Grasp], without: Collection[Box]
     ) -> list[FloatArray]:
-        """Joint paths (k, 6) rad from standoff to grasp; `model` counts away from what is grasped."""
+        """Joint paths (k, n) from standoff to grasp; `model` counts away from what is grasped."""
         near = self.model(arm, without=without, opening=self.parameters.execution.jaw.open_gap)
         clearances, pick = self.parameters.clearances, self.parameters.pick
         return find_approaches(model, near, self.joints(arm), candidates, clearances, pick)
@@ -225,7 +229,7 @@ class Motion(PlanningScene):
         margin: float | None = None,
         tight: bool = True,
     ) -> FloatArray:
-        """A path (k, 6) rad with `margin` m (default: as set), else, if `tight`, with the smaller one."""
+        """A path (k, n) with `margin` m (default: as set), else, if `tight`, with the smaller one."""
         planner, clearances = self.parameters.planner, self.parameters.clearances
         wide = clearances.margin if margin is None else margin
         try:

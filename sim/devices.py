@@ -108,8 +108,8 @@ def _draw_light(light: Light, rng: np.random.Generator, smallest_brightness: flo
 
 def _wrist_mounting(arm: SimArm, mount: WristMount, error: RigidTransform) -> CameraMounting:
     def expose() -> Callable[[], RigidTransform]:
-        wrist = arm.deferred_wrist_pose()
-        return lambda: wrist() * mount.wrist_from_camera * error
+        pose = arm.deferred_mount_pose()
+        return lambda: pose() * mount.mount_from_camera * error
 
     return CameraMounting(expose, lambda: arm.reading().positions)
 

@@ -70,10 +70,8 @@ def _check(document: Document, robot: Robot) -> None:
     except RobotError as error:
         raise Findings([Finding(*document.place(error.path), str(error))]) from None
     found = []
-    rows = [
-        (("sleep",), robot.sleep),
-        *((("calibration", "poses", i), p) for i, p in enumerate(robot.calibration.poses)),
-    ]
+    poses = enumerate(robot.calibration.poses)
+    rows = [(("sleep",), robot.sleep), *((("calibration", "poses", i), pose) for i, pose in poses)]
     for path, row in rows:
         if len(row) != count:
             message = f"{len(row)} values; the robot has {count} joints: {', '.join(robot.joint_names)}"

@@ -14,6 +14,7 @@ from regrasp.app.files.schema_nodes import value_at
 from regrasp.app.files.validation import validated
 from regrasp.app.files.yaml_lines import Document, Place, parse
 from regrasp.app.files.yaml_lines import Path as KeyPath
+from regrasp.app.robots.robot_file import DEFAULT_ROBOT, robot_named
 from regrasp.app.scenario.old_words import OldWordWarning
 from regrasp.app.task import find
 from regrasp.interfaces.cell import Cell, WristMount
@@ -45,7 +46,9 @@ def load_cell(
     assignments = [_with_new_key(assignment) for assignment in assignments]
     if not isinstance(document.value, dict):  # only that is told, not the assignments
         validated(document, Cell)
+    robots = _put_robots(document, path.parent)
     _, found = catch_findings(apply_assignments, document, assignments)
+    found = [*robots, *found, *_put_robots(document, path.parent)]
     if task is None:
         task = find.task_named(_only_task(document, shown(path)))
     model = task.cell()
@@ -69,6 +72,21 @@ def tasks_of(path: Path, assignments: Sequence[Assignment] = (), where: Place | 
         validated(document, Cell)
     catch_findings(apply_assignments, document, [_with_new_key(assignment) for assignment in assignments])
     return _sections(document)
+
+
+def _put_robots(document: Document, folder: Path) -> list[Finding]:
+    """Put the content of robot files in the place of their names; findings of files that cannot be read."""
+    found: list[Finding] = []
+    arms = value_at(document.value, ("known", "arms"))
+    for i, arm in enumerate(arms if isinstance(arms, list) else []):
+        if not isinstance(arm, dict) or not isinstance(name := arm.get("robot", DEFAULT_ROBOT), str):
+            continue
+        key = ("known", "arms", i, "robot")
+        place = document.place(key if "robot" in arm else key[:-1])
+        content, wrong = catch_findings(robot_named, name, folder, place)
+        found += wrong
+        arm["robot"] = content if content is not None else robot_named(DEFAULT_ROBOT, folder, place)
+    return found
 
 
 def _task_findings(document: Document, cell: Cell, task: "Task", laid_out: bool) -> list[Finding]:

@@ -19,7 +19,6 @@ from regrasp.app.scenario.shapes import (
 )
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cell import Box, KnownCell
-from regrasp.interfaces.fault import JOINT_NAMES
 from regrasp.interfaces.quote import cut
 
 
@@ -78,26 +77,25 @@ def reaches(document: Document, part: Part, depth: float, name: str) -> Finding:
 
 
 def _joints(document: Document, known: KnownCell) -> Iterator[Finding]:
-    from regrasp.motion.robots.kinematics import LOWER, UPPER  # late: it brings the compiler
-
     for i, arm in enumerate(known.arms):
-        for j, (angle, low, high) in enumerate(zip(arm.sleep, LOWER, UPPER, strict=True)):
+        chain = arm.robot.chain
+        for j, (angle, low, high) in enumerate(zip(arm.sleep, chain.lower, chain.upper, strict=True)):
             if not low <= angle <= high:
-                told = f"{angle:g} rad is past the limits of the {arm.name} arm's {JOINT_NAMES[j]}; "
+                unit = "m" if chain.slides[j] else "rad"
+                told = f"{angle:g} {unit} is past the limits of the {arm.name} arm's {chain.names[j]}; "
                 inside = f"write one from {np.ceil(100 * low) / 100:.2f} to {np.floor(100 * high) / 100:.2f}"
                 yield Finding(*document.place(("known", "arms", i, "sleep", j)), told + inside)
 
 
 def _between_the_arms(known: KnownCell) -> float:
     """How deep (m) the arms asleep reach into each other, by the spheres that fill their moving links."""
-    from regrasp.motion.robots.spheres import SPHERE_LINKS, SPHERES  # late: they bring the compiler
-
-    moving = SPHERE_LINKS > 0
-    radii = SPHERES[moving, 3]
-    bodies = [sleeping_arm_cubes(arm)[0][moving] for arm in known.arms]
+    bodies = []
+    for arm in known.arms:
+        moving = arm.robot.body.links > 0
+        bodies.append((sleeping_arm_cubes(arm)[0][moving], arm.robot.body.spheres[moving, 3]))
     deepest = [
-        float((radii[:, None] + radii[None] - np.linalg.norm(a[:, None] - b[None], axis=2)).max())
-        for a, b in combinations(bodies, 2)
+        float((r[:, None] + s[None] - np.linalg.norm(a[:, None] - b[None], axis=2)).max())
+        for (a, r), (b, s) in combinations(bodies, 2)
     ]
     return max(deepest, default=0.0)
 

@@ -83,6 +83,12 @@ def _devices(document: Document, cell: Cell | None) -> Iterator[Finding]:
             if isinstance(name, str) and name not in names:
                 right = nearest(name, names) if names else "this cell has none"
                 yield Finding(*document.place(("faults", i, key)), f"no {key} {quoted(name)}; {right}")
+        arm, joint = given.get("arm"), given.get("joint")
+        if isinstance(joint, str) and arm in known["arm"]:
+            joints = cell.known.arm(str(arm)).robot.joint_names
+            if joint not in joints:
+                message = f"the {arm} arm has no joint {quoted(joint)}; {nearest(joint, joints)}"
+                yield Finding(*document.place(("faults", i, "joint")), message)
 
 
 def _nodes(document: Document, tree: Path | None, task: "Task | None") -> Iterator[Finding]:

@@ -5,15 +5,11 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from scipy.spatial.transform import RigidTransform, Rotation
+from scipy.spatial.transform import Rotation
 
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cell import ArmSpec, FixedMount, KnownCell
 from regrasp.interfaces.fields import Size, Vector
-
-# The ViperX 300 S's base, rtb-data's mesh VXSA-300-M-1-Base: centre from the arm's base, and full size, metres.
-_BASE_CENTER = np.array([-0.0475, 0.0, 0.0394])
-_BASE_SIZE = (0.300, 0.204, 0.0787)
 
 
 @dataclass(frozen=True)
@@ -81,7 +77,8 @@ def half_edges(turn: FloatArray, size: Size) -> FloatArray:
 
 def arm_base(arm: ArmSpec) -> tuple[str, FloatArray, FloatArray]:
     """Name, centre (3,) and half edges (3, 3), m, of an arm's base."""
-    return f"the {arm.name} arm's base", np.array(arm.base) + _BASE_CENTER, half_edges(np.eye(3), _BASE_SIZE)
+    base, box = arm.world_from_base, arm.robot.footprint
+    return f"the {arm.name} arm's base", base.apply(box.center), half_edges(base.rotation.as_matrix(), box.size)
 
 
 def fixed_cameras(cell: KnownCell) -> list[tuple[str, FloatArray]]:
@@ -93,8 +90,8 @@ def fixed_cameras(cell: KnownCell) -> list[tuple[str, FloatArray]]:
 def sleeping_arm_cubes(arm: ArmSpec) -> tuple[FloatArray, FloatArray]:
     """Centres (n, 3) and half edges (n,), m, of the cubes inside the spheres that fill an arm in its sleep pose."""
     from regrasp.motion.robots.kinematics import ArmKinematics  # late: it brings the compiler
-    from regrasp.motion.robots.spheres import SPHERE_LINKS, SPHERES
 
-    frames = ArmKinematics(RigidTransform.from_translation(arm.base)).link_frames(np.array(arm.sleep))[SPHERE_LINKS]
-    centers = np.einsum("nij,nj->ni", frames[:, :3, :3], SPHERES[:, :3]) + frames[:, :3, 3]
-    return centers, SPHERES[:, 3] / np.sqrt(3)
+    body = arm.robot.body
+    frames = ArmKinematics(arm.robot, arm.world_from_base).link_frames(np.array(arm.sleep))[body.links]
+    centers = np.einsum("nij,nj->ni", frames[:, :3, :3], body.spheres[:, :3]) + frames[:, :3, 3]
+    return centers, body.spheres[:, 3] / np.sqrt(3)

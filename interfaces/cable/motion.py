@@ -23,7 +23,7 @@ class Viewpoint:
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """A place to look from that can be reached: free joints (n, 6) rad of the arm that carries the camera."""
+    """A place to look from that can be reached: free joints (k, n) of the arm that carries the camera."""
 
     world_from_camera: "RigidTransform"
     joints: FloatArray

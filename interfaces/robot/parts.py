@@ -4,7 +4,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from regrasp.interfaces.fields import Color, Force, Friction, JointAngle, Length, Model, Number, Size, Vector
+from regrasp.interfaces.fields import Force, Friction, JointAngle, Length, Model, Number, Size, Vector
 
 LinkName = Annotated[str, Field(min_length=1, max_length=80)]
 Sphere = tuple[Number, Number, Number, Annotated[float, Field(gt=0, le=2)]]  # centre and radius, m
@@ -18,8 +18,8 @@ class Source(Model):
 
     path: str
     package: str | None = None
-    arguments: dict[str, str] = {}  # of the xacro file
-    ros_packages: dict[str, str] = {}
+    arguments: dict[str, str] = Field(default_factory=dict)  # of the xacro file
+    ros_packages: dict[str, str] = Field(default_factory=dict)
 
 
 class Placed(Model):
@@ -148,10 +148,3 @@ class Footprint(Model):
 
     center: Vector
     size: Size
-
-
-class Paint(Model):
-    """Colours in place of the URDF's."""
-
-    links: Color
-    pads: Color = (0.12, 0.12, 0.12)

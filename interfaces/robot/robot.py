@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from regrasp.interfaces.arrays import FloatArray, Mask
-from regrasp.interfaces.fields import JointAngle, Model
+from regrasp.interfaces.fields import Color, JointAngle, Model
 from regrasp.interfaces.quote import nearest, quoted
 from regrasp.interfaces.robot import urdf
 from regrasp.interfaces.robot.parts import (
@@ -23,7 +23,6 @@ from regrasp.interfaces.robot.parts import (
     Joint,
     LinkageGripper,
     LinkName,
-    Paint,
     Placed,
     Rail,
     Source,
@@ -88,7 +87,7 @@ class Robot(Model):
     # Pairs of links that can meet; links not named together are kept apart by the joints' limits.
     self_collision: tuple[tuple[LinkName, LinkName], ...]
     still: tuple[LinkName, ...] = ()  # links that turn on the spot, which nothing around can meet
-    paint: Paint | None = None
+    paint: Color | None = None  # in place of the URDF's colours and textures
     draw: Annotated[str, Field(pattern="^(visual|collision)$")] = "visual"  # which of the URDF's meshes are drawn
     braking: Annotated[float, Field(gt=0, le=1000)] | None = None  # rad/s2 or m/s2; None: the joints' acceleration
     folder: str = ""
@@ -147,7 +146,8 @@ class Robot(Model):
         """
         joints = self._joints_to_tool()
         zero = np.array([self._root_frame() @ self.tree.frame(joint.child) for joint in joints])
-        origins = np.round(np.diff(zero[:, :3, 3], axis=0, prepend=np.zeros((1, 3))), DECIMALS) + 0.0
+        steps = np.diff(zero[:, :3, 3], axis=0, prepend=np.zeros((1, 3)))
+        origins: FloatArray = np.asarray(np.round(steps, DECIMALS) + 0.0, float)
         axes = np.array([pose[:3, :3] @ joint.axis for pose, joint in zip(zero, joints, strict=True)])
         slides = np.array([joint.kind == "prismatic" for joint in joints])
         last_from_tool = self._in_body(self.tool)[1]
@@ -169,9 +169,17 @@ class Robot(Model):
     @cached_property
     def mounted(self) -> tuple[int, FloatArray]:
         """The chain's link that carries a camera, and link_from_mount (4, 4). Raises RobotError without a mount."""
+        return self._in_body(self.camera_mount)
+
+    @property
+    def camera_mount(self) -> Placed:
+        """`mount`. Raises RobotError if there is none."""
         if self.mount is None:
             raise RobotError(("mount",), f"the robot {self.title} has no mount for a camera; give it one")
-        return self._in_body(self.mount)
+        return self.mount
+
+    def __hash__(self) -> int:
+        return hash((self.title, self.urdf.path, self.joint_names, self.folder))
 
     @cached_property
     def body(self) -> "Body":
@@ -231,12 +239,12 @@ class Robot(Model):
                 raise RobotError(path, f"the URDF has no joint {quoted(joint.in_urdf)}; {right}")
         for key, link in (("tool", self.tool.link), ("base_link", self.base_link)):
             if link not in tree.links:
-                path = (key, "link") if key == "tool" else (key,)
-                raise RobotError(path, f"the URDF has no link {quoted(link)}; {nearest(link, tree.links)}")
+                here: tuple[str, ...] = (key, "link") if key == "tool" else (key,)
+                raise RobotError(here, f"the URDF has no link {quoted(link)}; {nearest(link, tree.links)}")
         way = [joint for joint in tree.way_to(self.tool.link) if joint.kind != "fixed"]
         if [joint.name for joint in way] != [*self.urdf_joints]:
-            there, here = ", ".join(joint.name for joint in way) or "none", ", ".join(self.urdf_joints)
-            raise RobotError(("joints",), f"the joints that move the tool are {there}, in this order, not {here}")
+            there, given = ", ".join(joint.name for joint in way) or "none", ", ".join(self.urdf_joints)
+            raise RobotError(("joints",), f"the joints that move the tool are {there}, in this order, not {given}")
         return way
 
     def _limits(self, joints: list[UrdfJoint]) -> FloatArray:
@@ -308,19 +316,24 @@ def _pad_gap(
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """A robot's spheres: their chain links (n,), and centre and radius (n, 4), m, there, with the jaw fully open."""
+    """A robot's spheres: their chain links (n,), and centre and radius (n, 4), m, there, with the jaw fully open.
+
+    `parts` (n,) number the links of the URDF that they are on.
+    """
 
     links: NDArray[np.int64]
+    parts: NDArray[np.int64]
     spheres: FloatArray
     fingers: FloatArray  # (n, 3) unit vectors along which spheres move as the jaw opens; 0 for those that do not
-    pairs: frozenset[tuple[int, int]]  # rows of spheres that can meet
+    pairs: NDArray[np.int64]  # (m, 2) rows of spheres that can meet
     first_moving: int  # the first chain link that something around can meet
     robot: Robot
 
     @classmethod
     def of(cls, robot: Robot) -> "Body":
         """Raises RobotError: a link of the spheres or of the pairs is not in the URDF."""
-        links, spheres, fingers, rows = [], [], [], {}
+        links: list[int] = []
+        spheres, fingers, rows = [], [], {}
         open_jaw, ways = robot.gripper_positions(robot.gripper.opening), _finger_ways(robot)
         for name, group in robot.spheres.items():
             index, pose = _found(robot, name, ("spheres", name), open_jaw)
@@ -335,13 +348,14 @@ class Body:
                 if name not in rows:
                     message = f"{quoted(name)} has no spheres; {nearest(name, list(rows))}"
                     raise RobotError(("self_collision", n, side), message)
-        pairs = frozenset((i, j) for a, b in robot.self_collision for i in rows[a] for j in rows[b])
+        pairs = [(i, j) for a, b in robot.self_collision for i in rows[a] for j in rows[b]]
         still = {_found(robot, name, ("still", n), open_jaw)[0] for n, name in enumerate(robot.still)}
         return cls(
             np.array(links, np.int64),
+            np.repeat(np.arange(len(rows)), [len(group) for group in rows.values()]),
             np.array(spheres, float).reshape(-1, 4),
             np.array(fingers, float).reshape(-1, 3),
-            pairs,
+            np.array(pairs, np.int64).reshape(-1, 2),
             max(still, default=-1) + 1,
             robot,
         )
@@ -395,7 +409,7 @@ def _at(key: str, source: Source, folder: str) -> ET.Element:
     try:
         return urdf.read_urdf(source, Path(folder))
     except RobotError as error:
-        inside = (key,) if key == "urdf" else (key, "urdf")
+        inside: tuple[str, ...] = ("urdf",) if key == "urdf" else (key, "urdf")
         raise RobotError((*inside, *error.path), str(error)) from None
 
 
@@ -403,7 +417,7 @@ def _add_rail(root: ET.Element, rail: Rail, base: str) -> None:
     """The beam as the new root, and a carriage on it that carries the base."""
     beam, carriage = (ET.SubElement(root, "link", name=name) for name in (BEAM, CARRIAGE))
     along = "xyz".index(rail.axis)
-    size, middle = list((*rail.beam[:1], *rail.beam[:1], rail.beam[1])), [0.0, 0.0, 0.0]
+    size, middle = [rail.beam[0], rail.beam[0], rail.beam[1]], [0.0, 0.0, 0.0]
     size[along] = rail.upper - rail.lower + rail.carriage[along]
     middle[along] = 0.5 * (rail.lower + rail.upper)
     middle[2] = -rail.below - 0.5 * (rail.carriage[2] + rail.beam[1])
@@ -412,14 +426,8 @@ def _add_rail(root: ET.Element, rail: Rail, base: str) -> None:
     urdf.add_inertia(carriage, _CARRIAGE_MASS, _CARRIAGE_INERTIA)
     joint = urdf.add_joint(root, rail.name, "prismatic", BEAM, CARRIAGE)
     ET.SubElement(joint, "axis", xyz=" ".join("1" if axis == along else "0" for axis in range(3)))
-    ET.SubElement(
-        joint,
-        "limit",
-        lower=repr(rail.lower),
-        upper=repr(rail.upper),
-        velocity=repr(rail.speed),
-        effort=repr(rail.force),
-    )
+    limits = {"lower": rail.lower, "upper": rail.upper, "velocity": rail.speed, "effort": rail.force}
+    ET.SubElement(joint, "limit", {key: repr(value) for key, value in limits.items()})
     urdf.add_joint(root, "rail_base", "fixed", CARRIAGE, base)
 
 

@@ -16,6 +16,7 @@ from regrasp.motion.cable.viewing import ViewingParameters, approached, outline,
 from regrasp.motion.cable.viewpoints import closer_views, spiral
 from regrasp.motion.failure import PlanningError
 from regrasp.motion.request import MotionRequest
+from regrasp.motion.robots.views import ik_view
 from regrasp.motion.scene.collision import CollisionModel
 from regrasp.motion.service import Motion, MotionParameters
 
@@ -93,5 +94,5 @@ class SearchMotion(Motion):
     def _view_goals(self, world_from_camera: RigidTransform, model: CollisionModel) -> FloatArray:
         """Joints (n, 6) rad of the search arm that bring its camera there and are free in its `model`."""
         mount, margin = self.known.search_mount, self.parameters.viewing.margin
-        views = self.kinematics[self.search_arm].ik_view(world_from_camera, mount.wrist_from_camera)
-        return np.array([q for q in views if model.free(q, margin)]).reshape(-1, 6)
+        views = ik_view(self.kinematics[self.search_arm], world_from_camera, mount.mount_from_camera)
+        return np.array([q for q in views if model.free(q, margin)]).reshape(-1, len(self.kinematics[self.search_arm]))

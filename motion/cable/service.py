@@ -24,7 +24,6 @@ from regrasp.motion.failure import PlanningError
 from regrasp.motion.grasping.approach import pick_candidates
 from regrasp.motion.grasping.gap_test import GripWatch
 from regrasp.motion.request import MotionRequest
-from regrasp.motion.robots.spheres import JAW_OPENING
 from regrasp.motion.scene.collision import CollisionModel
 from regrasp.motion.scene.planning_scene import NO_POINTS
 from regrasp.motion.service import PointCloudSource
@@ -80,8 +79,9 @@ class CableMotion(SearchMotion):
         """
         cable = self.known.cable
         plugged = cable.socket(cable.plugged_into).world_from_plug(cable.connector.length)
-        candidates = pick_candidates(plugged, cable.connector, 0.0, self.parameters.pick)
         for arm in self.arms:
+            widest = self.known.arm(arm).robot.gripper.opening
+            candidates = pick_candidates(plugged, cable.connector, 0.0, widest, self.parameters.pick)
             with suppress(PlanningError):
                 self._approaches(arm, self.model(arm), candidates, cable.clip.bracket)
 
@@ -155,12 +155,12 @@ class CableMotion(SearchMotion):
             clearances, carry = self.parameters.clearances, self.parameters.carry
             candidates = carry_paths(self.known, kin, q, goals, held, carry)
             paths = (path for path in candidates if can_continue(kin, path[-1], onward, carry.step))
-            wide = self.model(arm, held=spheres, opening=JAW_OPENING)
+            wide = self.model(arm, held=spheres, opening=self.known.arm(arm).robot.gripper.opening)
             path = first_free((wide, model), clearances.near_margins, paths)
             if path is None:
                 solutions = [end for goal in goals for end in kin.ik(goal)]
                 ends = [end for end in solutions if can_continue(kin, end, onward, carry.step)]
-                path = self._plan(model, q, np.array(ends).reshape(-1, 6))
+                path = self._plan(model, q, np.array(ends).reshape(-1, len(kin)))
             yield from self.execution.follow(arm, path, speed)
 
         return self.execution.request(arm, steps())

@@ -50,14 +50,15 @@ def pick_candidates(
     world_from_cylinder: RigidTransform,
     cylinder: Cylinder,
     shallow: float,
+    opening: float,
     parameters: PickParameters = PickParameters(),
 ) -> list[Grasp]:
-    """Grasps at every grip offset, cheapest first within each; see `grasp_candidates` for `shallow` m."""
+    """Grasps at every grip offset, cheapest first within each; see `grasp_candidates` for `shallow` and `opening` m."""
     return [
         grasp
         for offset in parameters.grip_offsets
         for grasp in grasp_candidates(
-            world_from_cylinder, cylinder.length, cylinder.radius, offset, shallow, parameters.grasp
+            world_from_cylinder, cylinder.length, cylinder.radius, offset, shallow, parameters.grasp, opening
         )
     ]
 
@@ -70,7 +71,7 @@ def find_approaches(
     clearances: Clearances,
     parameters: PickParameters = PickParameters(),
 ) -> list[FloatArray]:
-    """Joint paths (k, 6) rad from standoff to grasp of the first candidates that work, about `max_approaches`.
+    """Joint paths (k, n) from standoff to grasp of the first candidates that work, about `max_approaches`.
 
     All keep the greatest of the near margins with which any candidate works. `model` and `near` as in `choose_grasp`.
     Raises PlanningError with a tally when no candidate works with any margin.

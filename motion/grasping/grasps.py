@@ -14,7 +14,6 @@ from regrasp.motion.failure import PlanningError
 from regrasp.motion.planning.straight import straight_lines
 from regrasp.motion.robots.kinematics import ArmKinematics
 from regrasp.motion.robots.poses import multiply, rotation_matrix
-from regrasp.motion.robots.spheres import JAW_OPENING
 from regrasp.motion.scene.collision import CollisionModel
 
 _OUT_OF_REACH = "out of reach"
@@ -58,7 +57,7 @@ class Grasp:
 
 @dataclass(frozen=True, eq=False)
 class GraspChoice:
-    """A grasp and the joint paths (k, 6) rad straight in from its standoff.
+    """A grasp and the joint paths (k, n) straight in from its standoff.
 
     There is one path for each branch of the inverse kinematics that works, the nearest to the arm first.
     """
@@ -74,17 +73,19 @@ def grasp_candidates(
     grip_offset: float = -0.02,
     shallow: float = 0.0,
     parameters: GraspParameters = GraspParameters(),
+    opening: float = np.inf,
 ) -> list[Grasp]:
     """Grasps of a connector of `length` and `radius` metres (frame at its centre, x from cable to tip), cheapest first.
 
     The fingers close across the axis, `grip_offset` metres along it from the centre; negative is towards the cable,
     where the tip stays in sight. A yaw (rad) tilts the approach from square to the axis, positive with the palm on the
     cable's side. A roll (rad) turns it about the axis; 0 comes from the arms (along world x as far as the axis lets
-    it). The connector lies `shallow` metres nearer to the finger tips than the tool's centre does.
+    it). The connector lies `shallow` metres nearer to the finger tips than the tool's centre does. The jaws open by
+    `opening` metres at most.
 
     Raises ValueError if the grip lies off the connector, it does not fit the jaws, or a yaw exceeds `max_yaw`.
     """
-    _check_fit(length, radius, grip_offset, parameters)
+    _check_fit(length, radius, grip_offset, parameters, opening)
     axis = world_from_connector.rotation.apply([1.0, 0.0, 0.0])
     centre = world_from_connector.translation + grip_offset * axis
     forward = _perpendicular(axis)
@@ -104,11 +105,11 @@ def grasp_candidates(
     return [Grasp(flat[i], float(costs[i])) for i in np.argsort(costs, kind="stable")]
 
 
-def _check_fit(length: float, radius: float, grip_offset: float, parameters: GraspParameters) -> None:
+def _check_fit(length: float, radius: float, grip_offset: float, parameters: GraspParameters, opening: float) -> None:
     if abs(grip_offset) > 0.5 * length:
         raise ValueError(f"grip {grip_offset:.3f} m from the centre is off a connector of {length:.3f} m")
-    if 2 * radius > JAW_OPENING:
-        raise ValueError(f"a connector {2 * radius:.3f} m thick does not fit jaws that open {JAW_OPENING:.3f} m")
+    if 2 * radius > opening:
+        raise ValueError(f"a connector {2 * radius:.3f} m thick does not fit jaws that open {opening:.3f} m")
     if max(abs(yaw) for yaw in parameters.yaws) > parameters.max_yaw + 1e-9:
         limit, asked = np.rad2deg(parameters.max_yaw), np.rad2deg(parameters.yaws).round(1).tolist()
         raise ValueError(f"yaws go to {limit:.0f} degrees, asked for {asked}")
@@ -125,7 +126,7 @@ def choose_grasp(
     """The first of the candidates that works: plan to one of its standoffs, then follow the path that begins there.
 
     `model` must be free at the standoff, and `near` (without the target's own surface; default: `model`) on the
-    straight path in. `q_now` (6,) rad orders the branches. Raises PlanningError with a tally of what was wrong with the
+    straight path in. `q_now` (n,) orders the branches. Raises PlanningError with a tally of what was wrong with the
     candidates: OUT_OF_REACH when all were, else NO_COLLISION_FREE_GOAL.
     """
     ways = WaysIn(kin, parameters.standoff)
@@ -144,13 +145,13 @@ class WaysIn:
         self._paths: dict[tuple[Grasp, int], FloatArray | None] = {}
 
     def joints(self, grasp: Grasp) -> FloatArray:
-        """The joints (n, 6) rad at the grasp, one row for each branch of the inverse kinematics."""
+        """The joints (m, n) at the grasp, one row for each branch of the inverse kinematics."""
         if grasp not in self._joints:
             self._joints[grasp] = self._kin.ik(grasp.pose)
         return self._joints[grasp]
 
     def path(self, grasp: Grasp, branch: int) -> FloatArray | None:
-        """The path (k, 6) rad straight in to row `branch` of `joints`, None if there is none."""
+        """The path (k, n) straight in to row `branch` of `joints`, None if there is none."""
         if (grasp, branch) not in self._paths:
             back = np.eye(4)
             back[0, 3] = -self._standoff
@@ -160,7 +161,7 @@ class WaysIn:
 
 
 class Trouble(NamedTuple):
-    """What is wrong with a candidate: a phrase with a place for what stands at `q` (6,) rad too near in `model`."""
+    """What is wrong with a candidate: a phrase with a place for what stands at `q` (n,) too near in `model`."""
 
     phrase: str
     model: CollisionModel | None = None

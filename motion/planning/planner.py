@@ -13,13 +13,9 @@ import ompl.util as ou
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cause import CauseCode
 from regrasp.motion.failure import PlanningError
-from regrasp.motion.robots.kinematics import LOWER, UPPER
 from regrasp.motion.scene.collision import CollisionModel
 
 ou.setLogLevel(ou.LOG_NONE)
-
-# Metres that the arm's far end moves per radian of each joint, about: distances in joint space count big joints more.
-WEIGHTS = np.array([0.75, 0.75, 0.5, 0.25, 0.25, 0.12])
 
 
 @dataclass(frozen=True)
@@ -45,7 +41,7 @@ def plan(
     margin: float = 0.01,
     parameters: PlannerParameters = PlannerParameters(),
 ) -> FloatArray:
-    """Joint path (k, 6) rad from `start` (6,) to one of `goals` (n, 6), `margin` metres from everything.
+    """Joint path (k, n) from `start` (n,) to one of `goals` (m, n), `margin` metres from everything.
 
     A start that is nearer than `margin` but does not touch (after a grasp beside a panel) is first led away: the path
     begins with small steps along which the clearance only grows.
@@ -53,7 +49,7 @@ def plan(
     Raises PlanningError: MOTION_BLOCKED if the start touches something, OUT_OF_REACH without goals,
     NO_COLLISION_FREE_GOAL if no goal keeps the margin, PLANNING_FAILED if no path was found.
     """
-    start, goals = np.asarray(start, float), np.asarray(goals, float).reshape(-1, 6)
+    start, goals = np.asarray(start, float), np.asarray(goals, float).reshape(-1, len(start))
     escape = _escape(model, start, margin, np.random.default_rng(seed), parameters)
     free_goals = _free_goals(model, goals, margin)
     for goal in free_goals:
@@ -80,7 +76,7 @@ class _Budget:
 
 
 class _EdgeCheck(ob.MotionValidator):
-    """Straight joint motions checked in one call, and counted. States are joints times `WEIGHTS`."""
+    """Straight joint motions checked in one call, and counted. States are joints times their levers."""
 
     def __init__(self, space: ob.SpaceInformation, model: CollisionModel, margin: float, budget: _Budget) -> None:
         super().__init__(space)
@@ -88,24 +84,30 @@ class _EdgeCheck(ob.MotionValidator):
 
     def checkMotion(self, a: ob.State, b: ob.State) -> bool:  # noqa: N802 (OMPL's name)
         """Whether the motion between two states is free."""
-        qa, qb = _joints(a), _joints(b)
+        levers = self._model.kinematics.chain.levers
+        qa, qb = _joints(a, levers), _joints(b, levers)
         self._budget.left -= 1 + int(np.abs(qb - qa).max() / self._model.coarse_step)
         return self._model.edge_free(qa, qb, self._margin)
 
 
-def _joints(state: ob.State) -> FloatArray:
-    return np.array(state[0:6]) / WEIGHTS  # iterating over a state crashes the process (OMPL 2.0.1)
+def _joints(state: ob.State, levers: FloatArray) -> FloatArray:
+    return np.array(state[0 : len(levers)]) / levers  # iterating over a state crashes the process (OMPL 2.0.1)
 
 
 def _search(
     model: CollisionModel, start: FloatArray, goals: FloatArray, seed: int, budget: _Budget, margin: float
 ) -> FloatArray:
-    """Waypoints (k, 6) by RRTConnect (Kuffner and LaValle 2000); PlanningError when the budget runs out."""
-    space = ob.RealVectorStateSpace(6)
-    bounds = ob.RealVectorBounds(6)
-    for i in range(6):
-        bounds.setLow(i, float(LOWER[i] * WEIGHTS[i]))
-        bounds.setHigh(i, float(UPPER[i] * WEIGHTS[i]))
+    """Waypoints (k, n) by RRTConnect (Kuffner and LaValle 2000); PlanningError when the budget runs out.
+
+    Distances between states are those of the joints, each times its lever: big joints count more.
+    """
+    kin = model.kinematics
+    levers, count = kin.chain.levers, len(kin)
+    space = ob.RealVectorStateSpace(count)
+    bounds = ob.RealVectorBounds(count)
+    for i in range(count):
+        bounds.setLow(i, float(kin.lower[i] * levers[i]))
+        bounds.setHigh(i, float(kin.upper[i] * levers[i]))
     space.setBounds(bounds)
     ou.RNG.setSeed(seed + 1)  # OMPL takes no 0
     setup = og.SimpleSetup(space)
@@ -113,18 +115,18 @@ def _search(
 
     def valid(state: ob.State) -> bool:
         budget.left -= 1
-        return model.free(_joints(state), margin)
+        return model.free(_joints(state, levers), margin)
 
     check = _EdgeCheck(information, model, margin, budget)
     setup.setStateValidityChecker(valid)
     information.setMotionValidator(check)
     first = space.allocState()
-    first[0:6] = (start * WEIGHTS).tolist()
+    first[0:count] = (start * levers).tolist()
     setup.addStartState(first)
     targets = ob.GoalStates(information)
     for goal in goals:
         target = space.allocState()
-        target[0:6] = (goal * WEIGHTS).tolist()
+        target[0:count] = (goal * levers).tolist()
         targets.addState(target)
     setup.setGoal(targets)
     setup.setPlanner(og.RRTConnect(information))
@@ -134,9 +136,9 @@ def _search(
             CauseCode.PLANNING_FAILED,
             f"no path to {len(goals)} goals at {margin * 1e3:.0f} mm margin in {budget.limit} checked configurations",
         )
-    path = np.array([_joints(state) for state in setup.getSolutionPath().getStates()])
+    path = np.array([_joints(state, levers) for state in setup.getSolutionPath().getStates()])
     path[0] = start
-    path[-1] = goals[np.argmin(np.abs(goals - path[-1]).max(axis=1))]  # as given, without the rounding of the weights
+    path[-1] = goals[np.argmin(np.abs(goals - path[-1]).max(axis=1))]  # as given, without the rounding of the levers
     return path
 
 
@@ -157,7 +159,7 @@ def _free_goals(model: CollisionModel, goals: FloatArray, margin: float) -> Floa
 def _escape(
     model: CollisionModel, start: FloatArray, margin: float, rng: np.random.Generator, parameters: PlannerParameters
 ) -> FloatArray:
-    """Small steps (k, 6) from the start to where the margin is kept, each with more clearance than the one before."""
+    """Small steps (k, n) from the start to where the margin is kept, each with more clearance than the one before."""
     q = start
     steps = [q]
     clearance, what = model.nearest(q)
@@ -165,8 +167,8 @@ def _escape(
         message = f"the arm touches {what}, {-clearance * 1e3:.0f} mm deep"
         raise PlanningError(CauseCode.MOTION_BLOCKED, message)
     while not model.free(q, margin):
-        directions = _directions(rng, parameters.escape_directions)
-        candidates = np.clip(q + directions * parameters.escape_step, LOWER, UPPER)
+        directions = _directions(rng, parameters.escape_directions, len(q))
+        candidates = np.clip(q + directions * parameters.escape_step, model.kinematics.lower, model.kinematics.upper)
         best = max(candidates, key=model.clearance)
         if model.clearance(best) <= clearance or len(steps) > parameters.escape_steps:
             message = f"no way out to {margin * 1e3:.0f} mm clearance from {what}, {clearance * 1e3:.0f} mm away"
@@ -176,11 +178,11 @@ def _escape(
     return np.array(steps)
 
 
-def _directions(rng: np.random.Generator, count: int) -> FloatArray:
-    """Joint directions (12 + count, 6), largest entry 1: each joint both ways, and `count` random mixtures."""
-    mixed = rng.normal(size=(count, 6))
+def _directions(rng: np.random.Generator, count: int, joints: int) -> FloatArray:
+    """Directions (2 joints + count, joints), largest entry 1: each joint both ways, and `count` random mixtures."""
+    mixed = rng.normal(size=(count, joints))
     mixed /= np.abs(mixed).max(axis=1, keepdims=True)
-    return np.vstack([np.eye(6), -np.eye(6), mixed])
+    return np.vstack([np.eye(joints), -np.eye(joints), mixed])
 
 
 def _shortened(

@@ -21,7 +21,7 @@ def straight_line(
     turn_step: float = 0.05,
     max_joint_step: float = 0.3,
 ) -> FloatArray:
-    """Joint path (k, 6) rad from `q0` (6,) that moves the tool in a straight line to `goal` (world_from_tool).
+    """Joint path (k, n) from `q0` (n,) that moves the tool in a straight line to `goal` (world_from_tool).
 
     The goal may be a matrix (4, 4). Waypoints lie at most `step` metres and `turn_step` rad of rotation apart; the
     rotation turns evenly (slerp). More than `max_joint_step` rad of one joint between two waypoints would be a change
@@ -37,7 +37,7 @@ def straight_line(
 def straight_lines(
     kin: ArmKinematics, q: FloatArray, poses: Iterable[FloatArray], step: float = 0.005
 ) -> FloatArray | None:
-    """Joint path (k, 6) rad from `q` (6,) in straight lines through poses (4, 4) of the tool; None where it stops."""
+    """Joint path (k, n) from `q` (n,) in straight lines through poses (4, 4) of the tool; None where it stops."""
     path = [q[None]]
     for pose in poses:
         found = _follow_line(kin, path[-1][-1], pose, step)
@@ -73,10 +73,10 @@ def _follow_line(
     """`straight_line` without an exception."""
     start = kin.tool_matrix(q0)
     poses = poses_between(start, goal, step, turn_step)
-    path = np.empty((len(poses) + 1, 6))
+    path = np.empty((len(poses) + 1, len(q0)))
     path[0] = q0
     for n, pose in enumerate(poses):
-        branches = kin.ik(pose)
+        branches = kin.ik(pose, path[n])
         change = np.abs(branches - path[n]).max(axis=1, initial=0.0)
         nearest = change.argmin() if len(change) else None
         if nearest is None or change[nearest] > max_joint_step:

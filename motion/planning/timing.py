@@ -9,7 +9,6 @@ from scipy.interpolate import BPoly
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.trajectory import Trajectory
 from regrasp.motion.planning.toppra_solver import time_optimal
-from regrasp.motion.robots.kinematics import ACCELERATION_LIMIT, VELOCITY_LIMIT
 
 
 @dataclass(frozen=True)
@@ -22,14 +21,23 @@ class TimingParameters:
     limit_share: float = 0.85  # of the limits; toppra overshoots accelerations between its grid points
     grid_step: float = 0.02  # rad of path between two grid points at most
 
-    @property
-    def velocity_limit(self) -> FloatArray:
-        """The joints' velocities (6,) rad/s from which they brake within `stop_time`."""
-        return np.asarray(np.minimum(VELOCITY_LIMIT, ACCELERATION_LIMIT * self.stop_time))
+
+@dataclass(frozen=True, eq=False)
+class JointLimits:
+    """The joints' speeds (n,) rad/s and accelerations (n,) rad/s2, of a rail m/s and m/s2."""
+
+    speeds: FloatArray
+    accelerations: FloatArray
+
+    def braking_within(self, seconds: float) -> FloatArray:
+        """The speeds (n,) from which the joints brake in that time."""
+        return np.asarray(np.minimum(self.speeds, self.accelerations * seconds))
 
 
-def time_path(path: FloatArray, speed: float = 1.0, parameters: TimingParameters = TimingParameters()) -> Trajectory:
-    r"""Trajectory along the joint path (k, 6) rad, at rest at both ends; it cuts corners by at most `corner` / 2 rad.
+def time_path(
+    path: FloatArray, limits: JointLimits, speed: float = 1.0, parameters: TimingParameters = TimingParameters()
+) -> Trajectory:
+    r"""Trajectory along the joint path (k, n), at rest at both ends; it cuts corners by at most `corner` / 2 rad.
 
     `speed` in (0, 1] slows the whole motion down in proportion. Raises RuntimeError where no timing is found.
 
@@ -37,13 +45,14 @@ def time_path(path: FloatArray, speed: float = 1.0, parameters: TimingParameters
 
     .. math:: |q'(s) \dot s| \le v_{max}, \quad |q'(s) \ddot s + q''(s) \dot s^2| \le a_{max}
     """
-    path = np.asarray(path, float).reshape(-1, 6)
+    path = np.asarray(path, float).reshape(-1, len(limits.speeds))
+    fastest = limits.braking_within(parameters.stop_time)
     path = path[np.append(True, np.abs(np.diff(path, axis=0)).max(axis=1) > 1e-9)]
     if len(path) == 1:
-        return Trajectory(np.zeros(1), path.copy(), np.zeros((1, 6)))
+        return Trajectory(np.zeros(1), path.copy(), np.zeros(path.shape))
     curve = _blended(path, parameters.corner)
-    velocity = parameters.limit_share * parameters.velocity_limit
-    acceleration = parameters.limit_share * ACCELERATION_LIMIT
+    velocity = parameters.limit_share * fastest
+    acceleration = parameters.limit_share * limits.accelerations
     timed = time_optimal(curve, _grid(curve.x, parameters.grid_step), velocity, acceleration)
     if timed is None:
         raise RuntimeError(f"toppra found no timing for a path of {len(path)} waypoints")
@@ -51,7 +60,7 @@ def time_path(path: FloatArray, speed: float = 1.0, parameters: TimingParameters
     t = np.linspace(0.0, float(timed.duration), count)
     positions, velocities = timed(t), timed(t, 1)
     velocities[[0, -1]] = 0.0
-    stretch = max(1.0, _overshoot(t, positions, velocities, parameters.velocity_limit)) / speed
+    stretch = max(1.0, _overshoot(t, positions, velocities, fastest, limits.accelerations)) / speed
     return Trajectory(t * stretch, positions, velocities / stretch)
 
 
@@ -86,8 +95,10 @@ def _grid(breaks: FloatArray, step: float) -> FloatArray:
     return np.append(np.concatenate(parts), breaks[-1])
 
 
-def _overshoot(t: FloatArray, positions: FloatArray, velocities: FloatArray, velocity_limit: FloatArray) -> float:
-    """Factor by which time must be stretched so that the interpolated samples keep the full limits.
+def _overshoot(
+    t: FloatArray, positions: FloatArray, velocities: FloatArray, fastest: FloatArray, hardest: FloatArray
+) -> float:
+    """Factor by which time must be stretched so that the interpolated samples keep the full limits (n,).
 
     Stretching time by f divides velocities by f and accelerations by f^2.
     """
@@ -95,5 +106,5 @@ def _overshoot(t: FloatArray, positions: FloatArray, velocities: FloatArray, vel
     slope, v0, v1 = np.diff(positions, axis=0) / h, velocities[:-1], velocities[1:]
     # A cubic's acceleration is largest at an end of its interval.
     acceleration = np.abs([6 * slope - 4 * v0 - 2 * v1, 2 * v0 + 4 * v1 - 6 * slope]) / h
-    velocity = np.abs(velocities) / velocity_limit
-    return max(float(velocity.max()), float(np.sqrt((acceleration / ACCELERATION_LIMIT).max())))
+    velocity = np.abs(velocities) / fastest
+    return max(float(velocity.max()), float(np.sqrt((acceleration / hardest).max())))

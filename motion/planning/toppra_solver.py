@@ -44,7 +44,7 @@ toppra.setup_logging("ERROR")
 def time_optimal(curve: BPoly, grid: FloatArray, velocity: FloatArray, acceleration: FloatArray) -> Any:
     """toppra's trajectory along a curve in joint space, at rest at both ends; None where it finds none.
 
-    `grid` (n,) are values of the curve's parameter; `velocity` (6,) rad/s and `acceleration` (6,) rad/s2 are limits.
+    `grid` (n,) are values of the curve's parameter; `velocity` (n,) and `acceleration` (n,) are limits.
     """
     constraints = [
         toppra.constraint.JointVelocityConstraint(np.column_stack([-velocity, velocity])),
@@ -62,6 +62,7 @@ class _Path(toppra.interpolator.AbstractGeometricPath):  # type: ignore[misc,unu
     def __init__(self, curve: BPoly) -> None:
         self._derivatives = (curve, curve.derivative(), curve.derivative(2))
         self._end = float(curve.x[-1])
+        self._joints = int(curve.c.shape[2])
 
     def __call__(self, s: FloatArray, order: int = 0) -> FloatArray:
         # just inside the end, where the second derivative still belongs to the last piece
@@ -70,7 +71,7 @@ class _Path(toppra.interpolator.AbstractGeometricPath):  # type: ignore[misc,unu
     @property
     def dof(self) -> int:
         """Number of joints."""
-        return 6
+        return self._joints
 
     @property
     def path_interval(self) -> FloatArray:

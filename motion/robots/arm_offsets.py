@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regrasp.interfaces.arrays import FloatArray
-from regrasp.motion.robots.kinematics import AXES, ArmKinematics, world_spheres
-from regrasp.motion.robots.spheres import SPHERE_LINKS, sphere_distances, spheres_at
+from regrasp.motion.robots.forward import spheres_in
+from regrasp.motion.robots.kinematics import ArmKinematics
+from regrasp.motion.robots.spheres import sphere_distances
 
 
 @dataclass(frozen=True)
@@ -29,7 +30,7 @@ class JointOffsetParameters:
     gates: tuple[float, ...] = (0.03, 0.021, 0.015, 0.010, *[0.008] * 8)
     search_distance: float = 0.06  # m from the spheres before the first iteration: only such points can pass a gate
     min_points: int = 300  # choice: a third of what shows of a hand beside a piece of foam
-    first_link: int = 4  # the forearm beyond its roll; links nearer to the shoulder err in other ways than the hand
+    last_links: int = 3  # so many links before the tool count; those nearer to the shoulder err in other ways
 
 
 def joint_offsets(
@@ -39,7 +40,7 @@ def joint_offsets(
     points: FloatArray,
     parameters: JointOffsetParameters = JointOffsetParameters(),
 ) -> FloatArray:
-    r"""What to add (6,) rad to the encoders' `q` (6,) so that the arm lies where its surface is seen.
+    r"""What to add (n,) to the encoders' `q` (n,) so that the arm lies where its surface is seen.
 
     `points` (n, 3) m in the world: what a camera sees of the arm and around it. `opening`: m between the pads. It
     returns zeros where fewer than `min_points` points lie on the arm.
@@ -49,20 +50,22 @@ def joint_offsets(
 
     .. math:: \min_\delta \sum_i r_i(q + \delta)^2 / \sigma_p^2 + |\delta|^2 / \sigma_\delta^2
     """
-    seen = parameters.first_link <= SPHERE_LINKS
-    links, local = SPHERE_LINKS[seen], spheres_at(opening)[seen]
+    body = kin.robot.body
+    seen = body.links > len(kin) - parameters.last_links
+    links, local = body.links[seen], body.at(opening)[seen]
     local[:, 3] -= parameters.surface_depth
-    points = points[sphere_distances(points, world_spheres(kin.base, q, links, local))[0] < parameters.search_distance]
-    offsets = np.zeros(6)
+    points = points[
+        sphere_distances(points, spheres_in(kin.link_frames(q), links, local))[0] < parameters.search_distance
+    ]
+    offsets = np.zeros(len(kin))
     for gate in parameters.gates:
-        spheres = world_spheres(kin.base, q + offsets, links, local)
+        frames = kin.link_frames(q + offsets)
+        spheres = spheres_in(frames, links, local)
         residuals, nearest = sphere_distances(points, spheres)
         inliers = np.abs(residuals) < gate
         if np.count_nonzero(inliers) < parameters.min_points:
-            return np.zeros(6)
-        jacobian = _jacobian(
-            kin.link_frames(q + offsets), points[inliers], spheres[nearest[inliers], :3], links[nearest[inliers]]
-        )
+            return np.zeros(len(kin))
+        jacobian = _jacobian(kin, frames, points[inliers], spheres[nearest[inliers], :3], links[nearest[inliers]])
         offsets -= _step(offsets, jacobian, residuals[inliers], parameters)
     return offsets
 
@@ -70,19 +73,24 @@ def joint_offsets(
 def _step(
     offsets: FloatArray, jacobian: FloatArray, residuals: FloatArray, parameters: JointOffsetParameters
 ) -> FloatArray:
-    """The Gauss-Newton step (6,) rad to subtract, by the normal equations."""
+    """The Gauss-Newton step (n,) rad to subtract, by the normal equations."""
     prior, noise = parameters.offset_deviation**2, parameters.point_deviation**2
-    information = np.eye(6) / prior + jacobian.T @ jacobian / noise
+    information = np.eye(len(offsets)) / prior + jacobian.T @ jacobian / noise
     return np.asarray(np.linalg.solve(information, offsets / prior + jacobian.T @ residuals / noise))
 
 
-def _jacobian(frames: FloatArray, points: FloatArray, centers: FloatArray, links: NDArray[np.int64]) -> FloatArray:
-    """Derivative (n, 6) m/rad of each point's distance to its sphere by each joint, for link frames (7, 4, 4)."""
+def _jacobian(
+    kin: ArmKinematics, frames: FloatArray, points: FloatArray, centers: FloatArray, links: NDArray[np.int64]
+) -> FloatArray:
+    """Derivative (m, n) m/rad of each point's distance to its sphere by each joint, for link frames (n + 1, 4, 4)."""
     normals = points - centers
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    jacobian = np.zeros((len(points), 6))
-    for joint, axis in enumerate(AXES):
+    jacobian = np.zeros((len(points), len(kin)))
+    for joint, axis in enumerate(kin.chain.axes):
         frame = frames[joint + 1]
-        velocities = np.cross(frame[:3, axis], points - frame[:3, 3])
-        jacobian[:, joint] = np.where(links > joint, -np.einsum("ij,ij->i", normals, velocities), 0.0)
+        along = frame[:3, :3] @ axis
+        velocities = along if kin.chain.slides[joint] else np.cross(along, points - frame[:3, 3])
+        jacobian[:, joint] = np.where(
+            links > joint, -np.einsum("ij,ij->i", normals, np.broadcast_to(velocities, normals.shape)), 0.0
+        )
     return jacobian

@@ -5,14 +5,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from regrasp.interfaces.arrays import FloatArray
-from regrasp.interfaces.fault import JOINT_NAMES
 from regrasp.interfaces.reading import JointReading
+from regrasp.interfaces.robot.robot import Chain
 from regrasp.interfaces.trajectory import Trajectory
 
 
 @dataclass(frozen=True)
 class ArmWatchParameters:
-    """Limits on encoder readings; each stands well above what is measured without a fault."""
+    """Limits on encoder readings; each stands well above what is measured without a fault.
+
+    On a rail, m take the place of rad; an arm's tool moves by about as much.
+    """
 
     tracking_error: float = 0.08  # rad off the trajectory; without a fault or a contact it is 0.004
     jump: float = 0.05  # rad between two readings beyond what the velocities allow; without a fault it is 0.002
@@ -21,10 +24,10 @@ class ArmWatchParameters:
 
 
 class ArmWatch:
-    """Watches one arm while it follows a trajectory. `name` is the arm's, for the sentences."""
+    """Watches one arm while it follows a trajectory. `name` and `chain` are the arm's, for the sentences."""
 
-    def __init__(self, name: str, parameters: ArmWatchParameters = ArmWatchParameters()) -> None:
-        self._name, self._parameters = name, parameters
+    def __init__(self, name: str, chain: Chain, parameters: ArmWatchParameters = ArmWatchParameters()) -> None:
+        self._name, self._chain, self._parameters = name, chain, parameters
         self._last: JointReading | None = None
         self._resting_at: FloatArray | None = None
 
@@ -33,7 +36,7 @@ class ArmWatch:
         self._last = None
 
     def leave(self, joints: FloatArray | None) -> None:
-        """Note that the arm rests at these joints (6,) rad; None when it is not known where it comes to rest."""
+        """Note that the arm rests at these joints (n,); None when it is not known where it comes to rest."""
         self._resting_at = joints
 
     def moved_alone(self, reading: JointReading) -> str | None:
@@ -66,12 +69,12 @@ class ArmWatch:
         worst = int(np.argmax(np.abs(error)))
         if abs(error[worst]) <= limit:
             return None
-        joint = JOINT_NAMES[worst].replace("_", " ")
-        return f"the {self._name} arm's {joint} reads {abs(error[worst]):.3f} rad {what}, limit {limit:.3f}"
+        joint, unit = self._chain.names[worst].replace("_", " "), "m" if self._chain.slides[worst] else "rad"
+        return f"the {self._name} arm's {joint} reads {abs(error[worst]):.3f} {unit} {what}, limit {limit:.3f}"
 
 
 def remaining_waypoints(path: FloatArray, reached: FloatArray) -> FloatArray:
-    """The waypoints (n, 6) of a joint path (k, 6) that lie ahead of `reached` (6,), a place on it or near it."""
+    """The waypoints (m, n) of a joint path (k, n) that lie ahead of `reached` (n,), a place on it or near it."""
     starts, segments = path[:-1], np.diff(path, axis=0)
     lengths_sq = np.maximum(np.einsum("ij,ij->i", segments, segments), 1e-12)
     shares = np.einsum("ij,ij->i", reached - starts, segments) / lengths_sq

@@ -11,12 +11,12 @@ MAX_GAP = 0.2  # m between the centres of two spheres in a row of a group; choic
 _SLACK = 1e-6  # m that a bounding sphere is larger: far more than the rounding errors of a check
 
 
-def group_starts(links: NDArray[np.int64], spheres: FloatArray) -> NDArray[np.int64]:
-    """Where groups of spheres (n, 4) m in a row begin, (g + 1,) with n at the end; a group lies on one link."""
+def group_starts(parts: NDArray[np.int64], spheres: FloatArray) -> NDArray[np.int64]:
+    """Where groups of spheres (n, 4) m in a row begin, (g + 1,) with n at the end; a group is of one part."""
     starts, last = [], 0
     for n in range(len(spheres)):
         gap = n and np.linalg.norm(spheres[n, :3] - spheres[n - 1, :3])
-        if n == 0 or links[n] != links[n - 1] or gap > MAX_GAP or n - last == MAX_GROUP:
+        if n == 0 or parts[n] != parts[n - 1] or gap > MAX_GAP or n - last == MAX_GROUP:
             starts.append(n)
             last = n
     return np.array([*starts, len(spheres)], np.int64)

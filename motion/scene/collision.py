@@ -2,29 +2,21 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
 from itertools import pairwise
 
 import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-from regrasp.interfaces.arrays import FloatArray
+from regrasp.interfaces.arrays import FloatArray, Mask
 from regrasp.interfaces.cell import Box
-from regrasp.motion.robots.kinematics import (
-    LOWER,
-    TOOL_OFFSET,
-    UPPER,
-    ArmKinematics,
-    link_frames_in,
-    spheres_in,
-    world_spheres,
-)
-from regrasp.motion.robots.spheres import CAMERA_ACROSS, CAMERA_RADIUS, JAW_OPENING, SPHERE_LINKS, spheres_at
+from regrasp.motion.robots.forward import link_frames_in, spheres_in, world_spheres
+from regrasp.motion.robots.kinematics import ArmKinematics
+from regrasp.motion.robots.spheres import CAMERA_ACROSS, CAMERA_RADIUS
 from regrasp.motion.scene.bounds import bounding_spheres, group_pairs, group_starts, groups_meet, square_distance
 from regrasp.motion.scene.distance_grid import FREE_DISTANCE, DistanceGrid
 
-_FIRST_MOVING_LINK = 2  # base and shoulder only turn on the spot: no box, surface or arm can be met by moving them
+_CAMERA, _CARRIED = -1, -2  # parts that are no links of the robot
 _ITSELF, _GRID, _OTHER_ARM = -1, -2, -3  # what a clearance is to, when it is not a box
 
 
@@ -53,13 +45,13 @@ class Clearances:
 class ArmBody:
     """What makes up an arm's body besides its links.
 
-    `camera_offset` (3,) m is where a wrist camera sits in the wrist link's frame. `carried` (m, 4) m are spheres fixed
-    in the tool frame. The pads stand `opening` m apart.
+    `camera_offset` (3,) m is where a camera sits in the robot's mount. `carried` (m, 4) m are spheres fixed in the tool
+    frame. The pads stand `opening` m apart; None: fully open.
     """
 
     camera_offset: Sequence[float] | None = None
     carried: FloatArray | None = None
-    opening: float = JAW_OPENING
+    opening: float | None = None
 
 
 @nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
@@ -85,12 +77,14 @@ def _grid_distance(p: FloatArray, distance: NDArray[np.float32], lower: FloatArr
 
 
 @nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
-def _nearest(q, base, links, local, pairs, boxes, others, distance, lower, h, self_overlap):  # type: ignore[no-untyped-def]
+def _nearest(  # type: ignore[no-untyped-def]
+    q, base, joints, first, links, local, pairs, boxes, others, distance, lower, h, self_overlap
+):
     """(clearance, what) over everything: clearance in m, what an index into `boxes` or one of the negative codes."""
-    world = world_spheres(base, q, links, local)
+    world = world_spheres(base, joints, q, links, local)
     best, what = FREE_DISTANCE, _ITSELF
     for n in range(world.shape[0]):
-        if links[n] < _FIRST_MOVING_LINK:
+        if links[n] < first:
             continue
         p, r = world[n, :3], world[n, 3]
         for b in range(boxes.shape[0]):
@@ -131,14 +125,14 @@ def _meets_box(p, reach, boxes):  # type: ignore[no-untyped-def]
 
 @nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
 def _free(  # type: ignore[no-untyped-def]
-    q, margin, base, links, local, boxes, others, distance, lower, h, self_overlap,
+    q, margin, base, joints, first, links, local, boxes, others, distance, lower, h, self_overlap,
     starts, group_links, group_bounds, group_pairs, other_starts, other_bounds,
 ):  # fmt: skip
     """Whether `_nearest` would be at least `margin` (own links: 0), at a tenth of the cost."""
-    frames = link_frames_in(base, q)
+    frames = link_frames_in(base, joints, q)
     world, bounds = spheres_in(frames, links, local), spheres_in(frames, group_links, group_bounds)
     for g in range(bounds.shape[0] - 1, -1, -1):  # gripper first: it meets things most often
-        if group_links[g] < _FIRST_MOVING_LINK:
+        if group_links[g] < first:
             continue
         near_box = _meets_box(bounds[g], bounds[g, 3] + margin, boxes)
         for n in range(starts[g], starts[g + 1]):
@@ -176,22 +170,6 @@ def _edge_free(qa, qb, step, margin, *scene):  # type: ignore[no-untyped-def]
     return True
 
 
-@cache
-def _self_pairs(with_camera: bool) -> tuple[tuple[int, int], ...]:
-    """Pairs of spheres of one arm that can meet: link 0-1 with 4-6, link 2 with 5-6, the camera also with 3-4.
-
-    Neighbouring links are left out: joint limits keep them apart.
-    """
-    links = [*SPHERE_LINKS.tolist(), *([5] * len(CAMERA_ACROSS) if with_camera else [])]
-    camera = len(SPHERE_LINKS)
-    return tuple(
-        (i, j)
-        for i, a in enumerate(links)
-        for j, b in enumerate(links)
-        if (a <= 1 and b >= 4) or (a == 2 and b >= 5) or (j >= camera and a in (3, 4))
-    )
-
-
 class CollisionModel:
     """One arm, and all that it must not touch. It does not change; make a new one when the surroundings do.
 
@@ -211,10 +189,12 @@ class CollisionModel:
         self.kinematics = kinematics
         self.coarse_step, self._fine_step = parameters.coarse_step, parameters.fine_step
         self._names = [box.name for box in boxes]
-        links, local, pairs = _body_spheres(body)
+        links, parts, local, pairs = _body_spheres(kinematics, body)
         distance = grid or DistanceGrid(np.full((1, 1, 1), FREE_DISTANCE, np.float32), np.zeros(3), 1e-3)
         self._arguments = (
             kinematics.base,
+            kinematics.joints,
+            kinematics.robot.body.first_moving,
             links,
             local,
             pairs,
@@ -225,11 +205,11 @@ class CollisionModel:
             float(distance.h),
             float(parameters.self_overlap),
         )
-        starts, other = group_starts(links, local), self._arguments[5]
+        starts, other = group_starts(parts, local), self._arguments[7]
         other_starts = group_starts(np.zeros(len(other), np.int64), other)
         self._free_arguments = (
-            *self._arguments[:3],
-            *self._arguments[4:],
+            *self._arguments[:5],
+            *self._arguments[6:],
             starts,
             links[starts[:-1]],
             bounding_spheres(local, starts),
@@ -239,8 +219,8 @@ class CollisionModel:
         )
 
     def free(self, q: FloatArray, margin: float) -> bool:
-        """Whether the arm at joints (6,) rad lies within its limits and keeps `margin` metres from everything."""
-        inside = bool(np.all((q >= LOWER) & (q <= UPPER)))
+        """Whether the arm at joints (n,) lies within its limits and keeps `margin` metres from everything."""
+        inside = bool(np.all((q >= self.kinematics.lower) & (q <= self.kinematics.upper)))
         return inside and bool(_free(np.asarray(q, float), margin, *self._free_arguments))
 
     def edge_free(self, qa: FloatArray, qb: FloatArray, margin: float) -> bool:
@@ -263,30 +243,53 @@ class CollisionModel:
         return float(distance), names[what] if what < 0 else self._names[what]
 
     def spheres(self, q: FloatArray) -> FloatArray:
-        """The arm's spheres (n, 4) in world at joints (6,) rad, for another arm's model."""
-        base, links, local = self._arguments[:3]
-        return np.asarray(world_spheres(base, np.asarray(q, float), links, local))
+        """The arm's spheres (n, 4) in world at joints (n,), for another arm's model."""
+        base, joints, _, links, local = self._arguments[:5]
+        return np.asarray(world_spheres(base, joints, np.asarray(q, float), links, local))
 
     def _edge_free(self, qa: FloatArray, qb: FloatArray, margin: float, step: float) -> bool:
         return bool(_edge_free(np.asarray(qa, float), np.asarray(qb, float), step, margin, *self._free_arguments))
 
 
-def _body_spheres(body: ArmBody) -> tuple[NDArray[np.int64], FloatArray, NDArray[np.int64]]:
-    """An arm's spheres: their links (n,), the spheres (n, 4) in the links' frames, and pairs (m, 2) that can meet."""
-    links, local = [SPHERE_LINKS], [spheres_at(body.opening)]
-    pairs = list(_self_pairs(body.camera_offset is not None))
+def _body_spheres(
+    kinematics: ArmKinematics, body: ArmBody
+) -> tuple[NDArray[np.int64], NDArray[np.int64], FloatArray, NDArray[np.int64]]:
+    """An arm's spheres: their links and parts (n,), the spheres (n, 4) in the links, and pairs (m, 2) that can meet.
+
+    A camera can meet all links before its own. What is carried can meet those up to the third before the last: the
+    wrist turns with it.
+    """
+    robot = kinematics.robot
+    own = robot.body
+    links, parts, pairs = [own.links], [own.parts], own.pairs
+    local = [own.at(robot.gripper.opening if body.opening is None else body.opening)]
     if body.camera_offset is not None:
-        links.append(np.full(len(CAMERA_ACROSS), 5))
+        index, link_from_mount = robot.mounted
+        links.append(np.full(len(CAMERA_ACROSS), index))
+        parts.append(np.full(len(CAMERA_ACROSS), _CAMERA))
+        pairs = np.vstack([pairs, _pairs(own.links < index, len(own.links), len(CAMERA_ACROSS))])
         x, y, z = body.camera_offset
-        local.append(np.array([[x, y + across, z, CAMERA_RADIUS] for across in CAMERA_ACROSS]))
+        centers = np.array([[x, y + across, z] for across in CAMERA_ACROSS])
+        local.append(np.column_stack([_moved(centers, link_from_mount), np.full(len(centers), CAMERA_RADIUS)]))
     if body.carried is not None and len(body.carried):
-        first = sum(map(len, links))
-        up_to_forearm = np.flatnonzero(SPHERE_LINKS <= 3).tolist()
-        pairs += [(i, first + n) for i in up_to_forearm for n in range(len(body.carried))]
-        links.append(np.full(len(body.carried), 6))
-        local.append(np.asarray(body.carried, float) + np.append(TOOL_OFFSET, 0.0))
+        carried = np.asarray(body.carried, float)
+        pairs = np.vstack([pairs, _pairs(own.links <= len(kinematics) - 3, sum(map(len, links)), len(carried))])
+        links.append(np.full(len(carried), len(kinematics)))
+        parts.append(np.full(len(carried), _CARRIED))
+        local.append(np.column_stack([_moved(carried[:, :3], kinematics.last_from_tool), carried[:, 3]]))
     return (
         np.concatenate(links).astype(np.int64),
+        np.concatenate(parts),
         np.ascontiguousarray(np.concatenate(local)),
-        np.array(pairs, dtype=np.int64).reshape(-1, 2),
+        np.ascontiguousarray(pairs),
     )
+
+
+def _pairs(rows: Mask, first: int, count: int) -> NDArray[np.int64]:
+    """Pairs (m, 2) of each of the `rows` (n,) that are true with `count` spheres from number `first` on."""
+    own, more = np.meshgrid(np.flatnonzero(rows), first + np.arange(count), indexing="ij")
+    return np.column_stack([own.ravel(), more.ravel()])
+
+
+def _moved(points: FloatArray, pose: FloatArray) -> FloatArray:
+    return np.asarray(points @ pose[:3, :3].T + pose[:3, 3])

@@ -11,7 +11,8 @@ from regrasp.interfaces.cell import Box, KnownCell, WristMount
 from regrasp.interfaces.devices import Arm, Gripper
 from regrasp.interfaces.frame import RgbdFrame
 from regrasp.interfaces.wall_time import counts_as
-from regrasp.motion.robots.kinematics import ArmKinematics, InverseKinematicsParameters
+from regrasp.motion.robots.ik_parameters import InverseKinematicsParameters
+from regrasp.motion.robots.kinematics import ArmKinematics
 from regrasp.motion.robots.spheres import sphere_distances
 from regrasp.motion.scene.collision import ArmBody, CollisionModel, CollisionParameters
 from regrasp.motion.scene.distance_grid import DistanceGrid
@@ -46,8 +47,7 @@ class PlanningScene:
         self.known, self.arms, self.grippers = known, arms, grippers
         self._scene_parameters = parameters
         self.kinematics: dict[str, ArmKinematics] = {
-            spec.name: ArmKinematics(RigidTransform.from_translation(spec.base), parameters.kinematics)
-            for spec in known.arms
+            spec.name: ArmKinematics(spec.robot, spec.world_from_base, parameters.kinematics) for spec in known.arms
         }
         self._cameras: dict[str, WristMount] = {
             c.mount.arm: c.mount for c in known.cameras if isinstance(c.mount, WristMount)
@@ -110,7 +110,7 @@ class PlanningScene:
         return model
 
     def joints(self, arm: str) -> FloatArray:
-        """The arm's joints (6,) rad as read."""
+        """The arm's joints (n,) as read."""
         return self.arms[arm].reading().positions
 
     def tool(self, arm: str) -> RigidTransform:
@@ -122,7 +122,7 @@ class PlanningScene:
         mount = self.known.camera(frame.camera).mount
         if isinstance(mount, WristMount):
             assert frame.joints is not None
-            return self.kinematics[mount.arm].wrist(frame.joints) * mount.wrist_from_camera
+            return self.kinematics[mount.arm].mount(frame.joints) * mount.mount_from_camera
         return mount.world_from_camera
 
     @counts_as("planning")

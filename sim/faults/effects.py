@@ -128,7 +128,8 @@ def _light(fault: f.LightChanges, world: FaultTarget) -> Effect:
 
 
 def _joint(fault: f.JointFault, world: FaultTarget) -> Effect:
-    arm, joint = world.arms[fault.arm], f.JOINT_NAMES.index(fault.joint)
+    arm = world.arms[fault.arm]
+    joint = arm.robot.joint_names.index(fault.joint)
     if isinstance(fault, f.EncoderJumps):
         angle = fault.angle
         return Effect(lambda: arm.slip_encoder(joint, angle))

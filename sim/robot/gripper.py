@@ -1,14 +1,17 @@
-"""The ViperX's gripper: two coupled fingers that hold by friction alone, and their noisy encoder."""
+"""Grippers: two fingers that one drive moves and that hold by friction alone, and their noisy encoder."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 import pybullet as p
 
-from regrasp.interfaces.hidden_world import HiddenWorld
+from regrasp.interfaces.hidden_world import Errors, GripperSpec
 from regrasp.interfaces.reading import GripperReading
-from regrasp.sim.robot.model import finger_position, pad_gap
+from regrasp.interfaces.robot.parts import LinkageGripper, ParallelGripper
+from regrasp.interfaces.robot.robot import Linkage, Robot, finger_position
+from regrasp.sim.robot.model import pad_links
 
 
 @dataclass(frozen=True)
@@ -16,37 +19,43 @@ class GripperParameters:
     """The fingers' drive and their coupling."""
 
     open_force: float = 40.0  # N on each finger while opening or holding a gap
-    closed_gap: float = 0.003  # m between the pads at the lower stop
     position_gain: float = 0.1  # PyBullet's position control while opening or holding a gap
     velocity_gain: float = 1.0
     spinning_friction: float = 0.005  # of the pads, against rotation about a contact's normal (PyBullet's unit)
-    gear_force: float = 500.0  # N, limit of the constraint that couples the fingers
+    gear_force: float = 500.0  # N or N m, limit of the constraints that couple the fingers
     gear_error_reduction: float = 0.3  # share of the coupling's error that is corrected in a step
 
 
-class SimGripper:
-    """Implements `regrasp.interfaces.devices.Gripper` with the fingers and pads among the `links` of an arm's `body`.
+@dataclass(frozen=True, eq=False)
+class GripperPlace:
+    """Where a gripper is: PyBullet's client and body, its links and joints by name, and the arm's simulated seconds."""
 
-    `now` gives the arm's simulated seconds. The arm calls `sample()` when it is `due`.
-    """
+    client: int
+    body: int
+    links: Mapping[str, int]
+    joints: Mapping[str, int]
+    now: Callable[[], float]
+
+
+class SimGripper(ABC):
+    """Implements `regrasp.interfaces.devices.Gripper`. The arm calls `sample()` when it is `due`."""
 
     def __init__(
         self,
-        client: int,
-        body: int,
-        links: Mapping[str, int],
-        now: Callable[[], float],
-        hidden: HiddenWorld,
+        robot: Robot,
+        place: GripperPlace,
+        errors: Errors,
         rng: np.random.Generator,
         parameters: GripperParameters = GripperParameters(),
     ) -> None:
-        self._client, self._body, self._now = client, body, now
-        self._spec, self._errors, self._parameters = hidden.gripper, hidden.errors, parameters
-        self._fingers = (links["left_finger_link"], links["right_finger_link"])
-        self.pads = (links["left_pad"], links["right_pad"])
-        self._noise = _noise(hidden.errors.finger_noise, int(rng.integers(2**31)))
-        self._build(links["gripper_prop_link"])
-        self._gap_command = parameters.closed_gap
+        self._place, self._client, self._body = place, place.client, place.body
+        self._errors, self._parameters = errors, parameters
+        self._robot, self._max_force = robot, robot.gripper.force
+        self.pads = tuple(place.links[name] for name in pad_links(robot.gripper))
+        self._noise = _noise(errors.finger_noise, int(rng.integers(2**31)))
+        self._set_friction(robot.gripper.friction)
+        self._build()
+        self._gap_command = robot.gripper.closed
         self._force: float | None = None
         self._forced_open, self._stuck, self._force_share = False, False, 1.0
         self._backlash_gap = self.true_gap()
@@ -60,7 +69,7 @@ class SimGripper:
 
     def close(self, force: float) -> None:
         """See `regrasp.interfaces.devices.Gripper`; `force` is limited to the gripper's maximum."""
-        self._force = min(force, self._spec.max_force)
+        self._force = min(force, self._max_force)
         self._drive()
 
     def reading(self) -> GripperReading:
@@ -80,10 +89,13 @@ class SimGripper:
         self._force_share = self._force_share if force_share is None else force_share
         self._drive()
 
+    @abstractmethod
     def true_gap(self) -> float:
         """The true distance between the pads in metres."""
-        states = p.getJointStates(self._body, self._fingers, physicsClientId=self._client)
-        return pad_gap(states[0][0], states[1][0], self._spec.pad_thickness)
+
+    @abstractmethod
+    def place_at(self, gap: float) -> None:
+        """Set the fingers at once so that the pads are `gap` m apart, for pictures without physics."""
 
     def restart_clock(self) -> None:
         """Set the count of samples to zero; the arm's clock is zero now."""
@@ -102,48 +114,91 @@ class SimGripper:
         self._backlash_gap = min(max(self._backlash_gap, gap - half), gap + half)
         noise = next(self._noise)
         step = self._errors.finger_resolution
-        return GripperReading(self._now(), max(0.0, round((self._backlash_gap + noise) / step) * step))
+        return GripperReading(self._place.now(), max(0.0, round((self._backlash_gap + noise) / step) * step))
 
-    def _build(self, prop: int) -> None:
-        """Couple the fingers, set the pads' friction, stop the URDF's propeller joint, and close the gripper."""
-        body, client = self._body, self._client
+    def _set_friction(self, friction: float) -> None:
         for pad in self.pads:
             p.changeDynamics(
-                body,
+                self._body,
                 pad,
-                lateralFriction=self._spec.friction,
+                lateralFriction=friction,
                 spinningFriction=self._parameters.spinning_friction,
-                physicsClientId=client,
+                physicsClientId=self._client,
             )
-        left, right = self._fingers
+
+    def _couple(self, joint: int, other: int, ratio: float, axis: tuple[float, float, float]) -> None:
+        """Couple two joints (PyBullet's numbers) of the body, about or along this axis of their links."""
         gear = p.createConstraint(
-            body, left, body, right, p.JOINT_GEAR, [0, 1, 0], [0, 0, 0], [0, 0, 0], physicsClientId=client
+            self._body, joint, self._body, other, p.JOINT_GEAR, axis, [0, 0, 0], [0, 0, 0], physicsClientId=self._client
         )
-        # One servo moves both fingers; the URDF's right finger has the opposite sign.
         p.changeConstraint(
             gear,
-            gearRatio=1,
+            gearRatio=ratio,
             maxForce=self._parameters.gear_force,
             erp=self._parameters.gear_error_reduction,
-            physicsClientId=client,
+            physicsClientId=self._client,
         )
-        p.setJointMotorControl2(body, prop, p.VELOCITY_CONTROL, targetVelocity=0, force=1, physicsClientId=client)
-        closed = finger_position(self._parameters.closed_gap, self._spec.pad_thickness)
-        p.resetJointState(body, left, closed, physicsClientId=client)
-        p.resetJointState(body, right, -closed, physicsClientId=client)
+
+    @abstractmethod
+    def _build(self) -> None:
+        """Couple the fingers and close the gripper."""
 
     def _drive(self) -> None:
         if self._stuck:
             return
         if self._forced_open:
-            self._drive_at(self._spec.speed, self._spec.max_force)
+            self._drive_at(self._robot.gripper.speed, self._max_force)
         elif self._force is not None:
-            self._drive_at(-self._spec.speed, self._force_share * self._force)
+            self._drive_at(-self._robot.gripper.speed, self._force_share * self._force)
         else:
-            self._drive_to(finger_position(self._gap_command, self._spec.pad_thickness))
+            self._drive_to(self._gap_command)
 
+    @abstractmethod
     def _drive_at(self, speed: float, force: float) -> None:
         """Open (speed > 0) or close; each finger moves at `speed` m/s with at most `force` N."""
+
+    @abstractmethod
+    def _drive_to(self, gap: float) -> None:
+        """Move the pads until they are `gap` m apart, and hold them there."""
+
+
+class SimParallelGripper(SimGripper):
+    """Two sliding fingers."""
+
+    def true_gap(self) -> float:
+        """See `SimGripper`."""
+        states = p.getJointStates(self._body, self._fingers, physicsClientId=self._client)
+        pads = self._gripper.pads
+        return float(states[0][0] - states[1][0] - 2 * (pads.face + pads.thickness))
+
+    def place_at(self, gap: float) -> None:
+        """See `SimGripper`."""
+        position = self._position(gap)
+        left, right = self._fingers
+        p.resetJointState(self._body, left, position, physicsClientId=self._client)
+        p.resetJointState(self._body, right, -position, physicsClientId=self._client)
+
+    @property
+    def _gripper(self) -> ParallelGripper:
+        assert isinstance(self._robot.gripper, ParallelGripper)
+        return self._robot.gripper
+
+    def _position(self, gap: float) -> float:
+        """The left finger joint's, m; the right one's is its negative."""
+        return finger_position(gap, self._gripper.pads.face, self._gripper.pads.thickness)
+
+    def _build(self) -> None:
+        self._fingers = tuple(self._place.joints[name] for name in self._gripper.joints)
+        left, right = self._fingers
+        self._couple(left, right, 1.0, (0, 1, 0))  # one servo moves both; the URDF's right finger has the opposite sign
+        for name in self._gripper.spin:
+            joint, client = self._place.joints[name], self._client
+            p.setJointMotorControl2(
+                self._body, joint, p.VELOCITY_CONTROL, targetVelocity=0, force=1, physicsClientId=client
+            )
+        self.place_at(self._gripper.closed)
+
+    def _drive_at(self, speed: float, force: float) -> None:
         for finger, side in zip(self._fingers, (1, -1), strict=True):
             p.setJointMotorControl2(
                 self._body,
@@ -154,8 +209,8 @@ class SimGripper:
                 physicsClientId=self._client,
             )
 
-    def _drive_to(self, position: float) -> None:
-        """Move the finger joints to `position` m and hold them there."""
+    def _drive_to(self, gap: float) -> None:
+        position = self._position(gap)
         for finger, side in zip(self._fingers, (1, -1), strict=True):
             p.setJointMotorControl2(
                 self._body,
@@ -165,9 +220,111 @@ class SimGripper:
                 positionGain=self._parameters.position_gain,
                 velocityGain=self._parameters.velocity_gain,
                 force=self._parameters.open_force,
-                maxVelocity=self._spec.speed,
+                maxVelocity=self._robot.gripper.speed,
                 physicsClientId=self._client,
             )
+
+
+class SimLinkageGripper(SimGripper):
+    r"""Two fingers on linkages. PyBullet ignores `mimic`: gears couple all joints to the driven one.
+
+    A finger's force follows from the drive's torque by virtual work: with the opening :math:`g(	heta)` each finger
+    moves by :math:`g/2`, so that :math:`	au = F |dg/d	heta| / 2` on each side.
+    """
+
+    def true_gap(self) -> float:
+        """See `SimGripper`."""
+        states = p.getJointStates(self._body, self._drives, physicsClientId=self._client)
+        return self._linkage.opening(float(np.mean([state[0] for state in states])))
+
+    def place_at(self, gap: float) -> None:
+        """See `SimGripper`."""
+        for name, position in self._linkage.positions(gap).items():
+            p.resetJointState(self._body, self._place.joints[name], position, physicsClientId=self._client)
+
+    def sample(self) -> None:
+        """See `SimGripper`; the torque for the present force depends on how far the jaw is open."""
+        super().sample()
+        if self._force is not None and not self._stuck and not self._forced_open:
+            self._drive()
+
+    @property
+    def _linkage(self) -> Linkage:
+        return self._robot.linkage
+
+    def _build(self) -> None:
+        gripper, joints = self._robot.gripper, self._place.joints
+        assert isinstance(gripper, LinkageGripper)
+        tree, driven = self._robot.tree, joints[gripper.joint]
+        # One joint a side is driven: the first on the way to its pad.
+        sides = [
+            next(joint.name for joint in tree.way_to(pad) if joint.name in self._linkage.followers)
+            for pad in gripper.pads
+        ]
+        self._drives = tuple(joints[name] for name in sides)
+        for name, (multiplier, _) in self._linkage.followers.items():
+            p.setJointMotorControl2(self._body, joints[name], p.VELOCITY_CONTROL, force=0, physicsClientId=self._client)
+            if name != gripper.joint:
+                axis = tuple(tree.joints[name].axis.tolist())
+                self._couple(driven, joints[name], -multiplier, axis)
+        self.place_at(gripper.closed)
+
+    def _drive_at(self, speed: float, force: float) -> None:
+        slope = self._slope()
+        for joint in self._drives:
+            p.setJointMotorControl2(
+                self._body,
+                joint,
+                p.VELOCITY_CONTROL,
+                targetVelocity=-speed / slope,
+                force=force * slope,
+                physicsClientId=self._client,
+            )
+
+    def _drive_to(self, gap: float) -> None:
+        slope = self._slope()
+        for joint in self._drives:
+            p.setJointMotorControl2(
+                self._body,
+                joint,
+                p.POSITION_CONTROL,
+                targetPosition=self._linkage.position(gap),
+                positionGain=self._parameters.position_gain,
+                velocityGain=self._parameters.velocity_gain,
+                force=self._parameters.open_force * slope,
+                maxVelocity=self._robot.gripper.speed / slope,
+                physicsClientId=self._client,
+            )
+
+    def _slope(self) -> float:
+        """How far (m) each finger moves by a rad of the drive, at the present opening."""
+        linkage, step = self._linkage, 1e-3
+        here = linkage.position(self.true_gap())
+        here = min(max(here, linkage.driven[0] + step), linkage.driven[-1] - step)
+        return (linkage.opening(here - step) - linkage.opening(here + step)) / (4 * step)
+
+
+def make_gripper(
+    robot: Robot,
+    place: GripperPlace,
+    errors: Errors,
+    rng: np.random.Generator,
+    parameters: GripperParameters = GripperParameters(),
+) -> SimGripper:
+    """The gripper of a robot that is loaded in PyBullet."""
+    kind = SimParallelGripper if isinstance(robot.gripper, ParallelGripper) else SimLinkageGripper
+    return kind(robot, place, errors, rng, parameters)
+
+
+def robot_in_world(robot: Robot, spec: GripperSpec) -> Robot:
+    """The robot with the gripper that it has in this world."""
+    names = {"max_force": "force", "speed": "speed", "friction": "friction"}
+    given = {name: value for key, name in names.items() if (value := getattr(spec, key)) is not None}
+    gripper = robot.gripper.model_copy(update=given)
+    if spec.pad_thickness is not None and isinstance(gripper, ParallelGripper):
+        pads = gripper.pads.model_copy(update={"thickness": spec.pad_thickness})
+        gripper = gripper.model_copy(update={"pads": pads})
+    return robot if gripper == robot.gripper else robot.model_copy(update={"gripper": gripper})
 
 
 def _noise(deviation: float, seed: int, block: int = 256) -> Iterator[float]:

@@ -1,114 +1,131 @@
-"""URDF of the ViperX 300 S, made from the `rtb-data` package, with rubber pads on the fingers and a wrist camera."""
+"""The URDF that the world loads for a robot: that of its file, with rubber pads, a camera on its mount, and paint."""
 
+import copy
 import xml.etree.ElementTree as ET
-from importlib.resources import files
 
-import xacro
+import numpy as np
 
+from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.fields import Color
+from regrasp.interfaces.robot import urdf
+from regrasp.interfaces.robot.parts import Gripper, Pads, ParallelGripper
+from regrasp.interfaces.robot.robot import Robot
 
-PACKAGE = "package://trossen_descriptions/"
-ROBOT_NAME = "vx300s"
-# Dimensions of this robot, in metres.
-FINGER_FACE = 0.0135  # measured on rtb-data's meshes: a finger's inner face lies this far behind its joint's position
-# The pads sit at the finger tips. Their centre, which is our tool centre, lies this far in front of the fingers' link,
-# 0.018 in front of the maker's ee_gripper_link. A finger so ends 0.012 past what it holds, to hold a plug near a panel.
-PAD_CENTER_X = 0.0565
-PAD_LENGTH = 0.024  # along the fingers
-PAD_HEIGHT = 0.034  # of the finger's 0.061; a cylinder gripped over such a length resists a bending moment
-CAMERA_SIZE = (0.025, 0.090, 0.025)  # body of the D435i
-BRACKET = (0.008, 0.030)  # thickness and width of the camera's bracket, which is visible and has no collision shape
-# The real arms are black. Choice: grey, so that no lit part of them is as dark as what is black in a cell.
-ARM_COLOR = (0.30, 0.30, 0.31)
+CAMERA_SIZE = (0.025, 0.090, 0.025)  # m; body of the D435i
+CAMERA_COLOR: Color = (0.75, 0.75, 0.75)
+BRACKET = (0.008, 0.030)  # m; thickness and width of the camera's bracket, which is visible and has no collision shape
+BRACKET_COLOR: Color = (0.30, 0.30, 0.31)
+PAD_COLOR: Color = (0.12, 0.12, 0.12)
+_MASS, _INERTIA = 0.005, 1e-6  # kg and kg m2 of a pad and of the camera; choice: next to nothing
 
 
-def robot_urdf(pad_thickness: float, camera_offset: tuple[float, float, float] | None) -> str:
+def robot_urdf(robot: Robot, camera_offset: tuple[float, float, float] | None) -> str:
     """The URDF text.
 
-    The pads, `pad_thickness` m thick, are the links `left_pad` and `right_pad`. `camera_offset` (m, in our wrist link)
-    adds a camera; None leaves it out.
+    Pads that are added are the links `left_pad` and `right_pad`. `camera_offset` (m, in the robot's mount) adds a
+    camera; None leaves it out.
     """
-    root = files("rtbdata") / "xacro" / "trossen_descriptions"
-    document = xacro.process_file(str(root / "urdf" / "vx300s.urdf.xacro"), mappings={"robot_name": ROBOT_NAME})
-    # PyBullet cannot parse a one-line URDF.
-    text = document.toprettyxml(indent=" ").replace(PACKAGE, f"{root}/")
-    robot = ET.fromstring(text)
-    _set_color(robot.find("material"))
-    for finger, side in (("left", 1.0), ("right", -1.0)):
-        # The finger link's origin is at its joint's position: the face is FINGER_FACE nearer to the middle.
-        y = -side * (FINGER_FACE + pad_thickness / 2)
-        _add_box(
-            robot,
-            f"{finger}_pad",
-            f"{ROBOT_NAME}/{finger}_finger_link",
-            (PAD_CENTER_X, y, 0.0),
-            (PAD_LENGTH, pad_thickness, PAD_HEIGHT),
-            (0.12, 0.12, 0.12),
-        )
+    root = robot.element()
+    if robot.draw == "collision":
+        _draw_collision_shapes(root)
+    if robot.paint is not None:
+        _paint(root, robot.paint)
+    if isinstance(robot.gripper, ParallelGripper):
+        _add_pads(root, robot.gripper.pads)
     if camera_offset is not None:
-        # The optical centre is at the front of the body. The URDF's wrist link is ours rotated by pi about x.
-        behind = (camera_offset[0] - CAMERA_SIZE[0] / 2 - 0.004, -camera_offset[1], -camera_offset[2])
-        body = _add_box(robot, "camera_body", f"{ROBOT_NAME}/wrist_link", behind, CAMERA_SIZE, (0.75, 0.75, 0.75))
-        span = camera_offset[2]
-        _add_visual(body, (*BRACKET, span), ARM_COLOR, (0.0, 0.0, span / 2))
-    ET.indent(robot)
-    return ET.tostring(robot, encoding="unicode")
+        _add_camera(root, robot, camera_offset)
+    ET.indent(root)
+    return ET.tostring(root, encoding="unicode")
 
 
-def pad_gap(left: float, right: float, pad_thickness: float) -> float:
-    """Distance between the pads in m; `left` and `right` are the finger joints' positions in m."""
-    return left - right - 2 * (FINGER_FACE + pad_thickness)
+def pad_links(gripper: Gripper) -> tuple[str, str]:
+    """The links of the left and the right pad."""
+    return ("left_pad", "right_pad") if isinstance(gripper, ParallelGripper) else gripper.pads
 
 
-def finger_position(gap: float, pad_thickness: float) -> float:
-    """Position of the left finger joint in m at which the pads are `gap` m apart; the right one's is its negative."""
-    return gap / 2 + FINGER_FACE + pad_thickness
+def _add_pads(root: ET.Element, pads: Pads) -> None:
+    for name, link, side in zip(("left_pad", "right_pad"), pads.links, (1.0, -1.0), strict=True):
+        # The finger link's origin is at its joint's position: the face is `pads.face` nearer to the middle.
+        y = -side * (pads.face + pads.thickness / 2)
+        _add_box(root, name, link, (pads.ahead, y, 0.0), (pads.length, pads.thickness, pads.height), PAD_COLOR)
+
+
+def _add_camera(root: ET.Element, robot: Robot, offset: tuple[float, float, float]) -> None:
+    """The optical centre is at the front of the camera's body; a bracket joins it to the mount."""
+    mount = robot.camera_mount
+    pose = urdf.pose_of(mount.xyz, mount.rpy)
+    behind = (offset[0] - CAMERA_SIZE[0] / 2 - 0.004, *offset[1:])
+    place = pose[:3, :3] @ behind + pose[:3, 3]
+    turn, rpy = pose[:3, :3], (0.0, 0.0, 0.0)
+    if not set(np.unique(turn)) <= {-1.0, 0.0, 1.0}:  # a box cannot be turned by exchanging its edges
+        turn, rpy = np.eye(3), mount.rpy
+    body = _add_box(
+        root, "camera_body", mount.link, tuple(place.tolist()), _turned_box(turn, CAMERA_SIZE), CAMERA_COLOR, rpy
+    )
+    span = offset[2]
+    middle = tuple((turn @ (0.0, 0.0, -span / 2)).tolist())
+    _add_visual(body, _turned_box(turn, (*BRACKET, span)), BRACKET_COLOR, middle)
+
+
+def _turned_box(turn: FloatArray, size: tuple[float, ...]) -> tuple[float, ...]:
+    """The edges of a box that is turned by whole right angles."""
+    return tuple((np.abs(turn) @ size).tolist())
+
+
+def _draw_collision_shapes(root: ET.Element) -> None:
+    for link in root.findall("link"):
+        shapes = link.findall("collision")
+        if not shapes:
+            continue
+        for visual in link.findall("visual"):
+            link.remove(visual)
+        for shape in shapes:
+            drawn = copy.deepcopy(shape)
+            drawn.tag = "visual"
+            link.append(drawn)
+
+
+def _paint(root: ET.Element, color: Color) -> None:
+    """Give all that is drawn this colour, in place of textures and colours of the URDF."""
+    for material in root.findall("material"):
+        name = material.get("name", "")
+        material.clear()
+        material.set("name", name)
+        ET.SubElement(material, "color", rgba=urdf.numbers((*color, 1.0)))
+    named = {material.get("name") for material in root.findall("material")}
+    for n, visual in enumerate(root.iter("visual")):
+        material_of = visual.find("material")
+        if material_of is not None and material_of.get("name") in named:
+            continue
+        if material_of is not None:
+            visual.remove(material_of)
+        _color(visual, f"paint_{n}", color)
 
 
 def _add_box(
-    robot: ET.Element,
+    root: ET.Element,
     name: str,
     parent: str,
-    position: tuple[float, float, float],
-    size: tuple[float, float, float],
+    position: tuple[float, ...],
+    size: tuple[float, ...],
     color: Color,
+    rpy: tuple[float, ...] = (0.0, 0.0, 0.0),
 ) -> ET.Element:
     """Add a box, as a link of its own, fixed on the link `parent`; return its link."""
-    link = ET.SubElement(robot, "link", name=name)
+    link = ET.SubElement(root, "link", name=name)
     _add_visual(link, size, color, (0.0, 0.0, 0.0))
-    ET.SubElement(ET.SubElement(ET.SubElement(link, "collision"), "geometry"), "box", size=_numbers(size))
-    inertial = ET.SubElement(link, "inertial")
-    ET.SubElement(inertial, "mass", value="0.005")
-    ET.SubElement(inertial, "inertia", ixx="1e-6", iyy="1e-6", izz="1e-6", ixy="0", ixz="0", iyz="0")
-    joint = ET.SubElement(robot, "joint", name=f"{name}_joint", type="fixed")
-    ET.SubElement(joint, "parent", link=parent)
-    ET.SubElement(joint, "child", link=name)
-    ET.SubElement(joint, "origin", xyz=_numbers(position), rpy="0 0 0")
+    ET.SubElement(ET.SubElement(ET.SubElement(link, "collision"), "geometry"), "box", size=urdf.numbers(size))
+    urdf.add_inertia(link, _MASS, _INERTIA)
+    urdf.add_joint(root, f"{name}_joint", "fixed", parent, name, position, rpy)
     return link
 
 
-def _add_visual(
-    link: ET.Element,
-    size: tuple[float, float, float],
-    color: Color,
-    position: tuple[float, float, float],
-) -> None:
+def _add_visual(link: ET.Element, size: tuple[float, ...], color: Color, position: tuple[float, ...]) -> None:
     """Add a visual box at `position` in the link."""
-    visual = ET.SubElement(link, "visual")
-    ET.SubElement(visual, "origin", xyz=_numbers(position), rpy="0 0 0")
-    ET.SubElement(ET.SubElement(visual, "geometry"), "box", size=_numbers(size))
-    material = ET.SubElement(visual, "material", name=f"{link.get('name')}_color_{len(link)}")
-    ET.SubElement(material, "color", rgba=_numbers((*color, 1.0)))
+    (visual,) = urdf.add_box(link, ("visual",), size, position)
+    _color(visual, f"{link.get('name')}_color_{len(link)}", color)
 
 
-def _set_color(material: ET.Element | None) -> None:
-    """Replace the texture of rtb-data's only material by the arms' colour."""
-    if material is None:
-        raise ValueError("rtb-data's ViperX model has no material")
-    material.clear()
-    material.set("name", "interbotix_black")
-    ET.SubElement(material, "color", rgba=_numbers((*ARM_COLOR, 1.0)))
-
-
-def _numbers(values: tuple[float, ...]) -> str:
-    return " ".join(map(str, values))
+def _color(visual: ET.Element, name: str, color: Color) -> None:
+    material = ET.SubElement(visual, "material", name=name)
+    ET.SubElement(material, "color", rgba=urdf.numbers((*color, 1.0)))

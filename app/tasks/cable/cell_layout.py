@@ -171,10 +171,14 @@ def _cable(document: Document, cell: CableCell) -> Iterator[Finding]:
 
 
 def _clip(document: Document, known: CableKnown) -> Iterator[Finding]:
-    from regrasp.motion.robots.kinematics import ORIGINS, TOOL_OFFSET  # late: it brings the compiler
-
-    shoulder = np.asarray(known.arm(known.cable.hand).base) + ORIGINS[0] + ORIGINS[1]
-    reach = float(np.linalg.norm(ORIGINS[2:], axis=1).sum() + np.linalg.norm(TOOL_OFFSET))
+    arm = known.arm(known.cable.hand)
+    chain, first = arm.robot.chain, int(arm.robot.rail is not None)
+    shoulder = arm.world_from_base.apply(chain.origins[: first + 2].sum(axis=0))
+    reach = float(
+        np.linalg.norm(chain.origins[first + 2 :], axis=1).sum() + np.linalg.norm(chain.last_from_tool[:3, 3])
+    )
+    if arm.robot.rail:
+        reach += arm.robot.rail.upper - arm.robot.rail.lower
     way = float(np.linalg.norm(np.asarray(known.cable.clip.seat) - shoulder))
     if way > reach:
         message = f"the clip is {way:.2f} m from the {known.cable.hand} arm's shoulder, which reaches {reach:.2f} m"
@@ -213,9 +217,7 @@ def _no_grasp(known: CableKnown) -> str | None:
     from regrasp.motion.robots.kinematics import ArmKinematics
     from regrasp.motion.scene.collision import ArmBody, Clearances, CollisionModel
 
-    arms: dict[str, ArmKinematics] = {
-        arm.name: ArmKinematics(RigidTransform.from_translation(arm.base)) for arm in known.arms
-    }
+    arms: dict[str, ArmKinematics] = {arm.name: ArmKinematics(arm.robot, arm.world_from_base) for arm in known.arms}
     boxes, connector = known.solids(), known.cable.connector
     others = [
         CollisionModel(arms[a.name], boxes).spheres(np.array(a.sleep)) for a in known.arms if a.name != known.cable.hand
@@ -227,7 +229,8 @@ def _no_grasp(known: CableKnown) -> str | None:
     clearances = Clearances()
     approach = ApproachParameters(margin=clearances.tight_margin, near_margin=clearances.near_margins[-1])
     try:
-        candidates = pick_candidates(plug, connector, UnplugParameters().shallow)
+        widest = known.arm(known.cable.hand).robot.gripper.opening
+        candidates = pick_candidates(plug, connector, UnplugParameters().shallow, widest)
         choose_grasp(arms[known.cable.hand], model, asleep_at, candidates, parameters=approach)
     except (PlanningError, ValueError) as error:
         return str(error)

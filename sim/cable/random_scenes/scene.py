@@ -28,7 +28,6 @@ from regrasp.sim.render.picture import BACKGROUND, Image, LightState
 from regrasp.sim.render.renderer import RendererName, make_renderer
 from regrasp.sim.render.visuals import Visuals
 from regrasp.sim.robot.arm import SimArm
-from regrasp.sim.robot.model import finger_position
 
 Triple = tuple[float, float, float]
 
@@ -169,9 +168,7 @@ class RandomScene:
         rng, sleep = self._rng, self._cell.known.arm(arm.name).sleep
         deviation = np.array(self._parameters.arm_deviation)
         arm.place(np.array(sleep) if rng.random() < self._parameters.sleeping_share else rng.normal(0.0, deviation))
-        opening = finger_position(float(rng.uniform(0.018, 0.08)), self._cell.hidden.gripper.pad_thickness)
-        for finger, side in (("left_finger_link", 1), ("right_finger_link", -1)):
-            p.resetJointState(arm.body, arm.links[finger], side * opening, physicsClientId=self._client)
+        arm.gripper.place_at(float(rng.uniform(0.018, 0.08)))
 
     def _in_hand(self) -> RigidTransform:
         """The connector's pose in the hand, with the arm posed so that it is in the connector's box."""

@@ -8,8 +8,6 @@ import numpy as np
 
 from regrasp.app.tasks.cable.studies.planner_queries import Query
 from regrasp.interfaces.arrays import FloatArray
-from regrasp.motion.robots.kinematics import LOWER, UPPER
-from regrasp.sim.robot.arm import JOINT_SIGNS
 from regrasp.sim.world import World
 
 Planner = Callable[[Query, int], FloatArray | None]  # a query and a seed to a path (k, 6) rad, None without success
@@ -39,11 +37,12 @@ class Birrt:
     def with_our_check(self, query: Query, seed: int) -> FloatArray | None:
         """By its `birrt`: each check is one of our model, at our coarse steps."""
         package, (body, joints, limits) = self._package, self._arm(query.arm)
-        steps = np.full(6, query.model.coarse_step)
-        start, goal = (tuple((JOINT_SIGNS * q).tolist()) for q in (query.start, query.goal))
+        signs = self._signs(query.arm)
+        steps = np.full(len(signs), query.model.coarse_step)
+        start, goal = (tuple((signs * q).tolist()) for q in (query.start, query.goal))
 
         def collides(q: Any, diagnosis: bool = False) -> bool:
-            return not query.model.free(JOINT_SIGNS * q, query.margin)
+            return not query.model.free(signs * q, query.margin)
 
         _sow(seed)
         path = package.birrt(
@@ -54,42 +53,48 @@ class Birrt:
             package.get_extend_fn(body, joints, resolutions=steps, norm=np.inf),
             collides,
         )
-        return _in_our_signs(path)
+        return _in_our_signs(path, signs)
 
     def with_its_check(self, query: Query, seed: int) -> FloatArray | None:
         """By its `plan_joint_motion`, as its users call it: PyBullet's check of the meshes, and its own steps."""
         package, (body, joints, limits) = self._package, self._arm(query.arm)
         others = [arm.body for name, arm in self._world.arms.items() if name != query.arm]
-        package.set_joint_positions(body, joints, JOINT_SIGNS * query.start)
+        signs = self._signs(query.arm)
+        package.set_joint_positions(body, joints, signs * query.start)
         _sow(seed)
         path = package.plan_joint_motion(
             body,
             joints,
-            tuple((JOINT_SIGNS * query.goal).tolist()),
+            tuple((signs * query.goal).tolist()),
             obstacles=[*self._world.fixed_bodies.values(), *others],
             disabled_collisions=self._touching[query.arm],
             max_distance=query.margin,
             custom_limits=limits,
         )
         self._sleep(query.arm)
-        return _in_our_signs(path)
+        return _in_our_signs(path, signs)
+
+    def _signs(self, name: str) -> FloatArray:
+        return self._world.arms[name].robot.signs
 
     def _arm(self, name: str) -> tuple[int, list[int], dict[int, tuple[float, float]]]:
         """Body, joints, and our limits (rad, in the URDF's signs) of an arm."""
         arm = self._world.arms[name]
-        ends = np.sort(JOINT_SIGNS * np.array([LOWER, UPPER]), axis=0).T.tolist()
+        chain = arm.robot.chain
+        ends = np.sort(arm.robot.signs * np.array([chain.lower, chain.upper]), axis=0).T.tolist()
         return arm.body, arm.joints, {joint: tuple(pair) for joint, pair in zip(arm.joints, ends, strict=True)}
 
     def _pairs_that_touch(self, name: str, q: FloatArray) -> set[tuple[int, int]]:
-        """Pairs of links of an arm whose hulls touch at joints (6,) rad."""
+        """Pairs of links of an arm whose hulls touch at joints (n,)."""
         package, (body, joints, _) = self._package, self._arm(name)
-        package.set_joint_positions(body, joints, JOINT_SIGNS * q)
+        package.set_joint_positions(body, joints, self._signs(name) * q)
         pairs = package.get_self_link_pairs(body, joints)
         return {(a, b) for a, b in pairs if package.pairwise_link_collision(body, a, body, b)}
 
     def _sleep(self, name: str) -> None:
         body, joints, _ = self._arm(name)
-        self._package.set_joint_positions(body, joints, JOINT_SIGNS * np.array(self._world.cell.known.arm(name).sleep))
+        sleep = np.array(self._world.cell.known.arm(name).sleep)
+        self._package.set_joint_positions(body, joints, self._signs(name) * sleep)
 
 
 def _sow(seed: int) -> None:
@@ -98,5 +103,5 @@ def _sow(seed: int) -> None:
     np.random.seed(seed)  # noqa: NPY002 - it has no other
 
 
-def _in_our_signs(path: Any) -> FloatArray | None:
-    return None if path is None else np.array(path, float) * JOINT_SIGNS
+def _in_our_signs(path: Any, signs: FloatArray) -> FloatArray | None:
+    return None if path is None else np.array(path, float) * signs

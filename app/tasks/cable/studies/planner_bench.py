@@ -17,7 +17,7 @@ from regrasp.app.tasks.cable.studies.birrt import Birrt, Planner
 from regrasp.app.tasks.cable.studies.planner_queries import Query, draw_queries
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.motion.failure import PlanningError
-from regrasp.motion.planning.planner import WEIGHTS, plan
+from regrasp.motion.planning.planner import plan
 from regrasp.motion.scene.planning_scene import PlanningScene
 
 SCENARIOS = ("no_obstacle", "short_obstacle", "tall_obstacle")
@@ -59,7 +59,7 @@ def print_planner_bench(count: int = 10, seed: int = 0) -> None:
                 answers[planner] += found
         finally:
             world.close()
-    print_table(HEADER, comparison_lines(answers))
+    print_table(HEADER, comparison_lines(answers, queries[0].model.kinematics.chain.levers))
 
 
 def ours(query: Query, seed: int) -> FloatArray | None:
@@ -83,10 +83,10 @@ def compare(queries: Sequence[Query], planners: Mapping[str, Planner], title: st
     return answers
 
 
-def comparison_lines(answers: Mapping[str, list[Answer]]) -> list[tuple[str, ...]]:
+def comparison_lines(answers: Mapping[str, list[Answer]], levers: FloatArray) -> list[tuple[str, ...]]:
     """A line for each planner over all queries, and one over those where the first planner's path is not straight.
 
-    Times count every query, paths those that all solved.
+    Times count every query, paths those that all solved. `levers` (n,) m are the joints'.
     """
     first = next(iter(answers.values()))
     bent = [a.path is None or len(a.path) > 2 for a in first]
@@ -96,7 +96,7 @@ def comparison_lines(answers: Mapping[str, list[Answer]]) -> list[tuple[str, ...
         reference = _median([a.seconds for a, c in zip(first, chosen, strict=True) if c])
         for name, found in answers.items():
             kept = [a for a, c in zip(found, chosen, strict=True) if c]
-            lengths = [path_lengths(a.path) for a, c, s in zip(found, chosen, solved, strict=True) if c and s]
+            lengths = [path_lengths(a.path, levers) for a, c, s in zip(found, chosen, solved, strict=True) if c and s]
             seconds = _median([a.seconds for a in kept])
             paths = (f"{_median([pair[i] for pair in lengths]):.2f}" for i in range(2))
             done = sum(a.path is not None for a in kept)
@@ -105,11 +105,11 @@ def comparison_lines(answers: Mapping[str, list[Answer]]) -> list[tuple[str, ...
     return lines
 
 
-def path_lengths(path: FloatArray | None) -> tuple[float, float]:
-    """Length of a path (k, 6) in joint space, rad, and with the planner's weights, m."""
+def path_lengths(path: FloatArray | None, levers: FloatArray) -> tuple[float, float]:
+    """Length of a path (k, n) in joint space, rad, and with the joints' `levers` (n,), m."""
     assert path is not None
-    steps = np.array([b - a for a, b in pairwise(path)]).reshape(-1, 6)
-    return float(np.linalg.norm(steps, axis=1).sum()), float(np.linalg.norm(steps * WEIGHTS, axis=1).sum())
+    steps = np.array([b - a for a, b in pairwise(path)]).reshape(-1, len(levers))
+    return float(np.linalg.norm(steps, axis=1).sum()), float(np.linalg.norm(steps * levers, axis=1).sum())
 
 
 def _median(values: Sequence[float]) -> float:

@@ -14,6 +14,7 @@ from regrasp.interfaces.scene import Obstacle
 from regrasp.motion.cable.viewpoints import SpiralParameters, closer_views, spiral
 from regrasp.motion.failure import PlanningError
 from regrasp.motion.grasping.approach import find_approaches, pick_candidates
+from regrasp.motion.robots.views import ik_view
 from regrasp.motion.scene.collision import Clearances, CollisionModel
 from regrasp.motion.scene.planning_scene import PlanningScene
 
@@ -108,7 +109,7 @@ def _viewing(
         search = spiral(end.translation, rear.mount.world_from_camera, rear.intrinsics, size)
         for views in ((view.world_from_camera for view in search), closer_views(end)):
             tried = islice(views, parameters.tried_views)
-            found = (scene.kinematics[arm].ik_view(view, mount.wrist_from_camera) for view in tried)
+            found = (ik_view(scene.kinematics[arm], view, mount.mount_from_camera) for view in tried)
             free = (next((q for q in qs if model.free(q, parameters.camera_margin)), None) for qs in found)
             yield from islice((q for q in free if q is not None), parameters.views)
 
@@ -124,7 +125,7 @@ def _grasping(
     model, near = scene.model(arm), scene.model(arm, without=cable.clip.bracket)
     for pose in (plug, cable.clip.world_from_seat, *lost):
         try:
-            grasps = pick_candidates(pose, connector, 0.0)
+            grasps = pick_candidates(pose, connector, 0.0, scene.known.arm(arm).robot.gripper.opening)
             paths = find_approaches(model, near, sleep, grasps, parameters.clearances)
         except PlanningError:  # none from which this one can be reached
             continue

@@ -1,0 +1,113 @@
+"""Forward kinematics, compiled: where the links of a chain are, and the spheres on them."""
+
+from typing import NamedTuple
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from regrasp.interfaces.arrays import FloatArray
+from regrasp.interfaces.robot.robot import Chain
+from regrasp.motion.robots.poses import multiply, rotation_matrix
+
+ANY_AXIS, SLIDE = 3, 4  # kinds of joints; 0, 1 and 2 turn about x, y and z
+
+
+class JointArrays(NamedTuple):
+    """A chain as compiled functions take it, see `Chain`.
+
+    `kinds` (n,) are as above; `signs` (n,) are -1 for those that turn about a coordinate axis the other way.
+    """
+
+    origins: FloatArray
+    axes: FloatArray
+    kinds: NDArray[np.int64]
+    signs: FloatArray
+
+
+def joint_arrays(chain: Chain) -> JointArrays:
+    """The arrays of a chain."""
+    along = np.abs(chain.axes) == 1.0
+    kinds = np.where(along.any(axis=1), along.argmax(axis=1), ANY_AXIS)
+    kinds[chain.slides] = SLIDE
+    signs = np.where(kinds < ANY_AXIS, chain.axes.sum(axis=1), 1.0)
+    return JointArrays(
+        np.ascontiguousarray(chain.origins), np.ascontiguousarray(chain.axes), kinds.astype(np.int64), signs
+    )
+
+
+@nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
+def link_frames_in(base, joints, q):  # type: ignore[no-untyped-def]
+    """Frames of the base and the links (n + 1, 4, 4) for a base frame (4, 4), `JointArrays` and positions (n,)."""
+    out = np.zeros((len(q) + 1, 4, 4))
+    out[0] = base
+    for i in range(len(q)):
+        parent, frame = out[i], out[i + 1]
+        for r in range(3):
+            frame[r, 3] = parent[r, 3]
+            for k in range(3):
+                frame[r, 3] += parent[r, k] * joints.origins[i, k]
+        a = joints.kinds[i]
+        if a < ANY_AXIS:
+            angle = joints.signs[i] * q[i]
+            c, s = np.cos(angle), np.sin(angle)
+            u, v = (a + 1) % 3, (a + 2) % 3
+            for r in range(3):
+                frame[r, a] = parent[r, a]
+                frame[r, u] = c * parent[r, u] + s * parent[r, v]
+                frame[r, v] = c * parent[r, v] - s * parent[r, u]
+        elif a == SLIDE:
+            for r in range(3):
+                for k in range(3):
+                    frame[r, k] = parent[r, k]
+                    frame[r, 3] += parent[r, k] * joints.axes[i, k] * q[i]
+        else:
+            turn = rotation_matrix(q[i] * joints.axes[i])
+            for r in range(3):
+                for k in range(3):
+                    frame[r, k] = parent[r, 0] * turn[0, k] + parent[r, 1] * turn[1, k] + parent[r, 2] * turn[2, k]
+        frame[3, 3] = 1.0
+    return out
+
+
+@nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
+def tool_frame(base, joints, last_from_tool, q):  # type: ignore[no-untyped-def]
+    """world_from_tool (4, 4) at positions (n,)."""
+    return multiply(link_frames_in(base, joints, q)[len(q)], last_from_tool)
+
+
+@nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
+def world_spheres(base, joints, q, links, local):  # type: ignore[no-untyped-def]
+    """Spheres (m, 4) m in the world, from those in the frames of their `links` (m,)."""
+    return spheres_in(link_frames_in(base, joints, q), links, local)
+
+
+@nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
+def spheres_in(frames: FloatArray, links: NDArray[np.int64], local: FloatArray) -> FloatArray:
+    """`world_spheres` with the frames (n + 1, 4, 4) of the links."""
+    out = np.empty_like(local)
+    for n in range(local.shape[0]):
+        f = frames[links[n]]
+        for r in range(3):
+            out[n, r] = f[r, 0] * local[n, 0] + f[r, 1] * local[n, 1] + f[r, 2] * local[n, 2] + f[r, 3]
+        out[n, 3] = local[n, 3]
+    return out
+
+
+@nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
+def tool_jacobian(base, joints, last_from_tool, q):  # type: ignore[no-untyped-def]
+    """Derivative (6, n) of the tool's position (m) and rotation (rad), in the world, by the joints."""
+    frames = link_frames_in(base, joints, q)
+    tool = multiply(frames[len(q)], last_from_tool)
+    out = np.zeros((6, len(q)))
+    for i in range(len(q)):
+        axis = np.zeros(3)
+        for r in range(3):
+            for k in range(3):
+                axis[r] += frames[i, r, k] * joints.axes[i, k]
+        if joints.kinds[i] == SLIDE:
+            out[:3, i] = axis
+        else:
+            out[:3, i] = np.cross(axis, tool[:3, 3] - frames[i + 1, :3, 3])
+            out[3:, i] = axis
+    return out
