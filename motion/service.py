@@ -83,6 +83,22 @@ class Motion(PlanningScene):
 
         return self.execution.request(arm, steps())
 
+    def move_tool(self, arm: str, world_from_tool: RigidTransform, *, margin: float | None = None) -> MotionRequest:
+        """As `move`, to any joints that bring the tool to a pose. A rail stays where it is if that will do."""
+
+        def steps() -> Iterator[None]:
+            kin, q = self.kinematics[arm], self.joints(arm)
+            model, goals = self.start_model(arm), kin.ik(world_from_tool, q)
+            try:
+                path = self._plan(model, q, goals, margin)
+            except PlanningError:
+                if kin.robot.rail is None:
+                    raise
+                path = self._plan(model, q, kin.ik(world_from_tool), margin)
+            yield from self.execution.follow(arm, path, 1.0)
+
+        return self.execution.request(arm, steps())
+
     def sleep(self, arm: str) -> MotionRequest:
         """Bring an arm to its sleep pose, out of the cameras' and the other arms' way."""
         return self.move(arm, np.array([self.known.arm(arm).sleep]))

@@ -87,6 +87,8 @@ class Robot(Model):
     # Pairs of links that can meet; links not named together are kept apart by the joints' limits.
     self_collision: tuple[tuple[LinkName, LinkName], ...]
     still: tuple[LinkName, ...] = ()  # links that turn on the spot, which nothing around can meet
+    # Links that touch nothing in the world: PyBullet takes their hulls, which fill what is open between the fingers.
+    untouchable: tuple[LinkName, ...] = ()
     paint: Color | None = None  # in place of the URDF's colours and textures
     draw: Annotated[str, Field(pattern="^(visual|collision)$")] = "visual"  # which of the URDF's meshes are drawn
     braking: Annotated[float, Field(gt=0, le=1000)] | None = None  # rad/s2 or m/s2; None: the joints' acceleration

@@ -49,7 +49,7 @@ def poses_before(
     for seated in _seated_poses(clip, held, np.linspace(-np.pi, np.pi, parameters.rolls, endpoint=False)):
         before = seated.copy()
         before[:3, 3] -= parameters.distance * seated[:3, 0]
-        starts = (start for start in kin.ik(before) if model.free(start, margin))
+        starts = (start for start in kin.ik(before, q) if model.free(start, margin))
         if any(_straight_in(kin, near, start, seated, margin, parameters.line_step) for start in starts):
             goals.append(before)
     if not goals:

@@ -158,7 +158,7 @@ class CableMotion(SearchMotion):
             wide = self.model(arm, held=spheres, opening=self.known.arm(arm).robot.gripper.opening)
             path = first_free((wide, model), clearances.near_margins, paths)
             if path is None:
-                solutions = [end for goal in goals for end in kin.ik(goal)]
+                solutions = [end for goal in goals for end in kin.ik(goal, q)]
                 ends = [end for end in solutions if can_continue(kin, end, onward, carry.step)]
                 path = self._plan(model, q, np.array(ends).reshape(-1, len(kin)))
             yield from self.execution.follow(arm, path, speed)

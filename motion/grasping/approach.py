@@ -8,6 +8,7 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import FloatArray
+from regrasp.motion.failure import PlanningError
 from regrasp.motion.grasping.grasps import (
     ApproachParameters,
     Grasp,
@@ -74,9 +75,27 @@ def find_approaches(
     """Joint paths (k, n) from standoff to grasp of the first candidates that work, about `max_approaches`.
 
     All keep the greatest of the near margins with which any candidate works. `model` and `near` as in `choose_grasp`.
+    A rail stays where it is unless nothing works from there.
     Raises PlanningError with a tally when no candidate works with any margin.
     """
-    ways = WaysIn(model.kinematics, parameters.standoff)
+    kin = model.kinematics
+    try:
+        return _approaches(WaysIn(kin, parameters.standoff, q), model, near, q, candidates, clearances, parameters)
+    except PlanningError:
+        if kin.robot.rail is None:
+            raise
+    return _approaches(WaysIn(kin, parameters.standoff, None), model, near, q, candidates, clearances, parameters)
+
+
+def _approaches(
+    ways: WaysIn,
+    model: CollisionModel,
+    near: CollisionModel,
+    q: FloatArray,
+    candidates: Sequence[Grasp],
+    clearances: Clearances,
+    parameters: PickParameters,
+) -> list[FloatArray]:
     for near_margin in clearances.near_margins:
         approach = ApproachParameters(parameters.standoff, clearances.margin, near_margin)
         paths: list[FloatArray] = []

@@ -129,7 +129,7 @@ def choose_grasp(
     straight path in. `q_now` (n,) orders the branches. Raises PlanningError with a tally of what was wrong with the
     candidates: OUT_OF_REACH when all were, else NO_COLLISION_FREE_GOAL.
     """
-    ways = WaysIn(kin, parameters.standoff)
+    ways = WaysIn(kin, parameters.standoff, q_now)
     choice, troubles = first_grasp(ways, model, q_now, candidates, near or model, parameters)
     if choice is None:
         raise no_grasp(troubles)
@@ -139,15 +139,16 @@ def choose_grasp(
 class WaysIn:
     """The joint paths to grasps from their standoffs, each worked out once: they are tried with several margins."""
 
-    def __init__(self, kin: ArmKinematics, standoff: float) -> None:
-        self._kin, self._standoff = kin, standoff
+    def __init__(self, kin: ArmKinematics, standoff: float, near: FloatArray | None) -> None:
+        """`near` (n,) is where the arm stands now, see `ArmKinematics.ik`."""
+        self._kin, self._standoff, self._near = kin, standoff, near
         self._joints: dict[Grasp, FloatArray] = {}
         self._paths: dict[tuple[Grasp, int], FloatArray | None] = {}
 
     def joints(self, grasp: Grasp) -> FloatArray:
         """The joints (m, n) at the grasp, one row for each branch of the inverse kinematics."""
         if grasp not in self._joints:
-            self._joints[grasp] = self._kin.ik(grasp.pose)
+            self._joints[grasp] = self._kin.ik(grasp.pose, self._near)
         return self._joints[grasp]
 
     def path(self, grasp: Grasp, branch: int) -> FloatArray | None:

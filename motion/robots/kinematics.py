@@ -11,8 +11,9 @@ from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.robot.robot import Chain, Robot
 from regrasp.motion.robots.forward import (
     ANY_AXIS,
-    JointArrays,
-    joint_arrays,
+    SIGN,
+    joint_kinds,
+    joint_table,
     link_frames_in,
     tool_frame,
     tool_jacobian,
@@ -23,6 +24,8 @@ from regrasp.motion.robots.poses import inverse, multiply, rotation_vector
 
 _ROUNDING = 1e-9  # rad past a joint's limit that are rounding errors
 _REFINEMENTS = 8  # steps of Gauss and Newton that improve an answer of the solver; three are common
+_NEAR = 0.003  # m and rad that a least-squares answer may be off to be improved; others belong to no branch
+_STRAIGHT = 1e-6  # sine of the joint before the last at which a wrist is straight
 _NO_WRIST = -1
 
 
@@ -62,16 +65,22 @@ class ArmKinematics:
         chain = robot.chain
         self.robot, self.chain, self._parameters = robot, chain, parameters
         self.base: FloatArray = np.ascontiguousarray(base.as_matrix())
-        self.joints: JointArrays = joint_arrays(chain)
+        self.joints: FloatArray = joint_table(chain)
         self.last_from_tool = np.ascontiguousarray(chain.last_from_tool)
         self.lower, self.upper = chain.lower, chain.upper
         self.tip = np.ascontiguousarray(self.last_from_tool[:3, 3])  # in the last link's frame
         self._rail = robot.rail is not None
         turn = self.last_from_tool[:3, :3]
-        self._tool_turn = None if np.array_equal(turn, np.eye(3)) else turn.T.copy()
+        self._tool_turn: FloatArray | None = None  # tool_from_tip, where they are not parallel
+        if not np.array_equal(turn, np.eye(3)):
+            self._tool_turn = np.eye(4)
+            self._tool_turn[:3, :3] = turn.T
         self._base_inverse = np.linalg.inv(self.base)
         self._turning = np.ascontiguousarray(~chain.slides)
-        self._wrist = _straight_wrist_axis(self.joints)
+        self._bounds, self._zero = np.array([chain.lower, chain.upper]), np.zeros(len(chain))
+        tolerances = np.array([parameters.position, parameters.angle, parameters.distinct])
+        wrist = _straight_wrist_axis(self.joints)
+        self._arm = (self.base, self.joints, self.tip, wrist, self._turning, tolerances)
         self._solver, self.closed_form = _solver(chain, int(self._rail))
 
     def __len__(self) -> int:
@@ -108,36 +117,30 @@ class ArmKinematics:
         of some places.
         """
         target = world_from_tool if isinstance(world_from_tool, np.ndarray) else world_from_tool.as_matrix()
-        if self._tool_turn is not None:
-            target = target.copy()
-            target[:3, :3] = target[:3, :3] @ self._tool_turn
-        return self.ik_tip(target, near)
+        return self.ik_tip(target if self._tool_turn is None else multiply(target, self._tool_turn), near)
 
     def ik_tip(self, world_from_tip: FloatArray, near: FloatArray | None = None) -> FloatArray:
         """As `ik`, for the pose (4, 4) of the tip."""
         if not self._rail:
-            return self.within_limits(self.solve(world_from_tip, near), near)
+            return self._answers(world_from_tip, near, 0.0)
         places = np.linspace(self.lower[0], self.upper[0], self._parameters.rail_places)
         if near is not None:
-            here = self.within_limits(self.solve(world_from_tip, near, near[0]), near)
+            here = self._answers(world_from_tip, near, near[0])
             if len(here):
                 return here
             places = places[np.argsort(np.abs(places - near[0]), kind="stable")]
-        rows = [self.within_limits(self.solve(world_from_tip, near, place), near) for place in places]
-        return np.concatenate(rows)
+        return np.concatenate([self._answers(world_from_tip, near, place) for place in places])
 
-    def solve(self, world_from_tip: FloatArray, near: FloatArray | None = None, rail: float = 0.0) -> FloatArray:
-        """All solutions (k, n) for the tip's pose (4, 4), wrapped, whatever the limits; with the rail at `rail` m."""
-        return self.checked(self.raw(world_from_tip, near, rail), world_from_tip)
+    def solve(self, world_from_tip: FloatArray) -> FloatArray:
+        """All solutions (k, n) for the tip's pose (4, 4), wrapped, whatever the limits; with a rail at zero."""
+        return np.asarray(_solutions(*self._arm, self._raw(world_from_tip, None, 0.0), world_from_tip))
 
-    def checked(self, raw: FloatArray, world_from_tip: FloatArray) -> FloatArray:
-        """Those of the solver's answers (k, n) that bring the tip to its pose (4, 4), wrapped, without repetitions."""
-        limits = self._parameters
-        tolerances = (limits.position, limits.angle, limits.distinct)
-        arm = (self.base, self.joints, self.tip, self._wrist, self._turning)
-        return np.asarray(_solutions(*arm, raw, world_from_tip, *tolerances))
+    def _answers(self, world_from_tip: FloatArray, near: FloatArray | None, rail: float) -> FloatArray:
+        """As `ik_tip`, with the rail at that m."""
+        raw = self._raw(world_from_tip, near, rail)
+        return np.asarray(_answers(*self._arm, raw, world_from_tip, self._bounds, self._zero if near is None else near))
 
-    def raw(self, world_from_tip: FloatArray, near: FloatArray | None = None, rail: float = 0.0) -> FloatArray:
+    def _raw(self, world_from_tip: FloatArray, near: FloatArray | None = None, rail: float = 0.0) -> FloatArray:
         """The solver's answers (k, n), some of which miss the pose."""
         target = multiply(self._base_inverse, world_from_tip)
         if not self._rail:
@@ -148,8 +151,7 @@ class ArmKinematics:
 
     def within_limits(self, rows: FloatArray, near: FloatArray | None = None) -> FloatArray:
         """The rows (k, n) within the joint limits, rounding errors aside; whole turns nearest to `near` (n,)."""
-        around = np.zeros(len(self)) if near is None else near
-        return np.asarray(_within_limits(rows, self.lower, self.upper, self._turning, around))
+        return np.asarray(_within_limits(rows, self._bounds, self._turning, self._zero if near is None else near))
 
 
 def _solver(chain: Chain, first: int) -> tuple[Solver, bool]:
@@ -161,15 +163,15 @@ def _solver(chain: Chain, first: int) -> tuple[Solver, bool]:
     return NumericalSolver(chain.without(first)), False
 
 
-def _straight_wrist_axis(joints: JointArrays) -> int:
+def _straight_wrist_axis(joints: FloatArray) -> int:
     """The axis (0 to 2) about which the fourth and the sixth joint turn when the fifth is 0 and the wrist straight.
 
     -1 where they do not turn about one line then, or not about one of the coordinate axes.
     """
-    kinds = joints.kinds[-3:]
-    if len(joints.kinds) < 6 or kinds[0] != kinds[2] or kinds[0] >= ANY_AXIS:
+    kinds = joint_kinds(joints)[-3:]
+    if len(joints) < 6 or kinds[0] != kinds[2] or kinds[0] >= ANY_AXIS:
         return _NO_WRIST
-    across = np.delete(joints.origins[-2:], kinds[0], axis=1)
+    across = np.delete(joints[-2:, :3], kinds[0], axis=1)
     return int(kinds[0]) if not across.any() else _NO_WRIST
 
 
@@ -204,7 +206,7 @@ def _with_straight_wrist(base, joints, axis, raw, target):  # type: ignore[no-un
     for r in range(3):
         sine += forearm[r, v] * target[r, u] - forearm[r, u] * target[r, v]
         cosine += forearm[r, u] * target[r, u] + forearm[r, v] * target[r, v]
-    arm[-1] = joints.signs[-1] * np.arctan2(sine, cosine)
+    arm[-1] = joints[-1, SIGN] * np.arctan2(sine, cosine)
     return arm
 
 
@@ -247,14 +249,16 @@ def is_new(row: FloatArray, rows: FloatArray, count: int, distinct: float) -> bo
 
 
 @nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
-def _solutions(  # type: ignore[no-untyped-def]
-    base, joints, tip, wrist, turning, raw, target, max_distance, max_angle, distinct
-):
-    """See `ArmKinematics.checked`."""
+def _solutions(base, joints, tip, wrist, turning, tolerances, raw, target):  # type: ignore[no-untyped-def]
+    """Those of the rows `raw` (k, n) that bring the tip to its pose (4, 4), wrapped, without repetitions."""
+    max_distance, max_angle, distinct = tolerances
     out, count, wrapped = np.empty_like(raw), 0, _wrapped(raw, turning)
     for row in range(raw.shape[0]):
         q = wrapped[row]
         if not _reaches(base, joints, tip, q, target, max_distance, max_angle):
+            straight = abs(np.sin(q[-2])) < _STRAIGHT  # where the solver does not turn the last joint
+            if wrist == _NO_WRIST and not (straight or _reaches(base, joints, tip, q, target, _NEAR, _NEAR)):
+                continue
             if wrist == _NO_WRIST:
                 q = _refined(base, joints, tip, q, target)
             else:
@@ -269,8 +273,15 @@ def _solutions(  # type: ignore[no-untyped-def]
 
 
 @nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
-def _within_limits(rows, lower, upper, turning, near):  # type: ignore[no-untyped-def]
+def _answers(base, joints, tip, wrist, turning, tolerances, raw, target, bounds, near):  # type: ignore[no-untyped-def]
+    """`_solutions` within the limits `bounds` (2, n), nearest to `near` (n,)."""
+    return _within_limits(_solutions(base, joints, tip, wrist, turning, tolerances, raw, target), bounds, turning, near)
+
+
+@nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
+def _within_limits(rows, bounds, turning, near):  # type: ignore[no-untyped-def]
     """See `ArmKinematics.within_limits`."""
+    lower, upper = bounds[0], bounds[1]
     out, count = np.empty_like(rows), 0
     for row in range(rows.shape[0]):
         q = rows[row].copy()

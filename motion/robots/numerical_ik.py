@@ -5,7 +5,7 @@ from scipy.optimize import least_squares
 
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.robot.robot import Chain
-from regrasp.motion.robots.forward import joint_arrays, tool_frame, tool_jacobian
+from regrasp.motion.robots.forward import joint_table, tool_frame, tool_jacobian
 from regrasp.motion.robots.poses import rotation_vector
 
 _EYE = np.eye(4)
@@ -20,7 +20,7 @@ class NumericalSolver:
 
     def __init__(self, chain: Chain, starts: int = 12, answers: int = 4, seed: int = 0) -> None:
         """It gives up after so many `starts`, or when it has so many `answers`."""
-        self._joints = joint_arrays(chain)
+        self._joints = joint_table(chain)
         self._last_from_tip = np.eye(4)
         self._last_from_tip[:3, 3] = chain.last_from_tool[:3, 3]
         inside = 1e-9 * (chain.upper - chain.lower)

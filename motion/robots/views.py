@@ -8,7 +8,7 @@ from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import FloatArray, Mask
 from regrasp.interfaces.wall_time import counts_as
-from regrasp.motion.robots.forward import JointArrays, link_frames_in
+from regrasp.motion.robots.forward import link_frames_in
 from regrasp.motion.robots.ik_parameters import InverseKinematicsParameters
 from regrasp.motion.robots.kinematics import ArmKinematics, is_new, wrap
 from regrasp.motion.robots.poses import inverse, multiply, rotation_matrix
@@ -75,7 +75,7 @@ def _solutions(
                     break
                 roll -= along * q[-1]
                 target = _rolled(tip_target, wanted, roll)
-                branches = kin.checked(kin.raw(target), target)
+                branches = kin.solve(target)
                 if not len(branches):
                     break
                 q = branches[_nearest(branches, q)]
@@ -95,7 +95,7 @@ def _distinct(rows: FloatArray, distinct: float) -> FloatArray:
 @nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
 def _views(
     base: FloatArray,
-    joints: JointArrays,
+    joints: FloatArray,
     index: int,
     rows: FloatArray,
     wanted: FloatArray,

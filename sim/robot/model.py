@@ -26,6 +26,7 @@ def robot_urdf(robot: Robot, camera_offset: tuple[float, float, float] | None) -
     camera; None leaves it out.
     """
     root = robot.element()
+    _let_through(root, robot.untouchable)
     if robot.draw == "collision":
         _draw_collision_shapes(root)
     if robot.paint is not None:
@@ -72,10 +73,20 @@ def _turned_box(turn: FloatArray, size: tuple[float, ...]) -> tuple[float, ...]:
     return tuple((np.abs(turn) @ size).tolist())
 
 
+def _let_through(root: ET.Element, links: tuple[str, ...]) -> None:
+    """Take away what the links collide with; what they look like stays."""
+    for link in root.findall("link"):
+        if link.get("name") in links:
+            for shape in link.findall("collision"):
+                shape.tag = "visual" if not link.findall("visual") else shape.tag
+                if shape.tag == "collision":
+                    link.remove(shape)
+
+
 def _draw_collision_shapes(root: ET.Element) -> None:
     for link in root.findall("link"):
         shapes = link.findall("collision")
-        if not shapes:
+        if not any(shape.find("geometry/mesh") is not None for shape in shapes):  # nothing, or only rough balls
             continue
         for visual in link.findall("visual"):
             link.remove(visual)
