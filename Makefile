@@ -30,6 +30,7 @@ lint: setup
 
 bench: setup
 	$(BIN)/python -m regrasp.app.tasks.cable.bench
+	$(BIN)/python -m regrasp.app.studies.robot_bench
 
 fuzz: setup
 	$(BIN)/python tests/support/fuzz_readers.py --cases 2000

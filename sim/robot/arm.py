@@ -3,10 +3,8 @@
 Its interface uses the joints' signs of that file; in the URDF some may count the other way.
 """
 
-import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numba
@@ -15,13 +13,13 @@ import pybullet as p
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from regrasp.interfaces.arrays import FloatArray, Mask
-from regrasp.interfaces.cell import ArmSpec, Cell, WristMount
+from regrasp.interfaces.cell import Cell, WristMount
 from regrasp.interfaces.reading import JointReading
 from regrasp.interfaces.robot.parts import Placed
-from regrasp.interfaces.robot.robot import Robot
 from regrasp.interfaces.trajectory import Trajectory
 from regrasp.sim.robot.gripper import GripperParameters, GripperPlace, SimGripper, make_gripper, robot_in_world
-from regrasp.sim.robot.model import pad_links, robot_urdf
+from regrasp.sim.robot.load import joint_numbers, link_numbers, load_robot_body
+from regrasp.sim.robot.model import pad_links
 
 
 @dataclass(frozen=True)
@@ -58,14 +56,9 @@ class SimArm:
         self._steps = 0
         chain, self._signs = self.robot.chain, self.robot.signs
         self._chain, count = chain, len(chain)
-        self.body = _load(client, spec, self.robot, robot_urdf(self.robot, _camera_offset(cell, name)))
-        infos = [
-            p.getJointInfo(self.body, j, physicsClientId=client)
-            for j in range(p.getNumJoints(self.body, physicsClientId=client))
-        ]
-        self.links: dict[str, int] = {info[12].decode(): info[0] for info in infos}
-        joints = {info[1].decode(): info[0] for info in infos}
-        self.joints = [joints[name] for name in self.robot.urdf_joints]
+        base, camera = spec.world_from_base, _camera_offset(cell, name)
+        self.body, self.joints = load_robot_body(client, self.robot, base, camera)
+        self.links = link_numbers(client, self.body)
         self._tool_links = [self.links[name] for name in (*pad_links(self.robot.gripper), self.robot.tool.link)]
         self._tool_turn = _turn(self.robot.tool.rpy)
         self.offsets = self._draw_offsets(hidden.errors.arm_tool, rng)
@@ -85,7 +78,7 @@ class SimArm:
         self.place(self._servo)
         self.gripper: SimGripper = make_gripper(
             self.robot,
-            GripperPlace(client, self.body, self.links, joints, self.now),
+            GripperPlace(client, self.body, self.links, joint_numbers(client, self.body), self.now),
             hidden.errors,
             rng,
             gripper_parameters or GripperParameters(),
@@ -301,23 +294,3 @@ def _framed(state: Sequence[Any], frame: Placed) -> RigidTransform:
         place = place + turn.apply(frame.xyz)
     own = _turn(frame.rpy)
     return RigidTransform.from_components(place, turn if own is None else turn * own)
-
-
-def _load(client: int, spec: ArmSpec, robot: Robot, urdf: str) -> int:
-    base, root_from_base = spec.world_from_base, robot.tree.frame(robot.base_link)
-    if not np.array_equal(root_from_base, np.eye(4)):
-        base = base * RigidTransform.from_matrix(root_from_base).inv()
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / f"{spec.name}.urdf"
-        path.write_text(urdf, encoding="utf-8")
-        body = p.loadURDF(
-            str(path),
-            base.translation.tolist(),
-            base.rotation.as_quat().tolist(),
-            useFixedBase=True,
-            flags=p.URDF_USE_INERTIA_FROM_FILE,
-            physicsClientId=client,
-        )
-    for link in range(-1, p.getNumJoints(body, physicsClientId=client)):
-        p.changeDynamics(body, link, linearDamping=0, angularDamping=0, jointDamping=0, physicsClientId=client)
-    return int(body)
