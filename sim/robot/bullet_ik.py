@@ -18,10 +18,10 @@ class BulletIk:
         self._body, joints = load_robot_body(self._client, robot, world_from_base)
         links = link_numbers(self._client, self._body)
         self._link, self._signs = links[robot.tool.link], robot.signs
-        link_from_mass = p.getDynamicsInfo(self._body, self._link, physicsClientId=self._client)[3:5]
-        self._tool_from_mass = RigidTransform.from_matrix(pose_of(robot.tool.xyz, robot.tool.rpy)).inv() * (
-            RigidTransform.from_components(link_from_mass[0], Rotation.from_quat(link_from_mass[1]))
-        )
+        turn = p.getDynamicsInfo(self._body, self._link, physicsClientId=self._client)[4]
+        tool_from_link = RigidTransform.from_matrix(pose_of(robot.tool.xyz, robot.tool.rpy)).inv()
+        # It brings the link's origin to the place, but turns the axes of its inertia as is asked.
+        self._tool_from_target = tool_from_link * RigidTransform.from_rotation(Rotation.from_quat(turn))
         infos = [p.getJointInfo(self._body, link, physicsClientId=self._client) for link in links.values()]
         movable = sorted(info[0] for info in infos if info[2] != p.JOINT_FIXED)
         self._rows = [movable.index(joint) for joint in joints]
