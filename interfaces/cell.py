@@ -4,7 +4,7 @@ It is read from a YAML file under `scenarios/cells/`. Units are SI. The world fr
 bases, midway between them: x points forward to the panels, y left, z up.
 """
 
-from typing import Annotated, Any, Self
+from typing import Annotated, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -46,11 +46,6 @@ class Box(Model):
     color: Color = (0.6, 0.6, 0.6)
 
 
-def _sleep_of(arm: dict[str, Any]) -> tuple[float, ...]:
-    """The sleep pose of the robot of an arm that is being read; () if that is not valid."""
-    return arm["robot"].sleep if "robot" in arm else ()
-
-
 class ArmSpec(Model):
     """An arm: a robot, and where it stands."""
 
@@ -58,7 +53,7 @@ class ArmSpec(Model):
     robot: Robot  # in a file the name of a robot or the path of its file
     base: Vector  # position of its base link
     base_rpy_deg: tuple[SignedDegrees, SignedDegrees, SignedDegrees] = (0.0, 0.0, 0.0)  # roll, pitch and yaw
-    sleep: tuple[JointAngle, ...] = Field(default_factory=_sleep_of)  # left out: the robot's
+    sleep: tuple[JointAngle, ...]  # left out in a file: the robot's
 
     @model_validator(mode="after")
     def _all_joints(self) -> Self:

@@ -49,6 +49,7 @@ def load_cell(
     robots = _put_robots(document, path.parent)
     _, found = catch_findings(apply_assignments, document, assignments)
     found = [*robots, *found, *_put_robots(document, path.parent)]
+    _put_sleep_poses(document)
     if task is None:
         task = find.task_named(_only_task(document, shown(path)))
     model = task.cell()
@@ -87,6 +88,15 @@ def _put_robots(document: Document, folder: Path) -> list[Finding]:
         found += wrong
         arm["robot"] = content if content is not None else robot_named(DEFAULT_ROBOT, folder, place)
     return found
+
+
+def _put_sleep_poses(document: Document) -> None:
+    """Give arms without a sleep pose that of their robot."""
+    arms = value_at(document.value, ("known", "arms"))
+    for arm in arms if isinstance(arms, list) else []:
+        robot = arm.get("robot") if isinstance(arm, dict) else None
+        if isinstance(robot, dict) and "sleep" in robot:
+            arm.setdefault("sleep", robot["sleep"])
 
 
 def _task_findings(document: Document, cell: Cell, task: "Task", laid_out: bool) -> list[Finding]:

@@ -94,7 +94,7 @@ def _between_the_arms(known: KnownCell) -> float:
         moving = arm.robot.body.links > 0
         bodies.append((sleeping_arm_cubes(arm)[0][moving], arm.robot.body.spheres[moving, 3]))
     deepest = [
-        float((r[:, None] + s[None] - np.linalg.norm(a[:, None] - b[None], axis=2)).max())
+        float((r[:, None] + s[None] - np.linalg.norm(a[:, None] - b[None], axis=2)).max(initial=0.0))
         for (a, r), (b, s) in combinations(bodies, 2)
     ]
     return max(deepest, default=0.0)

@@ -28,9 +28,7 @@ class BulletIk:
 
     def solve(self, world_from_tool: FloatArray, iterations: int) -> FloatArray:
         """Its answer (1, n) for a pose (4, 4) of the tool, right or wrong."""
-        target = (
-            RigidTransform.from_matrix(world_from_tool) * self._tool_from_target
-        )  # it brings the centre of mass there
+        target = RigidTransform.from_matrix(world_from_tool) * self._tool_from_target
         found = p.calculateInverseKinematics(
             self._body,
             self._link,
