@@ -94,8 +94,7 @@ def _put_sleep_poses(document: Document) -> None:
     """Give arms without a sleep pose that of their robot."""
     arms = value_at(document.value, ("known", "arms"))
     for arm in arms if isinstance(arms, list) else []:
-        robot = arm.get("robot") if isinstance(arm, dict) else None
-        if isinstance(robot, dict) and "sleep" in robot:
+        if isinstance(arm, dict) and isinstance(robot := arm.get("robot"), dict) and "sleep" in robot:
             arm.setdefault("sleep", robot["sleep"])
 
 
