@@ -10,8 +10,8 @@ from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.trajectory import Trajectory
 from regrasp.motion.planning.timing import JointLimits, TimingParameters, time_path
 
-SPEED, ACCELERATION = np.pi, 5.0  # rad/s and rad/s2 of every joint
-LIMITS = JointLimits(np.full(6, SPEED), np.full(6, ACCELERATION))
+ACCELERATION = 5.0  # rad/s2 of every joint
+LIMITS = JointLimits(np.full(6, np.pi), np.full(6, ACCELERATION))
 STOP_TIME = TimingParameters().stop_time
 paths = st.integers(2, 6).flatmap(lambda k: arrays(float, (k, 6), elements=st.floats(-2, 2, width=32)))
 
@@ -44,6 +44,18 @@ def test_within_limits_at_rest_at_the_ends_and_near_the_path(path: FloatArray) -
         assert np.all(acceleration < ACCELERATION * 1.01)
         assert np.all(np.abs(velocities) <= ACCELERATION * STOP_TIME * 1.01)
     assert max((distance_to_path(p, path) for p in positions[::10]), default=0.0) < 0.06
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.sampled_from([6, 7, 8]), st.integers(2, 6), st.integers(0, 2**32 - 1))
+def test_every_joint_keeps_limits_of_its_own(joints: int, waypoints: int, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    speeds, accelerations = rng.uniform(0.3, 4.0, joints), rng.uniform(1.0, 20.0, joints)
+    trajectory = time_path(rng.uniform(-2, 2, (waypoints, joints)), JointLimits(speeds, accelerations))
+    _, velocities = finely(trajectory)
+    assert np.all(np.abs(velocities) <= speeds * 1.01)
+    assert np.all(np.abs(velocities) <= accelerations * STOP_TIME * 1.01)
+    assert np.all(np.abs(np.diff(velocities, axis=0)) / 0.002 <= accelerations * 1.01)
 
 
 def test_one_row_is_a_trajectory_that_stays() -> None:
