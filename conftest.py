@@ -3,14 +3,11 @@
 import signal
 import sys
 from collections.abc import Iterator
-from importlib.resources import files
-from typing import Any
 
 import pybullet as p
 import pytest
-import yaml
 from hypothesis import settings
-from scipy.spatial.transform import RigidTransform
+from robots import thesis
 
 from regrasp.interfaces.cable.cell import CableCell, CableKnown
 from regrasp.interfaces.cell import Box
@@ -45,12 +42,6 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
 settings.register_profile("without deadline", deadline=None)  # compilation and other workers take their time
 settings.load_profile("without deadline")
-
-
-def thesis() -> Any:
-    """The cell file's content."""
-    text = (files("regrasp.scenarios") / "cells/thesis.yaml").read_text(encoding="utf-8")
-    return yaml.safe_load(text)
 
 
 @pytest.fixture(scope="session")
@@ -89,16 +80,21 @@ def boxes(known: CableKnown) -> list[Box]:
 @pytest.fixture(scope="session")
 def left_arm(known: CableKnown) -> ArmKinematics:
     """The left arm where it stands."""
-    return ArmKinematics(RigidTransform.from_translation(known.arm("left").base))
+    return _kinematics(known, "left")
 
 
 @pytest.fixture(scope="session")
 def right_arm(known: CableKnown) -> ArmKinematics:
     """The right arm where it stands."""
-    return ArmKinematics(RigidTransform.from_translation(known.arm("right").base))
+    return _kinematics(known, "right")
 
 
 @pytest.fixture(scope="session")
 def right_model(right_arm: ArmKinematics, boxes: list[Box]) -> CollisionModel:
     """The right arm among the boxes."""
     return CollisionModel(right_arm, boxes)
+
+
+def _kinematics(known: CableKnown, arm: str) -> ArmKinematics:
+    spec = known.arm(arm)
+    return ArmKinematics(spec.robot, spec.world_from_base)

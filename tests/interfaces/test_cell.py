@@ -1,10 +1,9 @@
 from collections.abc import Callable
-from importlib.resources import files
 from typing import Any
 
 import numpy as np
 import pytest
-import yaml
+import robots
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
 from pydantic import ValidationError
@@ -20,7 +19,7 @@ vectors = st.tuples(coordinates, coordinates, coordinates)
 
 @pytest.fixture
 def data() -> Any:
-    return yaml.safe_load((files("regrasp.scenarios") / "cells/thesis.yaml").read_text(encoding="utf-8"))
+    return robots.thesis()
 
 
 @pytest.fixture
@@ -88,8 +87,8 @@ def test_a_camera_turned_by_yaw_looks_left() -> None:
     np.testing.assert_allclose(pose.rotation.apply([0, 0, 1]), [0.0, 1.0, 0.0], atol=1e-9)
 
 
-def test_a_wrist_camera_looks_along_the_links_x() -> None:
-    mount = WristMount(arm="left", offset=(0.02, 0.0, 0.06)).wrist_from_camera
+def test_a_wrist_camera_looks_along_the_mounts_x() -> None:
+    mount = WristMount(arm="left", offset=(0.02, 0.0, 0.06)).mount_from_camera
     np.testing.assert_allclose(mount.apply([0.0, 0.0, 1.0]), [1.02, 0.0, 0.06], atol=1e-9)
 
 

@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regrasp.motion.robots.arm_offsets import JointOffsetParameters
-from regrasp.motion.robots.kinematics import ArmKinematics, world_spheres
-from regrasp.motion.robots.spheres import SPHERE_LINKS, spheres_at
+from regrasp.motion.robots.forward import spheres_in
+from regrasp.motion.robots.kinematics import ArmKinematics
 
 Floats = NDArray[np.float64]
 DEPTH = JointOffsetParameters().surface_depth
@@ -14,7 +14,8 @@ EYE = np.array([-0.3, 0.5, 0.7])
 
 def surface(kin: ArmKinematics, q: Floats, opening: float, spacing: float = 0.004) -> Floats:
     """Points (n, 3) of the arm's surface at `q` that face a camera at `EYE`, some `spacing` m apart."""
-    spheres = world_spheres(kin.base, q, SPHERE_LINKS, spheres_at(opening))
+    body = kin.robot.body
+    spheres = spheres_in(kin.link_frames(q), body.links, body.at(opening))
     steps = np.arange(2000) + 0.5
     height, turn = 1 - 2 * steps / len(steps), np.pi * (1 + 5**0.5) * steps  # a Fibonacci lattice
     flat = np.sqrt(1 - height**2)

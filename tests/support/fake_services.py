@@ -93,7 +93,7 @@ class FakeMotion:
         self.error: Exception | None = None
         self.hand = RigidTransform.from_translation([0.3, 0.0, 0.4])
         self.grippers = {arm.name: FakeGripper(clock) for arm in known.arms}
-        self.execution = Execution({}, self.grippers, clock, 0.0)  # for its jaws
+        self.execution = Execution({}, self.grippers, {}, clock, 0.0)  # for its jaws
         self.moves: list[tuple[str, Vector]] = []
         self.shifts: list[tuple[str, Vector]] = []
         self.cancelled: list[str] = []

@@ -29,7 +29,8 @@ def drive(world: World[Any], arm: str, goal: FloatArray, seconds: float) -> None
 
 
 def kinematics(world: World[Any], arm: str) -> ArmKinematics:
-    return ArmKinematics(RigidTransform.from_translation(world.cell.known.arm(arm).base))
+    spec = world.cell.known.arm(arm)
+    return ArmKinematics(spec.robot, spec.world_from_base)
 
 
 def nearest(solutions: FloatArray, q: FloatArray) -> FloatArray:

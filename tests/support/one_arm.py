@@ -15,7 +15,7 @@ def one_arm_cell(cell: Cell) -> Cell:
         fixed.model_copy(update={"name": ABOVE}),
         carried.model_copy(update={"name": ON_ARM, "mount": WristMount(arm=ARM, offset=carried.mount.offset)}),
     )
-    arm = ArmSpec(name=ARM, base=(0.0, 0.0, 0.0), sleep=known.arms[0].sleep)
+    arm = ArmSpec(name=ARM, robot=known.arms[0].robot, base=(0.0, 0.0, 0.0), sleep=known.arms[0].sleep)
     return Cell(
         known=KnownCell(boxes=known.boxes, arms=(arm,), cameras=cameras, latencies=known.latencies), hidden=cell.hidden
     )

@@ -2,10 +2,9 @@
 
 import hashlib
 import sys
-from importlib.resources import files
 
 import numpy as np
-import yaml
+from robots import thesis
 
 from regrasp.interfaces.cable.cell import CableCell
 from regrasp.interfaces.trajectory import Trajectory
@@ -15,7 +14,7 @@ LOOKS = range(4, 21, 4)  # tenths of a second at which the second reader looks
 
 
 def small_cell() -> CableCell:
-    data = yaml.safe_load((files("regrasp.scenarios") / "cells/thesis.yaml").read_text(encoding="utf-8"))
+    data = thesis()
     for camera in data["known"]["cameras"]:
         camera |= {"width": 212, "height": 120}
     return CableCell.model_validate(data)

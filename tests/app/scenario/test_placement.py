@@ -3,13 +3,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.optimize import linprog
-from scipy.spatial.transform import RigidTransform, Rotation
+from scipy.spatial.transform import Rotation
 
 from regrasp.app.scenario.placement import overlaps
 from regrasp.app.scenario.shapes import JitteredBox, penetration_depth
 from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.motion.robots.kinematics import ArmKinematics
-from regrasp.motion.robots.spheres import SPHERE_LINKS, SPHERES
 
 edges = st.tuples(*[st.floats(0.02, 0.5)] * 3)
 angles = st.tuples(*[st.floats(-3, 3)] * 3)
@@ -53,8 +52,8 @@ def test_a_block_in_a_sleeping_arm_or_around_the_camera_is_told(known: CableKnow
         return [name for name, _ in overlaps(known, JitteredBox(np.array(center), (edge, edge, edge), 20.0))]
 
     for arm in known.arms:
-        kinematics = ArmKinematics(RigidTransform.from_translation(arm.base))
-        wrist = kinematics.wrist(np.array(arm.sleep)).translation
+        kinematics = ArmKinematics(arm.robot, arm.world_from_base)
+        wrist = kinematics.mount(np.array(arm.sleep)).translation
         assert named((wrist[0], wrist[1], wrist[2])) == [f"the {arm.name} arm asleep"]
     assert named((-0.3556, 0.0, 0.4064)) == ["the rear camera"]
     assert named((0.2, 0.0, 0.6)) == []
@@ -66,11 +65,14 @@ def test_an_arm_asleep_is_told_where_one_of_its_spheres_is_in_the_block(
 ) -> None:
     found = dict(overlaps(known, JitteredBox(np.array(place), (edge, edge, edge), yaw_deg)))
     for arm in known.arms:
-        frames = ArmKinematics(RigidTransform.from_translation(arm.base)).link_frames(np.array(arm.sleep))
-        centers = np.array([(frames[link] @ [*c[:3], 1.0])[:3] for link, c in zip(SPHERE_LINKS, SPHERES, strict=True)])
+        frames = ArmKinematics(arm.robot, arm.world_from_base).link_frames(np.array(arm.sleep))
+        body = arm.robot.body
+        centers = np.array(
+            [(frames[link] @ [*c[:3], 1.0])[:3] for link, c in zip(body.links, body.spheres, strict=True)]
+        )
         inside = Rotation.from_euler("z", -yaw_deg, degrees=True).apply(centers - place)
         if np.any(np.abs(inside).max(axis=1) < 0.5 * edge - 1e-5):
             assert f"the {arm.name} arm asleep" in found
         gaps = np.linalg.norm(np.maximum(np.abs(inside) - 0.5 * edge, 0.0), axis=1)
-        if np.all(gaps > SPHERES[:, 3]):
+        if np.all(gaps > body.spheres[:, 3]):
             assert f"the {arm.name} arm asleep" not in found

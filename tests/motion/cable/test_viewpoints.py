@@ -10,6 +10,7 @@ from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.cell import Box, WristMount
 from regrasp.motion.cable.viewpoints import SpiralParameters, Viewpoint, spiral
 from regrasp.motion.robots.kinematics import ArmKinematics
+from regrasp.motion.robots.views import ik_view
 from regrasp.motion.scene.collision import ArmBody, CollisionModel
 
 DISTANCE = SpiralParameters().distance
@@ -80,6 +81,6 @@ def test_the_left_arm_reaches_most_of_the_first_nine(
     model = CollisionModel(left_arm, boxes, body=ArmBody(camera_offset=mount.offset), other_arm=others)
     reached = 0
     for stop in stops(known, START)[:9]:
-        answers = left_arm.ik_view(stop.world_from_camera, mount.wrist_from_camera)
+        answers = ik_view(left_arm, stop.world_from_camera, mount.mount_from_camera)
         reached += any(model.free(q, 0.01) for q in answers)
     assert reached >= 6

@@ -53,7 +53,7 @@ def test_a_shallow_grasp_holds_nearer_to_the_finger_tips() -> None:
     [
         ({"grip_offset": 0.05}, "off a connector"),
         ({"parameters": GraspParameters(yaws=(1.0,))}, "50 degrees"),
-        ({"radius": 0.05}, "does not fit"),
+        ({"radius": 0.05, "opening": 0.075}, "does not fit"),
     ],
 )
 def test_what_cannot_be_asked(arguments: dict[str, object], message: str) -> None:
@@ -76,7 +76,7 @@ def test_the_right_arm_grasps_the_connector_of_the_thesis_cell(
         "low": tilted((0.35, 0.12, 0.10), 25),
     }[place]
     left = known.arm("left")
-    other = CollisionModel(ArmKinematics(RigidTransform.from_translation(left.base)), []).spheres(np.array(left.sleep))
+    other = CollisionModel(ArmKinematics(left.robot, left.world_from_base), []).spheres(np.array(left.sleep))
     model = CollisionModel(right_arm, boxes, other_arm=other)
     sleep = np.array(known.arm("right").sleep)
     choice = choose_grasp(right_arm, model, sleep, grasp_candidates(connector, LENGTH, RADIUS))

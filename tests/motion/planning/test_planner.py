@@ -2,6 +2,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from robots import VX300S
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import FloatArray
@@ -12,7 +13,7 @@ from regrasp.motion.planning.planner import PlannerParameters, plan
 from regrasp.motion.robots.kinematics import ArmKinematics
 from regrasp.motion.scene.collision import CollisionModel
 
-KIN = ArmKinematics(RigidTransform.identity())
+KIN = ArmKinematics(VX300S, RigidTransform.identity())
 FLOOR = Box(name="floor", center=(0.2, 0, -0.02), size=(2.4, 2.4, 0.04))
 POST = Box(name="post", center=(0.5, 0.0, 0.25), size=(0.06, 0.06, 0.5))
 MODEL = CollisionModel(KIN, [FLOOR, POST])

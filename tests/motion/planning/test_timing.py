@@ -8,9 +8,10 @@ from hypothesis.extra.numpy import arrays
 
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.trajectory import Trajectory
-from regrasp.motion.planning.timing import TimingParameters, time_path
-from regrasp.motion.robots.kinematics import ACCELERATION_LIMIT
+from regrasp.motion.planning.timing import JointLimits, TimingParameters, time_path
 
+ACCELERATION = 5.0  # rad/s2 of every joint
+LIMITS = JointLimits(np.full(6, np.pi), np.full(6, ACCELERATION))
 STOP_TIME = TimingParameters().stop_time
 paths = st.integers(2, 6).flatmap(lambda k: arrays(float, (k, 6), elements=st.floats(-2, 2, width=32)))
 
@@ -31,7 +32,7 @@ def distance_to_path(point: FloatArray, path: FloatArray) -> float:
 @settings(max_examples=40, deadline=None)
 @given(paths)
 def test_within_limits_at_rest_at_the_ends_and_near_the_path(path: FloatArray) -> None:
-    trajectory = time_path(path)
+    trajectory = time_path(path, LIMITS)
     assert trajectory.positions[0] == pytest.approx(path[0], abs=1e-6)
     assert trajectory.positions[-1] == pytest.approx(path[-1], abs=1e-6)
     assert not trajectory.velocities[[0, -1]].any()
@@ -40,18 +41,30 @@ def test_within_limits_at_rest_at_the_ends_and_near_the_path(path: FloatArray) -
     positions, velocities = finely(trajectory)
     if len(positions) > 2:
         acceleration = np.abs(np.diff(velocities, axis=0)) / 0.002
-        assert np.all(acceleration < ACCELERATION_LIMIT * 1.01)
-        assert np.all(np.abs(velocities) <= ACCELERATION_LIMIT * STOP_TIME * 1.01)
+        assert np.all(acceleration < ACCELERATION * 1.01)
+        assert np.all(np.abs(velocities) <= ACCELERATION * STOP_TIME * 1.01)
     assert max((distance_to_path(p, path) for p in positions[::10]), default=0.0) < 0.06
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.sampled_from([6, 7, 8]), st.integers(2, 6), st.integers(0, 2**32 - 1))
+def test_every_joint_keeps_limits_of_its_own(joints: int, waypoints: int, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    speeds, accelerations = rng.uniform(0.3, 4.0, joints), rng.uniform(1.0, 20.0, joints)
+    trajectory = time_path(rng.uniform(-2, 2, (waypoints, joints)), JointLimits(speeds, accelerations))
+    _, velocities = finely(trajectory)
+    assert np.all(np.abs(velocities) <= speeds * 1.01)
+    assert np.all(np.abs(velocities) <= accelerations * STOP_TIME * 1.01)
+    assert np.all(np.abs(np.diff(velocities, axis=0)) / 0.002 <= accelerations * 1.01)
 
 
 def test_one_row_is_a_trajectory_that_stays() -> None:
     q = np.arange(6.0)
-    trajectory = time_path(q[None])
+    trajectory = time_path(q[None], LIMITS)
     assert trajectory.duration == 0.0
     assert trajectory.sample(0.5)[0] == pytest.approx(q)
 
 
 def test_half_the_speed_takes_twice_as_long() -> None:
     path = np.array([np.zeros(6), np.ones(6), [1, 1, 1, 0, 0, 0.0]])
-    assert time_path(path, speed=0.5).duration == pytest.approx(2 * time_path(path).duration, rel=0.05)
+    assert time_path(path, LIMITS, speed=0.5).duration == pytest.approx(2 * time_path(path, LIMITS).duration, rel=0.05)

@@ -4,13 +4,14 @@ from arm_surface import surface
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from robots import VX300S
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.motion.robots.arm_offsets import joint_offsets
 from regrasp.motion.robots.kinematics import ArmKinematics
 
 Floats = NDArray[np.float64]
-KIN = ArmKinematics(RigidTransform.identity())
+KIN = ArmKinematics(VX300S, RigidTransform.identity())
 READY = np.array([0.4, -0.3, 0.4, 0.5, 0.3, 0.2])
 GAP = 0.05
 

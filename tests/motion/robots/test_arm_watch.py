@@ -3,6 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from robots import VX300S
 
 from regrasp.interfaces.reading import JointReading
 from regrasp.interfaces.trajectory import Trajectory
@@ -24,13 +25,13 @@ def turn(seconds: float, angle: float) -> Trajectory:
 
 @pytest.mark.parametrize(("off", "said"), [(0.9 * LIMITS.tracking_error, False), (-1.1 * LIMITS.tracking_error, True)])
 def test_an_arm_off_its_trajectory_is_said_with_joint_and_numbers(off: float, said: bool) -> None:
-    sentence = ArmWatch("right").off_trajectory(reading(1.0, 0.5 + off), turn(2.0, 1.0), 1.0)
+    sentence = ArmWatch("right", VX300S.chain).off_trajectory(reading(1.0, 0.5 + off), turn(2.0, 1.0), 1.0)
     assert bool(sentence) == said
     assert not said or (sentence and "right arm's elbow reads 0.088 rad off its trajectory" in sentence)
 
 
 def test_a_reading_that_jumps_further_than_the_joint_turned_is_said() -> None:
-    watch = ArmWatch("left")
+    watch = ArmWatch("left", VX300S.chain)
     assert watch.jumped(reading(0.0, 0.0, 1.0)) is None
     assert watch.jumped(reading(DT, DT * 1.0, 1.0)) is None
     sentence = watch.jumped(reading(2 * DT, 2 * DT + LIMITS.jump + 0.01, 1.0))
@@ -39,13 +40,13 @@ def test_a_reading_that_jumps_further_than_the_joint_turned_is_said() -> None:
 
 
 def test_readings_far_apart_in_time_say_nothing() -> None:
-    watch = ArmWatch("left")
+    watch = ArmWatch("left", VX300S.chain)
     watch.jumped(reading(0.0, 0.0))
     assert watch.jumped(reading(1.0, 2.0)) is None
 
 
 def test_an_arm_that_moved_while_nobody_led_it_is_said() -> None:
-    watch = ArmWatch("left")
+    watch = ArmWatch("left", VX300S.chain)
     assert watch.moved_alone(reading(0.0, 2.0)) is None  # nobody knows where it was left
     watch.leave(reading(0.0, 0.3).positions)
     assert watch.moved_alone(reading(5.0, 0.3 + 0.9 * LIMITS.resting_drift)) is None

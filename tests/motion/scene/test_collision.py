@@ -4,22 +4,24 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from robots import VX300S
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.cell import Box
-from regrasp.motion.robots.kinematics import LOWER, UPPER, ArmKinematics
-from regrasp.motion.robots.spheres import SPHERE_LINKS, SPHERES
+from regrasp.motion.robots.kinematics import ArmKinematics
 from regrasp.motion.scene.collision import ArmBody, CollisionModel
 from regrasp.motion.scene.distance_grid import DistanceGrid
 
 HOME = np.array([0.0, -0.8, 0.8, 0.0, 0.5, 0.0])
 FORWARD = np.zeros(6)
-KIN = ArmKinematics(RigidTransform.identity())
+KIN = ArmKinematics(VX300S, RigidTransform.identity())
+SPHERES = VX300S.body.spheres  # rows of x, y, z and radius, m
+SPHERE_LINKS = VX300S.body.links
 BLOCK = Box(name="block", center=(0.45, 0.1, 0.35), size=(0.2, 0.06, 0.3))
 
-joints = st.tuples(*(st.floats(float(a), float(b)) for a, b in zip(LOWER, UPPER, strict=True))).map(np.array)
+joints = st.tuples(*(st.floats(float(a), float(b)) for a, b in zip(KIN.lower, KIN.upper, strict=True))).map(np.array)
 
 
 def brute_force(kin: ArmKinematics, q: FloatArray, box: Box) -> float:
@@ -57,7 +59,7 @@ def test_free_sees_each_sphere_of_an_arm_touched_alone() -> None:
 @settings(max_examples=60)
 @given(joints, st.floats(0.0, 0.05))
 def test_free_agrees_with_clearance(q: FloatArray, margin: float) -> None:
-    other = CollisionModel(ArmKinematics(RigidTransform.from_translation([0.0, 0.35, 0.0])), []).spheres(HOME)
+    other = CollisionModel(ArmKinematics(VX300S, RigidTransform.from_translation([0.0, 0.35, 0.0])), []).spheres(HOME)
     grid = DistanceGrid.from_points(np.array([[0.3, -0.2, 0.3]]), np.full(3, -1.0), np.full(3, 1.0), 0.02)
     model = CollisionModel(KIN, [BLOCK], body=ArmBody(camera_offset=(0, 0, 0.06)), other_arm=other, grid=grid)
     distance, what = model.nearest(q)
@@ -70,7 +72,7 @@ def test_free_agrees_with_clearance(q: FloatArray, margin: float) -> None:
 
 
 def test_the_sleeping_arms_of_the_thesis_cell_touch_nothing(known: CableKnown, boxes: Sequence[Box]) -> None:
-    arms = {str(a.name): ArmKinematics(RigidTransform.from_translation(a.base)) for a in known.arms}
+    arms = {str(a.name): ArmKinematics(a.robot, a.world_from_base) for a in known.arms}
     sleep = {str(a.name): np.array(a.sleep) for a in known.arms}
     for name, other in (("left", "right"), ("right", "left")):
         others = CollisionModel(arms[other], []).spheres(sleep[other])
@@ -96,7 +98,7 @@ def test_joint_limits_are_not_free() -> None:
 
 
 def test_another_arm_in_the_way() -> None:
-    neighbour = ArmKinematics(RigidTransform.from_translation([0.0, 0.3556, 0.0]))
+    neighbour = ArmKinematics(VX300S, RigidTransform.from_translation([0.0, 0.3556, 0.0]))
     turned = np.array([-0.9, 0.0, 0.0, 0.0, 0.0, 0.0])
     others = CollisionModel(neighbour, []).spheres(turned)
     model = CollisionModel(KIN, [], other_arm=others)

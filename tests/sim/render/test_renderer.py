@@ -7,6 +7,7 @@ import numpy as np
 import pybullet as p
 import pytest
 from numpy.typing import NDArray
+from robots import VX300S
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from regrasp.interfaces.cell import OPTICAL
@@ -60,7 +61,7 @@ def scene(client: int, tmp_path: Path) -> Visuals:
     add(client, p.GEOM_SPHERE, (0.3, -0.3, 0.1), (0.2, 0.8, 0.2), radius=0.08)
     add(client, p.GEOM_CAPSULE, (0.2, -0.1, 0.3), (0.2, 0.2, 0.8), radius=0.02, length=0.2)
     add(client, p.GEOM_CYLINDER, (0.2, 0.05, 0.3), (0.7, 0.0, 0.1), radius=0.02, length=0.2)
-    (tmp_path / "robot.urdf").write_text(robot_urdf(0.006, None))
+    (tmp_path / "robot.urdf").write_text(robot_urdf(VX300S, None))
     p.loadURDF(str(tmp_path / "robot.urdf"), [0.3, 0.0, 0.0], useFixedBase=True, physicsClientId=client)
     return Visuals(client)
 

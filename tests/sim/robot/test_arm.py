@@ -3,6 +3,7 @@
 import numpy as np
 import pybullet as p
 import pytest
+from robots import VX300S
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import FloatArray
@@ -11,9 +12,12 @@ from regrasp.interfaces.devices import Arm
 from regrasp.interfaces.hidden_world import Errors
 from regrasp.interfaces.scene import EARTH_GRAVITY
 from regrasp.interfaces.trajectory import Trajectory
-from regrasp.motion.robots.kinematics import LOWER, UPPER, ArmKinematics
-from regrasp.sim.robot.arm import ENCODER_STEP, JOINT_SIGNS, MAX_JOINT_SPEED, ArmParameters, SimArm
+from regrasp.motion.robots.kinematics import ArmKinematics
+from regrasp.sim.robot.arm import SimArm
 
+ENCODER_STEP = 2 * np.pi / 4096  # rad
+MAX_JOINT_SPEED = np.pi  # rad/s
+BRAKING = 12.0  # rad/s2
 TRACKING = 0.01  # rad
 STOP_TIME = 0.3  # s
 AT_REST = 0.01  # rad/s
@@ -33,7 +37,7 @@ def make(cell: CableCell, client: int, tool_error: float = 0.0, seed: int = 0) -
 
 def true_joints(arm: SimArm) -> FloatArray:
     states = p.getJointStates(arm.body, arm.joints, physicsClientId=arm.client)
-    return np.asarray(JOINT_SIGNS * [s[0] for s in states])
+    return np.asarray(VX300S.signs * [s[0] for s in states])
 
 
 def ease(start: FloatArray, goal: FloatArray, seconds: float) -> Trajectory:
@@ -97,7 +101,7 @@ def test_it_stops_within_its_time_from_full_speed(arm: SimArm) -> None:
     assert float(np.abs(rates).max()) < AT_REST
     assert not arm.is_moving()
     reach = float(np.abs(path[-1] - at).max())
-    assert reach == pytest.approx(float(full.max()) ** 2 / (2 * ArmParameters().braking), abs=3 * TRACKING)
+    assert reach == pytest.approx(float(full.max()) ** 2 / (2 * BRAKING), abs=3 * TRACKING)
     later = run(arm, 0.5)
     np.testing.assert_allclose(later[-1], path[-1], atol=1e-3)
 
@@ -112,7 +116,7 @@ def test_a_stop_at_rest_changes_nothing(arm: SimArm) -> None:
 @pytest.mark.parametrize("side", [1.0, -1.0])
 @pytest.mark.parametrize("joint", range(6))
 def test_a_joint_driven_on_stops_at_the_models_limit(arm: SimArm, joint: int, side: float) -> None:
-    limits = JOINT_SIGNS[joint] * np.array(
+    limits = VX300S.signs[joint] * np.array(
         p.getJointInfo(arm.body, arm.joints[joint], physicsClientId=arm.client)[8:10]
     )
     limit = side * float(np.max(side * limits))
@@ -122,7 +126,7 @@ def test_a_joint_driven_on_stops_at_the_models_limit(arm: SimArm, joint: int, si
     run(arm, 1.8)
     assert true_joints(arm)[joint] == pytest.approx(limit, abs=STOP_PLAY)
     # What motion plans within lies within.
-    assert side * limit > side * (UPPER if side > 0 else LOWER)[joint] - STOP_PLAY
+    assert side * limit > side * (VX300S.chain.upper if side > 0 else VX300S.chain.lower)[joint] - STOP_PLAY
 
 
 def test_readings_carry_time_speed_and_effort(arm: SimArm) -> None:
@@ -146,13 +150,13 @@ def test_encoders_have_4096_steps(arm: SimArm) -> None:
     np.testing.assert_allclose(arm.reading().positions, true_joints(arm), atol=ENCODER_STEP / 2 + 1e-9)
 
 
-def test_tool_and_wrist_are_where_the_kinematics_says(cell: CableCell, arm: SimArm) -> None:
-    kinematics = ArmKinematics(RigidTransform.from_translation(cell.known.arm("right").base))
+def test_tool_and_mount_are_where_the_kinematics_says(cell: CableCell, arm: SimArm) -> None:
+    kinematics = ArmKinematics(VX300S, cell.known.arm("right").world_from_base)
     arm.follow(ease(true_joints(arm), np.array([0.5, -0.2, 0.4, 0.3, -0.5, 0.8]), 1.0))
     run(arm, 1.2)
     for true, believed in (
         (arm.tool_pose(), kinematics.tool(true_joints(arm))),
-        (arm.deferred_wrist_pose()(), kinematics.wrist(true_joints(arm))),
+        (arm.deferred_mount_pose()(), kinematics.mount(true_joints(arm))),
     ):
         difference = believed.inv() * true
         assert float(np.linalg.norm(difference.translation)) < 5e-4
@@ -166,7 +170,7 @@ def _tool_error(arm: SimArm, kinematics: ArmKinematics, q: FloatArray) -> float:
 
 
 def test_joint_offsets_move_the_tool_by_the_stated_error(cell: CableCell, client: int) -> None:
-    kinematics = ArmKinematics(RigidTransform.identity())
+    kinematics = ArmKinematics(VX300S, RigidTransform.identity())
     poses = np.array(
         [[0.3, -0.6, 0.6, 0.0, 0.4, 0.0], [-0.3, 0.0, 0.2, 0.7, -0.4, 0.3], [0.9, -0.3, 0.0, 1.0, 0.9, 0.0]]
     )

@@ -5,23 +5,25 @@ from pathlib import Path
 import numpy as np
 import pybullet as p
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from robots import VX300S
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.motion.robots.kinematics import ArmKinematics
 from regrasp.perception.mapping.occupancy import OccupancyParameters
-from regrasp.sim.robot.arm import JOINT_LINKS, JOINT_SIGNS
-from regrasp.sim.robot.model import ARM_COLOR, CAMERA_SIZE, finger_position, pad_gap, robot_urdf
+from regrasp.sim.robot.model import CAMERA_SIZE, robot_urdf
 
-PAD = 0.006  # m
+GRAY = (0.30, 0.30, 0.31)
 OFFSET = (0.02, 0.0, 0.06)  # m
+# The links that the joints move.
+JOINT_LINKS = [
+    f"{part}_link" for part in ("shoulder", "upper_arm", "upper_forearm", "lower_forearm", "wrist", "gripper")
+]
 NEAR = 5e-4  # m: motion's kinematics against the URDF's
 
 
 @pytest.fixture(scope="module")
 def urdf() -> str:
-    return robot_urdf(PAD, OFFSET)
+    return robot_urdf(VX300S, OFFSET)
 
 
 @pytest.fixture
@@ -36,19 +38,11 @@ def robot(urdf: str, tmp_path: Path) -> Iterator[tuple[int, int, dict[str, int]]
     p.disconnect(client)
 
 
-@given(gap=st.floats(0.0, 0.08), pad=st.floats(0.001, 0.01))
-def test_gap_and_finger_position_are_inverse(gap: float, pad: float) -> None:
-    position = finger_position(gap, pad)
-    assert pad_gap(position, -position, pad) == pytest.approx(gap, abs=1e-12)
-
-
-def test_the_pads_collision_shapes_stand_the_gap_apart(robot: tuple[int, int, dict[str, int]]) -> None:
+@pytest.mark.parametrize("gap", [0.005, 0.03, 0.075])
+def test_the_pads_collision_shapes_stand_the_gap_apart(robot: tuple[int, int, dict[str, int]], gap: float) -> None:
     client, body, links = robot
-    gap = 0.03
-    for finger, side in (("left", 1), ("right", -1)):
-        p.resetJointState(
-            body, links[f"{finger}_finger_link"], side * finger_position(gap, PAD), physicsClientId=client
-        )
+    for finger, position in VX300S.gripper_positions(gap).items():
+        p.resetJointState(body, links[f"{finger}_link"], position, physicsClientId=client)
     point = p.getClosestPoints(body, body, 0.1, links["left_pad"], links["right_pad"], physicsClientId=client)
     assert point[0][8] == pytest.approx(gap, abs=1e-4)
 
@@ -56,10 +50,10 @@ def test_the_pads_collision_shapes_stand_the_gap_apart(robot: tuple[int, int, di
 def test_the_tool_is_where_the_motion_room_believes(robot: tuple[int, int, dict[str, int]]) -> None:
     client, body, links = robot
     q = np.array([0.4, -0.5, 0.6, 0.3, 0.5, -0.7])
-    for name, value in zip(JOINT_LINKS, JOINT_SIGNS * q, strict=True):
+    for name, value in zip(JOINT_LINKS, VX300S.signs * q, strict=True):
         p.resetJointState(body, links[name], value, physicsClientId=client)
     pads = [p.getLinkState(body, links[f"{s}_pad"], 0, 1, physicsClientId=client)[4] for s in ("left", "right")]
-    expected = ArmKinematics(RigidTransform.identity()).tool(q).translation
+    expected = ArmKinematics(VX300S, RigidTransform.identity()).tool(q).translation
     np.testing.assert_allclose(np.mean(pads, axis=0), expected, atol=NEAR)
 
 
@@ -77,16 +71,16 @@ def test_the_camera_is_carried_by_a_bracket_that_nothing_can_touch(urdf: str) ->
 
 
 def test_an_arm_without_a_camera_has_no_camera_body() -> None:
-    assert "camera_body" not in robot_urdf(PAD, None)
+    assert "camera_body" not in robot_urdf(VX300S, None)
 
 
 def test_the_arms_are_dark_grey_and_lighter_than_the_cable(robot: tuple[int, int, dict[str, int]]) -> None:
     client, body, _ = robot
     colors = [shape[7][:3] for shape in p.getVisualShapeData(body, physicsClientId=client)]
-    arms = [c for c in colors if c == pytest.approx(ARM_COLOR)]
+    arms = [c for c in colors if c == pytest.approx(GRAY)]
     assert len(arms) >= 12
-    assert max(ARM_COLOR) < 0.5
-    assert 255 * min(ARM_COLOR) > OccupancyParameters().max_cable_brightness
+    assert max(GRAY) < 0.5
+    assert 255 * min(GRAY) > OccupancyParameters().max_cable_brightness
 
 
 def _size(shape: ET.Element) -> list[float]:

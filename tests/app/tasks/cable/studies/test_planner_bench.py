@@ -19,7 +19,6 @@ from regrasp.app.tasks.cable.studies.planner_bench import (
 )
 from regrasp.app.tasks.cable.studies.planner_queries import Query, draw_queries
 from regrasp.interfaces.arrays import FloatArray
-from regrasp.motion.planning.planner import WEIGHTS
 from regrasp.motion.scene.planning_scene import PlanningScene
 from regrasp.sim.world import World
 
@@ -65,7 +64,7 @@ def test_planners_are_asked_the_same_in_turn(world: World[Any], capsys: pytest.C
     answers = compare(queries, {"ours": ours, "fake": fake}, "two")
     assert asked == [(queries[0], 0), (queries[1], 1)]
     assert capsys.readouterr().err == "planner: two 1/2\nplanner: two 2/2\n"
-    lines = comparison_lines(answers)
+    lines = comparison_lines(answers, queries[0].model.kinematics.chain.levers)
     assert [line[:3] for line in lines[:2]] == [("ours", "2", "2"), ("fake", "2", "1")]
     path = answers["ours"][1].path
     assert path is not None
@@ -79,14 +78,14 @@ def test_times_count_all_queries_and_paths_those_that_all_solved() -> None:
         "a": [Answer(0.01, short), Answer(0.02, long), Answer(0.03, None)],
         "b": [Answer(0.1, short), Answer(0.2, None), Answer(0.3, short)],
     }
-    weighted = f"{WEIGHTS[0]:.2f}"
-    assert comparison_lines(answers) == [
-        ("a", "3", "2", "20.0", "1.0", "1.00", weighted),
-        ("b", "3", "2", "200.0", "10.0", "1.00", weighted),
+    levers = np.array([0.75, 0.75, 0.5, 0.25, 0.25, 0.12])
+    assert comparison_lines(answers, levers) == [
+        ("a", "3", "2", "20.0", "1.0", "1.00", "0.75"),
+        ("b", "3", "2", "200.0", "10.0", "1.00", "0.75"),
         ("a, not straight", "2", "1", "25.0", "1.0", "nan", "nan"),
         ("b, not straight", "2", "1", "250.0", "10.0", "nan", "nan"),
     ]
-    assert path_lengths(long) == pytest.approx((4.0, 4.0 * WEIGHTS[0]))
+    assert path_lengths(long, levers) == pytest.approx((4.0, 3.0))
 
 
 def test_without_the_package_one_line_says_how_to_get_it(
