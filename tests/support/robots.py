@@ -21,4 +21,5 @@ def thesis() -> Any:
     content = yaml.safe_load((files("regrasp.scenarios") / "cells/thesis.yaml").read_text(encoding="utf-8"))
     for arm in content["known"]["arms"]:
         arm["robot"] = VX300S
+        arm.setdefault("sleep", VX300S.sleep)
     return content

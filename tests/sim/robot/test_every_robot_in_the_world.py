@@ -23,7 +23,7 @@ EVERY_BASE = pytest.mark.parametrize("turn", [STANDING, HANGING], ids=["standing
 def arm_of(
     cell: CableCell, client: int, robot: Robot, turn: tuple[float, float, float]
 ) -> tuple[SimArm, ArmKinematics]:
-    spec = ArmSpec(name="one", robot=robot, base=(0.3, -0.2, 0.9), base_rpy_deg=turn)
+    spec = ArmSpec(name="one", robot=robot, base=(0.3, -0.2, 0.9), base_rpy_deg=turn, sleep=robot.sleep)
     known = KnownCell(boxes=(), arms=(spec,), cameras=(), latencies=cell.known.latencies)
     hidden = cell.hidden.model_copy(update={"gripper": GripperSpec()})  # as its file says
     arm = SimArm(client, Cell(known=known, hidden=hidden), "one", np.random.default_rng(0))
