@@ -36,7 +36,7 @@ class Triangles:
         """Points (m, 3) of the surface such that none of it lies farther than `spacing` m from the nearest one."""
         # A point of a triangle whose sides are at most `side` is within side / sqrt(3) of a corner; of the corners one
         # in each cube of this edge is kept, within edge * sqrt(3) of the others.
-        side, edge = 0.3 * spacing * np.sqrt(3.0), 0.7 * spacing / np.sqrt(3.0)
+        side, edge = 0.7 * spacing * np.sqrt(3.0), 0.3 * spacing / np.sqrt(3.0)
         points = _bisected(self.corners, side).reshape(-1, 3)
         cells = np.floor((points - points.min(axis=0)) / edge).astype(np.int64)
         keys = np.ravel_multi_index(tuple(cells.T), tuple(cells.max(axis=0) + 1))
@@ -57,13 +57,13 @@ def surfaces(root: ET.Element, shape: Shape = "collision") -> dict[str, Triangle
     return {name: surface for name, surface in found.items() if len(surface.corners)}
 
 
-def missing_meshes(root: ET.Element) -> Iterator[str]:
-    """A sentence for each mesh of a link whose file is missing."""
+def missing_meshes(root: ET.Element) -> Iterator[tuple[str, str]]:
+    """The link of each mesh whose file is missing, and a sentence that says so."""
     told = set()
     for link, path in urdf.mesh_files(root):
         if not path.is_file() and (link, path) not in told:
             told.add((link, path))
-            yield _is_missing(link, path)
+            yield link, _is_missing(link, path)
 
 
 def _surface(link: ET.Element, shape: Shape) -> Triangles:
@@ -133,5 +133,3 @@ def _bisected(corners: FloatArray, side: float) -> FloatArray:
         middle = 0.5 * (a + b)
         corners = np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])
     return np.concatenate([np.empty((0, 3, 3)), *done])
-
-

@@ -95,7 +95,7 @@ def _marked(cells: tuple[NDArray[np.int64], ...], shape: tuple[int, ...]) -> Mas
 
 
 def _grown(marked: Mask, voxels: int = 1) -> Mask:
-    return np.asarray(ndimage.binary_dilation(marked, np.ones((3, 3, 3)), iterations=voxels))
+    return np.asarray(ndimage.binary_dilation(marked, np.ones((3, 3, 3), bool), iterations=voxels))
 
 
 def _between(near: Mask) -> Mask:

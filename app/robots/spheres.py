@@ -96,7 +96,8 @@ def _cover(
 
     They are chosen by a part of the points, to which some of those that they leave out are added, until all are held.
     """
-    unseen, chosen, left = rng.permutation(points), np.empty((0, 4)), []
+    left: list[FloatArray] = []
+    unseen, chosen = rng.permutation(points), np.empty((0, 4))
     held = np.empty((0, len(spheres)), bool)
     while True:
         out = np.flatnonzero(~_held(chosen, unseen).any(axis=1))[: parameters.points]
