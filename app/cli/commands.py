@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from regrasp.app.cli import calibrate, migrate, records, run, scenarios, snapshot, trees
+from regrasp.app.cli import calibrate, migrate, records, robots, run, scenarios, snapshot, trees
 from regrasp.app.cli.options import EXIT_BAD_INPUT, EXIT_UNMET
 from regrasp.app.files.findings import Findings
 from regrasp.app.interrupts import EXIT_INTERRUPTED
@@ -21,6 +21,7 @@ COMMANDS = (  # in the order in which a newcomer uses them; those that only a ta
     "scenarios",
     "migrate",
     "trees",
+    "robots",
     "study",
     "doctor",
     "snapshot",
@@ -61,6 +62,7 @@ run.add_to(app)
 records.add_to(app)
 app.add_typer(scenarios.app, name="scenarios")
 app.add_typer(trees.app, name="trees")
+app.add_typer(robots.app, name="robots")
 study = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Run many episodes or scenes, and count.")
 app.add_typer(study, name="study")
 calibrate.add_to(app)

@@ -21,10 +21,15 @@ def load_robot(path: Path, where: Place | None = None) -> Robot:
 
     Raises `Findings`; if there is no such file, the finding stands at `where`, the place that names the robot.
     """
+    return read_robot(path, where)[0]
+
+
+def read_robot(path: Path, where: Place | None = None) -> tuple[Robot, Document]:
+    """As `load_robot`, with the document, which knows the lines."""
     document = _read(path, where)
     robot = validated(document, Robot)
     _check(document, robot)
-    return robot
+    return robot, document
 
 
 def robot_named(name: str, beside: Path, where: Place) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 import warnings
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -46,10 +47,10 @@ def load_cell(
     assignments = [_with_new_key(assignment) for assignment in assignments]
     if not isinstance(document.value, dict):  # only that is told, not the assignments
         validated(document, Cell)
-    robots = _put_robots(document, path.parent)
+    asleep: dict[int, Any] = {}
+    robots = _put_robots(document, path.parent, asleep)
     _, found = catch_findings(apply_assignments, document, assignments)
-    found = [*robots, *found, *_put_robots(document, path.parent)]
-    _put_sleep_poses(document)
+    found = [*robots, *found, *_put_robots(document, path.parent, asleep)]
     if task is None:
         task = find.task_named(_only_task(document, shown(path)))
     model = task.cell()
@@ -75,8 +76,11 @@ def tasks_of(path: Path, assignments: Sequence[Assignment] = (), where: Place | 
     return _sections(document)
 
 
-def _put_robots(document: Document, folder: Path) -> list[Finding]:
-    """Put the content of robot files in the place of their names; findings of files that cannot be read."""
+def _put_robots(document: Document, folder: Path, asleep: dict[int, Any]) -> list[Finding]:
+    """Put the content of robot files in the place of their names; findings of files that cannot be read.
+
+    An arm without a sleep pose gets its robot's, which is noted in `asleep`, and another when the robot is changed.
+    """
     found: list[Finding] = []
     arms = value_at(document.value, ("known", "arms"))
     for i, arm in enumerate(arms if isinstance(arms, list) else []):
@@ -86,16 +90,10 @@ def _put_robots(document: Document, folder: Path) -> list[Finding]:
         place = document.place(key if "robot" in arm else key[:-1])
         content, wrong = catch_findings(robot_named, name, folder, place)
         found += wrong
-        arm["robot"] = content if content is not None else robot_named(DEFAULT_ROBOT, folder, place)
+        robot = arm["robot"] = deepcopy(content or robot_named(DEFAULT_ROBOT, folder, place))
+        if arm.get("sleep") == asleep.get(i):
+            arm["sleep"] = asleep[i] = deepcopy(robot.get("sleep"))
     return found
-
-
-def _put_sleep_poses(document: Document) -> None:
-    """Give arms without a sleep pose that of their robot."""
-    arms = value_at(document.value, ("known", "arms"))
-    for arm in arms if isinstance(arms, list) else []:
-        if isinstance(arm, dict) and isinstance(robot := arm.get("robot"), dict) and "sleep" in robot:
-            arm.setdefault("sleep", robot["sleep"])
 
 
 def _task_findings(document: Document, cell: Cell, task: "Task", laid_out: bool) -> list[Finding]:

@@ -4,7 +4,17 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from regrasp.interfaces.fields import Force, Friction, JointAngle, Length, Model, Number, Size, Vector
+from regrasp.interfaces.fields import (
+    Force,
+    Friction,
+    JointAngle,
+    Length,
+    Model,
+    NotNegative,
+    Number,
+    Size,
+    Vector,
+)
 
 LinkName = Annotated[str, Field(min_length=1, max_length=80)]
 Sphere = tuple[Number, Number, Number, Annotated[float, Field(gt=0, le=2)]]  # centre and radius, m
@@ -148,3 +158,31 @@ class Footprint(Model):
 
     center: Vector
     size: Size
+
+
+class LinkCover(Model):
+    """What the spheres of one link promise, where that differs from the others."""
+
+    outside: NotNegative | None = None
+    excess: NotNegative | None = None
+
+
+class Cover(Model):
+    """What the spheres promise of the links' geometry; `regrasp robots check` measures it.
+
+    Spheres of links that are fixed to one another count together. No point of a moving link's geometry lies farther
+    than `outside` m out of the spheres, and no sphere stands out of it by more than `excess` m. Of links that stand
+    still, or only turn on the spot, nothing around is checked: they promise no excess, and without spheres nothing.
+    """
+
+    outside: NotNegative = 0.001
+    excess: NotNegative = 0.03
+    links: dict[LinkName, LinkCover] = Field(default_factory=dict)  # those that differ
+
+    def of(self, link: str) -> tuple[float, float]:
+        """What is promised of a link: `outside` and `excess`, m."""
+        own = self.links.get(link, LinkCover())
+        return (
+            self.outside if own.outside is None else own.outside,
+            self.excess if own.excess is None else own.excess,
+        )

@@ -18,6 +18,7 @@ from regrasp.interfaces.robot import urdf
 from regrasp.interfaces.robot.parts import (
     Attached,
     Calibration,
+    Cover,
     Footprint,
     Gripper,
     Joint,
@@ -86,6 +87,7 @@ class Robot(Model):
     spheres: dict[LinkName, tuple[Sphere, ...]]  # by link, in its frame
     # Pairs of links that can meet; links not named together are kept apart by the joints' limits.
     self_collision: tuple[tuple[LinkName, LinkName], ...]
+    cover: Cover = Cover()
     still: tuple[LinkName, ...] = ()  # links that turn on the spot, which nothing around can meet
     # Links that touch nothing in the world: PyBullet takes their hulls, which fill what is open between the fingers.
     untouchable: tuple[LinkName, ...] = ()

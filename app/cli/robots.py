@@ -1,0 +1,192 @@
+"""`regrasp robots`: list, show and check robots, and fit spheres to them."""
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from regrasp.app.files.findings import Finding, Findings, shown
+from regrasp.app.files.resources import resolve, shipped
+from regrasp.interfaces.quote import nearest, printable, quoted
+
+if TYPE_CHECKING:
+    from regrasp.app.robots.proposal import Margins
+    from regrasp.interfaces.robot.robot import Robot
+
+app = typer.Typer(
+    no_args_is_help=True, rich_markup_mode=None, help="List, show and check robots, and fit collision spheres."
+)
+Name = Annotated[str, typer.Argument(help="A shipped robot's name, or a path to a .yaml file.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print it as JSON, for a program; SI units.")]
+LEAST_MARGIN, MOST_MARGIN = 0.002, 0.2  # m; choice: below, a link takes hundreds of spheres, above, a room
+
+
+@app.command("list")
+def list_robots(as_json: AsJson = False) -> None:
+    """List the shipped robots.
+
+    A cell names one as its arm's robot; a file of your own may name one as its base and change some of it.
+    """
+    from regrasp.app.robots.robot_file import load_robot
+
+    robots = {name: load_robot(path) for name, path in shipped("robot").items()}
+    rows = [
+        {"name": name, "title": robot.title, "joints": len(robot.joint_names), "spheres": _count(robot)}
+        for name, robot in robots.items()
+    ]
+    if as_json:
+        typer.echo(json.dumps(rows, indent=2, ensure_ascii=False))
+        return
+    names, titles = (max(len(str(row[key])) for row in rows) for key in ("name", "title"))
+    for row in rows:
+        typer.echo(
+            f"{row['name']:<{names}}  {row['title']:<{titles}}  {row['joints']} joints, {row['spheres']} spheres"
+        )
+
+
+def _count(robot: "Robot") -> int:
+    return sum(map(len, robot.spheres.values()))
+
+
+@app.command("show")
+def show_robot(robot: Name, as_json: AsJson = False) -> None:
+    """Show a robot's joints, tool, gripper and reach.
+
+    Limits are those that hold: the file's, and where it gives none the URDF's.
+
+    \b
+    Example:
+      regrasp robots show ur5e
+    """
+    from regrasp.app.robots.description import described, described_in_words
+    from regrasp.app.robots.robot_file import load_robot
+
+    loaded = load_robot(resolve("robot", robot, Path()))
+    if as_json:
+        typer.echo(json.dumps(described(loaded), indent=2, ensure_ascii=False))
+        return
+    for line in described_in_words(loaded):
+        typer.echo(printable(line))
+
+
+@app.command("check")
+def check_robots(
+    files: Annotated[list[str] | None, typer.Argument(help="Names or paths; default all that are shipped.")] = None,
+) -> None:
+    """Check robot files, and measure how well their spheres cover the meshes.
+
+    Joints, links and packages that do not exist, mesh files that are missing, limits beyond the URDF's, poses
+    beyond the limits or in which the robot meets itself, and meshes that lie farther outside the spheres than the file's
+    section `cover` promises.
+
+    \b
+    Example:
+      regrasp robots check my/robot.yaml
+
+    \b
+    Exit code: 0 nothing is wrong, 2 findings, one a line:
+      file:line: what is wrong; what would be right
+    """
+    from regrasp.app.robots.check import check_robot
+
+    found: list[Finding] = []
+    for name in files or shipped("robot"):
+        try:
+            path = resolve("robot", name, Path())
+            measures = check_robot(path)
+        except Findings as error:
+            found += error.items
+            continue
+        outside = max((m.outside or 0.0 for m in measures if m.moves), default=0.0)
+        outside, excess = max(outside, 0.0), max((m.excess or 0.0 for m in measures if m.moves), default=0.0)
+        count = sum(m.spheres for m in measures)
+        cover = f"{count} spheres leave at most {1000 * outside:.1f} mm of a moving link outside"
+        typer.echo(f"{shown(path)}: ok, {cover} and stand out by at most {1000 * excess:.1f} mm")
+    if found:
+        raise Findings(found)
+
+
+@app.command("spheres")
+def fit_robot_spheres(
+    robot: Name,
+    margin: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="[LINKS=]M",
+            help="Metres that a sphere may stand out, 0.02 by default; of some links: gripper_*=0.008.",
+        ),
+    ] = None,
+    links: Annotated[
+        list[str] | None,
+        typer.Option(metavar="LINKS", help="Fit these links only, such as 'gripper_*'; repeat. Others keep theirs."),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", metavar="FILE", help="Write here instead of standard output.")
+    ] = None,
+) -> None:
+    """Fit collision spheres to a robot's meshes.
+
+    Prints the sections `cover`, `self_collision` and `spheres` of a robot file. The spheres hold all of each
+    link's collision geometry, and stand out of it by at most the margin: halve it, and there are about three times as
+    many. Planning takes time with their number; small margins pay at fingers, which go near things.
+
+    The pairs of self_collision are those links that meet in some of 5,000 random joint positions. The others never do,
+    always do, or are neighbours.
+
+    \b
+    Examples:
+      regrasp robots spheres my/robot.yaml
+      regrasp robots spheres my/robot.yaml --margin 0.03 --margin '*finger*=0.006' > spheres.yaml
+      regrasp robots spheres my/robot.yaml --links wrist_3_link --margin 0.01
+    """
+    from regrasp.app.files.whole_file import write_whole
+    from regrasp.app.robots.proposal import as_yaml, propose, table
+    from regrasp.app.robots.robot_file import read_robot
+    from regrasp.interfaces.robot.urdf import RobotError
+
+    margins = _margins(margin or [])
+    loaded, document = read_robot(resolve("robot", robot, Path()))
+    _known_links(loaded, [*(links or []), *(pattern for pattern, _ in margins.of_links)])
+    try:
+        proposal = propose(loaded, margins, links or (), lambda line: typer.echo(line, err=True))
+    except RobotError as error:
+        raise Findings([Finding(*document.place(error.path), str(error))]) from None
+    for line in table(proposal.measures):
+        typer.echo(line, err=True)
+    text = as_yaml(proposal)
+    if out is None:
+        typer.echo(text, nl=False)
+    else:
+        write_whole(out, text)
+
+
+def _margins(texts: list[str]) -> "Margins":
+    from regrasp.app.robots.proposal import Margins
+
+    general, of_links = Margins().general, []
+    for text in texts:
+        pattern, equals, number = text.rpartition("=")
+        try:
+            value = float(number)
+        except ValueError:
+            value = float("nan")
+        if not LEAST_MARGIN <= value <= MOST_MARGIN or (equals and not pattern):
+            right = (
+                f"write metres from {LEAST_MARGIN} to {MOST_MARGIN}, such as 0.02, or for some links gripper_*=0.008"
+            )
+            raise Findings([Finding("--margin", 0, f"{quoted(text)} is no margin; {right}")])
+        if pattern:
+            of_links.append((pattern, value))
+        else:
+            general = value
+    return Margins(general, tuple(of_links))
+
+
+def _known_links(robot: "Robot", patterns: list[str]) -> None:
+    from fnmatch import fnmatchcase
+
+    for pattern in patterns:
+        if not any(fnmatchcase(link, pattern) for link in robot.tree.links):
+            message = f"no link of the robot is named {quoted(pattern)}; {nearest(pattern, robot.tree.links)}"
+            raise Findings([Finding("--links" if "=" not in pattern else "--margin", 0, message)])

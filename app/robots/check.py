@@ -1,0 +1,113 @@
+"""What is wrong with a robot file beyond its form: its meshes, limits, poses and spheres."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from regrasp.app.files.findings import Finding, Findings
+from regrasp.app.files.yaml_lines import Document
+from regrasp.app.robots.cover import LinkMeasure, measure_cover
+from regrasp.app.robots.meshes import missing_meshes, surfaces
+from regrasp.app.robots.robot_file import read_robot
+from regrasp.app.robots.self_collision import meetings
+from regrasp.interfaces.robot.parts import Joint
+from regrasp.interfaces.robot.robot import Robot
+from regrasp.interfaces.robot.urdf import RobotError
+
+MEASURED_TO = 0.001  # m to which a cover is measured
+SELF_OVERLAP = 0.008  # m that spheres of one arm may overlap, as the planners allow it: they stand out of the meshes
+_CLOSE = 1e-6  # rad or m by which a limit may be rounded
+
+Found = tuple[tuple[str | int, ...], str]  # where in the file, and what
+
+
+def check_robot(path: Path) -> list[LinkMeasure]:
+    """The measured cover of a robot file in which nothing is wrong. Raises `Findings` otherwise."""
+    robot, document = read_robot(path)
+    _raise(document, [*_meshes(robot), *_limits(robot), *_poses(robot), *_names(robot)])
+    try:
+        measures = measure_cover(robot)
+    except RobotError as error:
+        raise Findings([Finding(*document.place(error.path), str(error))]) from None
+    _raise(document, [*_bare(robot, measures), *_cover(robot, measures)])
+    return measures
+
+
+def _raise(document: Document, found: list[Found]) -> None:
+    if found:
+        raise Findings([Finding(*document.place(path), message) for path, message in found])
+
+
+def _meshes(robot: Robot) -> Iterator[Found]:
+    for link, message in missing_meshes(robot.element()):
+        attached = robot.attached is not None and link.startswith(robot.attached.prefix or "\0")
+        yield (("attached", "urdf") if attached else ("urdf",)), message
+
+
+def _limits(robot: Robot) -> Iterator[Found]:
+    """Limits that the file sets beyond those of the URDF."""
+    for i, joint in enumerate(robot.joints):
+        known = dict(robot.tree.joints[joint.in_urdf].limits)
+        if robot.tree.joints[joint.in_urdf].kind == "continuous":
+            known = {key: value for key, value in known.items() if key not in ("lower", "upper")}
+        if joint.sign < 0:
+            ends = {"lower": known.get("upper"), "upper": known.get("lower")}
+            known |= {key: -value for key, value in ends.items() if value is not None}
+        for key, said, limit in _said(joint, known):
+            where = "below" if key == "lower" else "above"
+            yield ("joints", i, key), f"{key} {said:g} of {joint.name} is {where} the URDF's {limit:g}; stay within it"
+
+
+def _said(joint: Joint, known: dict[str, float]) -> Iterator[tuple[str, float, float]]:
+    words = {"lower": "lower", "upper": "upper", "speed": "velocity", "torque": "effort"}
+    for key, word in words.items():
+        said, limit = getattr(joint, key), known.get(word)
+        if said is not None and limit is not None and (limit - said if key == "lower" else said - limit) > _CLOSE:
+            yield key, said, limit
+
+
+def _poses(robot: Robot) -> Iterator[Found]:
+    """Poses of the file beyond the limits, or in which the robot meets itself."""
+    chain = robot.chain
+    named: list[tuple[tuple[str | int, ...], tuple[float, ...]]] = [(("sleep",), robot.sleep)]
+    named += [(("calibration", "poses", i), pose) for i, pose in enumerate(robot.calibration.poses)]
+    for path, pose in named:
+        values = np.array(pose)
+        out = np.flatnonzero((values < chain.lower - _CLOSE) | (values > chain.upper + _CLOSE))
+        for i in out:
+            ends = f"{chain.lower[i]:g} to {chain.upper[i]:g}"
+            yield path, f"{values[i]:g} of {chain.names[i]} is beyond its limits, {ends}; give one between them"
+        for (a, b), depth in meetings(robot, values, SELF_OVERLAP):
+            message = f"here the spheres of {a} and {b} overlap by {1000 * depth:.1f} mm; at most"
+            yield path, f"{message} {1000 * SELF_OVERLAP:.0f} mm are let pass: change the pose, or the spheres"
+
+
+def _names(robot: Robot) -> Iterator[Found]:
+    for link in robot.cover.links:
+        if link not in robot.tree.links:
+            yield ("cover", "links", link), f"the URDF has no link {link!r}"
+
+
+def _bare(robot: Robot, measures: list[LinkMeasure]) -> Iterator[Found]:
+    """Moving links of whose rigid group no link has spheres."""
+    geometry = surfaces(robot.element())
+    for m in measures:
+        if m.moves and not m.group and m.link in geometry:
+            yield ("spheres",), f"{m.link} has a mesh and moves, but no spheres; {_remedy(m.link)}"
+
+
+def _cover(robot: Robot, measures: list[LinkMeasure]) -> Iterator[Found]:
+    for m in measures:
+        outside, excess = robot.cover.of(m.link)
+        place = ("spheres", m.link) if m.link in robot.spheres else ("spheres",)
+        if m.outside is not None and m.outside > outside + MEASURED_TO:
+            message = f"spheres that leave a mesh uncovered: {m.link} lies up to {1000 * m.outside:.1f} mm outside"
+            yield place, f"{message}, and the cover promises {1000 * outside:.1f} mm; {_remedy(m.link)}"
+        if m.moves and m.excess is not None and m.excess > excess + MEASURED_TO:
+            message = f"the spheres of {m.link} stand out by up to {1000 * m.excess:.1f} mm"
+            yield place, f"{message}, and the cover promises {1000 * excess:.1f} mm; use more and smaller ones"
+
+
+def _remedy(link: str) -> str:
+    return f"`regrasp robots spheres FILE --links {link}` fits them"
