@@ -89,10 +89,7 @@ def _joints(document: Document, known: KnownCell) -> Iterator[Finding]:
 
 def _between_the_arms(known: KnownCell) -> float:
     """How deep (m) the arms asleep reach into each other, by the spheres that fill their moving links."""
-    bodies = []
-    for arm in known.arms:
-        moving = arm.robot.body.links > 0
-        bodies.append((sleeping_arm_cubes(arm)[0][moving], arm.robot.body.spheres[moving, 3]))
+    bodies = [(centers, np.sqrt(3) * halves) for centers, halves in map(sleeping_arm_cubes, known.arms)]
     deepest = [
         float((r[:, None] + s[None] - np.linalg.norm(a[:, None] - b[None], axis=2)).max(initial=0.0))
         for (a, r), (b, s) in combinations(bodies, 2)

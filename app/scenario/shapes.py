@@ -88,10 +88,15 @@ def fixed_cameras(cell: KnownCell) -> list[tuple[str, FloatArray]]:
 
 
 def sleeping_arm_cubes(arm: ArmSpec) -> tuple[FloatArray, FloatArray]:
-    """Centres (n, 3) and half edges (n,), m, of the cubes inside the spheres that fill an arm in its sleep pose."""
+    """Centres (n, 3) and half edges (n,), m, of the cubes inside the spheres that fill an arm in its sleep pose.
+
+    Its base, which stands on something, does not count.
+    """
     from regrasp.motion.robots.kinematics import ArmKinematics  # late: it brings the compiler
 
     body = arm.robot.body
-    frames = ArmKinematics(arm.robot, arm.world_from_base).link_frames(np.array(arm.sleep))[body.links]
-    centers = np.einsum("nij,nj->ni", frames[:, :3, :3], body.spheres[:, :3]) + frames[:, :3, 3]
-    return centers, body.spheres[:, 3] / np.sqrt(3)
+    moving = body.links > 0
+    spheres = body.spheres[moving]
+    frames = ArmKinematics(arm.robot, arm.world_from_base).link_frames(np.array(arm.sleep))[body.links[moving]]
+    centers = np.einsum("nij,nj->ni", frames[:, :3, :3], spheres[:, :3]) + frames[:, :3, 3]
+    return centers, spheres[:, 3] / np.sqrt(3)

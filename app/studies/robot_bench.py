@@ -169,12 +169,12 @@ def _planning(
 
 
 def _plan_all(model: CollisionModel, ends: FloatArray, margin: float) -> tuple[list[float], list[FloatArray]]:
-    """Seconds that each query took, and the paths that were found."""
-    seconds, paths = [], []
+    """Seconds that each query took, and the paths that were found: from a start to where the tool is at a goal."""
+    seconds, paths, kin = [], [], model.kinematics
     for n, (start, goal) in enumerate(zip(*ends, strict=True)):
         began = time.perf_counter()
         with suppress(PlanningError):
-            paths.append(plan(model, start, goal[None], n, margin))
+            paths.append(plan(model, start, kin.ik(kin.tool_matrix(goal), start), n, margin))
         seconds.append(time.perf_counter() - began)
     return seconds, paths
 

@@ -123,13 +123,17 @@ class ArmKinematics:
         """As `ik`, for the pose (4, 4) of the tip."""
         if not self._rail:
             return self._answers(world_from_tip, near, 0.0)
-        places = np.linspace(self.lower[0], self.upper[0], self._parameters.rail_places)
-        if near is not None:
-            here = self._answers(world_from_tip, near, near[0])
-            if len(here):
-                return here
-            places = places[np.argsort(np.abs(places - near[0]), kind="stable")]
-        return np.concatenate([self._answers(world_from_tip, near, place) for place in places])
+        if near is not None and len(here := self._answers(world_from_tip, near, near[0])):
+            return here
+        found = np.empty((0, len(self)))
+        for count in self._parameters.rail_places:
+            places = np.linspace(self.lower[0], self.upper[0], count)
+            if near is not None:
+                places = places[np.argsort(np.abs(places - near[0]), kind="stable")]
+            found = np.concatenate([self._answers(world_from_tip, near, place) for place in places])
+            if len(found):
+                break
+        return found
 
     def solve(self, world_from_tip: FloatArray) -> FloatArray:
         """All solutions (k, n) for the tip's pose (4, 4), wrapped, whatever the limits; with a rail at zero."""
