@@ -109,11 +109,11 @@ MISTAKES = [
         ("    seconds: 1.0", "    secnds: 1.0", "unknown key 'secnds'; did you mean 'seconds'?"),
         ("      carried: [0.3, 0.8]", "      carried: [0.8, 0.3]", "faults.0.when.carried: runs backwards; put the"),
         ("      carried: [0.3, 0.8]", "      caried: [0.3, 0.8]", "unknown key 'caried'; did you mean 'carried'?"),
-        ("    joint: elbow", "    joint: elbo", "faults.1.joint: no 'elbo'; did you mean 'elbow'?"),
+        ("    joint: elbow", "    joint: elbo", "the right arm has no joint 'elbo'; did you mean 'elbow'?"),
         (
             "    joint: elbow",
             "    ",
-            "key 'joint' is missing in faults.1; expected one of waist, shoulder",
+            "key 'joint' is missing in faults.1; expected text",
             "  - type: joint_stalls",
         ),
         ("      node: settle", "      node: setle", "no node 'setle' in tree.xml; did you mean 'settle'?"),
