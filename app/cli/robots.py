@@ -77,8 +77,8 @@ def check_robots(
     """Check robot files, and measure how well their spheres cover the meshes.
 
     Joints, links and packages that do not exist, mesh files that are missing, limits beyond the URDF's, poses
-    beyond the limits or in which the robot meets itself, and meshes that lie farther outside the spheres than the file's
-    section `cover` promises.
+    beyond the limits or in which the robot meets itself, and meshes that lie farther outside the spheres than
+    the file's section `cover` promises.
 
     \b
     Example:

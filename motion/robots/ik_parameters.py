@@ -17,5 +17,5 @@ class InverseKinematicsParameters:
     roll: float = 1e-4  # rad of the last joint at which a camera's roll has converged
     roll_iterations: int = 20  # choice: bounds the time spent on a pose that it does not reach
     roll_starts: tuple[float, ...] = (0.0, 0.5 * np.pi, -0.5 * np.pi, np.pi)  # rad from which a camera's roll is sought
-    # Along a rail, from which an arm is tried, and more where it reaches from none; choice: 0.27 to 0.01 m apart on 3 m.
+    # Along a rail, from which an arm is tried, and more where it reaches from none; choice: 0.27 to 0.02 m apart on 3 m
     rail_places: tuple[int, ...] = (13, 49, 193)

@@ -161,3 +161,31 @@ def test_two_packages_with_one_task_are_told(tmp_path: Path) -> None:
     checked = regrasp("scenarios", "check", PRESS, folder=tmp_path)
     assert checked.returncode == 2
     assert "2 packages put it in, " in checked.stderr
+
+
+def test_another_robot_presses_it_by_one_change_of_the_cell(tmp_path: Path) -> None:
+    change = "cell.known.arms.0.robot=ur5e"
+    ran = regrasp("run", PRESS, "--quiet", "--set", change, "--out", str(tmp_path / "run"))
+    assert ran.returncode == 0, ran.stdout + ran.stderr
+    assert "✓ pressed: True (expected: True)" in ran.stdout
+
+
+THREE_ARMS = f"""
+base: {HERE / "cell.yaml"}
+known:
+  arms:
+    - {{name: solo, robot: ur5e_rail, base: [0.1, -1.2, 1.3], base_rpy_deg: [0.0, 180.0, 0.0]}}
+    - {{name: left, robot: vx300s, base: [0.0, 0.8, 0.0]}}
+    - {{name: right, robot: vx300s, base: [0.0, -0.8, 0.0]}}
+"""
+
+
+def test_an_arm_that_hangs_from_a_rail_presses_it_between_two_of_another_kind(tmp_path: Path) -> None:
+    (tmp_path / "cell.yaml").write_text(THREE_ARMS, encoding="utf-8")
+    change = f"cell={tmp_path / 'cell.yaml'}"
+    ran = regrasp("run", PRESS, "--quiet", "--set", change, "--out", str(tmp_path / "run"))
+    assert ran.returncode == 0, ran.stdout + ran.stderr
+    assert "✓ pressed: True (expected: True)" in ran.stdout
+    page = regrasp("explain", str(tmp_path / "run")).stdout
+    rail = next(line for line in page.splitlines() if line.strip().startswith("joints")).split("(")[1].split(",")[0]
+    assert float(rail) > 0.5  # the base stands 1.2 m beside the button, farther than the arm reaches
