@@ -12,7 +12,8 @@ from regrasp.interfaces.robot.robot import Chain
 class Reach:
     """What the tool reached in many random joint positions. Metres.
 
-    `nearest` and `farthest` are its distances from the shoulder, which is where the second joint sits. `lowest` and `highest` are heights over the base's origin, along the base's z. A rail does not count.
+    `nearest` and `farthest` are its distances from the shoulder, which is where the second joint sits. `lowest` and
+    `highest` are heights over the base's origin, along the base's z. A rail does not count.
     """
 
     nearest: float
