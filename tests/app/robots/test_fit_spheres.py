@@ -56,7 +56,7 @@ def test_spheres_hold_a_cylinder_and_keep_the_margin() -> None:
 
     def outside(points: FloatArray) -> FloatArray:
         across = np.maximum(np.linalg.norm(points[:, :2], axis=1) - radius, 0.0)
-        return np.hypot(across, np.maximum(np.abs(points[:, 2]) - height / 2, 0.0))
+        return np.asarray(np.hypot(across, np.maximum(np.abs(points[:, 2]) - height / 2, 0.0)))
 
     assert uncovered(cylinder.samples(0.003), spheres) <= 0.0
     assert excess(spheres, outside) <= MARGIN + 1e-4  # the mesh's sides lie 0.06 mm inside the cylinder
@@ -70,7 +70,7 @@ def test_spheres_of_an_angle_leave_its_notch_open() -> None:
     spheres = fit_spheres(angle, FitParameters(margin=MARGIN))
 
     def outside(points: FloatArray) -> FloatArray:
-        return np.min([out_of_box(points, *map(np.array, part)) for part in parts], axis=0)
+        return np.asarray(np.min([out_of_box(points, *map(np.array, part)) for part in parts], axis=0))
 
     assert uncovered(angle.samples(0.003), spheres) <= 0.0
     assert excess(spheres, outside) <= MARGIN
