@@ -76,9 +76,9 @@ def check_robots(
 ) -> None:
     """Check robot files, and measure how well their spheres cover the meshes.
 
-    Joints, links and packages that do not exist, mesh files that are missing, limits beyond the URDF's, poses
-    beyond the limits or in which the robot meets itself, and meshes that lie farther outside the spheres than
-    the file's section `cover` promises.
+    Finds joints, links and packages that do not exist, mesh files that are missing, limits beyond the URDF's, poses
+    beyond the limits or in which the robot meets itself, and meshes that lie farther outside the spheres than the
+    file's section `cover` promises.
 
     \b
     Example:
@@ -128,8 +128,8 @@ def fit_robot_spheres(
     """Fit collision spheres to a robot's meshes.
 
     Prints the sections `cover`, `self_collision` and `spheres` of a robot file. The spheres hold all of each
-    link's collision geometry, and stand out of it by at most the margin: halve it, and there are about three times as
-    many. Planning takes time with their number; small margins pay at fingers, which go near things.
+    link's collision geometry, and stand out of it by at most the margin: with half of it there are three to five times
+    as many. Planning takes time with their number; small margins pay at fingers, which go near things.
 
     The pairs of self_collision are those links that meet in some of 5,000 random joint positions. The others never do,
     always do, or are neighbours.
@@ -147,7 +147,8 @@ def fit_robot_spheres(
 
     margins = _margins(margin or [])
     loaded, document = read_robot(resolve("robot", robot, Path()))
-    _known_links(loaded, [*(links or []), *(pattern for pattern, _ in margins.of_links)])
+    _known_links(loaded, links or [], "--links")
+    _known_links(loaded, [pattern for pattern, _ in margins.of_links], "--margin")
     try:
         proposal = propose(loaded, margins, links or (), lambda line: typer.echo(line, err=True))
     except RobotError as error:
@@ -183,10 +184,10 @@ def _margins(texts: list[str]) -> "Margins":
     return Margins(general, tuple(of_links))
 
 
-def _known_links(robot: "Robot", patterns: list[str]) -> None:
+def _known_links(robot: "Robot", patterns: list[str], option: str) -> None:
     from fnmatch import fnmatchcase
 
     for pattern in patterns:
         if not any(fnmatchcase(link, pattern) for link in robot.tree.links):
             message = f"no link of the robot is named {quoted(pattern)}; {nearest(pattern, robot.tree.links)}"
-            raise Findings([Finding("--links" if "=" not in pattern else "--margin", 0, message)])
+            raise Findings([Finding(option, 0, message)])

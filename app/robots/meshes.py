@@ -107,6 +107,8 @@ def _read(link: str, path: Path) -> FloatArray:
         mesh: Any = trimesh.load(str(path), force="mesh", process=False, skip_materials=True)
     except Exception as error:  # whatever its readers raise for a file that they do not like
         raise RobotError(("urdf",), f"the mesh {path} of the link {link} cannot be read: {error}") from None
+    if not len(mesh.triangles):
+        raise RobotError(("urdf",), f"the mesh {path} of the link {link} has no triangles; export it again")
     return np.asarray(mesh.triangles, float)
 
 

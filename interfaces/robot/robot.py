@@ -396,7 +396,7 @@ def _finger_ways(robot: Robot) -> dict[str, FloatArray]:
     if isinstance(robot.gripper, LinkageGripper):
         return {}
     ways = {}
-    for link in robot.spheres:
+    for link in (link for link in robot.spheres if link in robot.tree.links):
         for name, side in zip(robot.gripper.joints, (1.0, -1.0), strict=True):
             joint = next((joint for joint in robot.tree.way_to(link) if joint.name == name), None)
             if joint is not None:

@@ -1,0 +1,109 @@
+from pathlib import Path
+
+import pytest
+from toy_robot import ROBOT, URDF, write_robot
+
+from regrasp.app.files.findings import Findings
+from regrasp.app.files.resources import shipped
+from regrasp.app.robots.check import check_robot
+
+
+@pytest.mark.parametrize("name", list(shipped("robot")))
+def test_the_shipped_robots_keep_what_their_cover_promises(name: str) -> None:
+    measures = check_robot(shipped("robot")[name])
+    assert sum(m.spheres for m in measures) > 50
+    assert all(m.group for m in measures if m.moves)
+
+
+def test_a_right_file_has_its_cover_measured(tmp_path: Path) -> None:
+    found = {m.link: m for m in check_robot(write_robot(tmp_path))}
+    assert {link: m.spheres for link, m in found.items()} == {"base": 0, "upper": 7, "lower": 5, "left": 1, "right": 1}
+    assert found["base"].outside is None
+    upper = found["upper"]  # a bar of 60 by 60 mm in spheres of 60 mm radius, 50 mm apart; their middles on its axis
+    assert upper.outside is not None
+    assert -0.015 < upper.outside < 0.0
+    assert upper.excess == pytest.approx(0.06, abs=1e-3)  # past its ends
+
+
+WRONG = {
+    "a joint that the URDF has not": (("name: bend", "name: bent"), "- {name: be", ["no joint 'bent'", "'bend'"]),
+    "a tool on no link": (
+        ("link: lower, xyz", "link: flange, xyz"),
+        "tool:",
+        ["no link 'flange'", "base, left, lower"],
+    ),
+    "no such package": (("{path: toy.urdf}", "{package: toy_models, path: a}"), "urdf:", ["no package toy_models"]),
+    "no such URDF": (("path: toy.urdf", "path: tory.urdf"), "urdf:", ["no file tory.urdf"]),
+    "a limit beyond the URDF's": (("lower: -1.5", "lower: -2.5"), "- {name: be", ["lower -2.5 of bend", "URDF's -2;"]),
+    "limits in the wrong order": (
+        ("lower: -1.5", "lower: 2.5, upper: 1"),
+        "- {name: be",
+        ["lower 2.5 is not below upper 1"],
+    ),
+    "a limit above what the URDF leaves": (
+        ("lower: -1.5", "lower: 2.5"),
+        "- {name: be",
+        ["from 2.5 to 2 by file and URDF"],
+    ),
+    "a pose beyond the limits": (("sleep: [0.0, 1.0]", "sleep: [0.0, 2.1]"), "sleep:", ["2.1 of bend", "-1.5 to 2"]),
+    "a pose with a value too few": (("sleep: [0.0, 1.0]", "sleep: [0.0]"), "sleep:", ["1 values", "turn, bend"]),
+    "spheres on no link": (("  lower: [[0", "  lover: [[0"), "  lover:", ["no link 'lover'", "'lower'"]),
+    "spheres that leave a mesh uncovered": (
+        ("0.06], [0, 0, 0.3, 0.06]]", "0.06]]"),
+        "  upper:",
+        ["spheres that leave a mesh uncovered: upper lies up to", "--links upper"],
+    ),
+    "a moving link without spheres": (
+        ("  left: [[0, 0, 0, 0.03]]\n", ""),
+        "spheres:",
+        ["left has a mesh", "no spheres"],
+    ),
+    "spheres that stand out": (
+        ("cover: {excess: 0.06}", "cover: {excess: 0.04}"),
+        "  upper:",
+        ["upper stand out by up to 59.9"],
+    ),
+    "a promise for no link": (("excess: 0.06}", "links: {uper: {}}}"), "cover:", ["no link 'uper'"]),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_each_mistake_is_a_line_with_its_place(case: str, tmp_path: Path) -> None:
+    (right, wrong), place, words = WRONG[case]
+    assert ROBOT.count(right) == 1, right
+    text = ROBOT.replace(right, wrong)
+    path, line = write_robot(tmp_path, text), text[: text.index(place)].count("\n") + 1
+    with pytest.raises(Findings) as error:
+        check_robot(path)
+    first = error.value.items[0]
+    assert (Path(first.source).name, first.line) == ("toy.yaml", line), first
+    for word in words:
+        assert word in first.message
+
+
+def test_a_missing_mesh_names_link_and_file(tmp_path: Path) -> None:
+    path = write_robot(tmp_path)
+    (tmp_path / "upper.stl").unlink()
+    with pytest.raises(Findings) as error:
+        check_robot(path)
+    (finding,) = error.value.items
+    assert finding.line == 2
+    assert f"the mesh {tmp_path / 'upper.stl'} of the link upper is missing" in finding.message
+
+
+def test_a_mesh_that_is_none_is_told(tmp_path: Path) -> None:
+    path = write_robot(tmp_path)
+    (tmp_path / "upper.stl").write_text("no triangles")
+    with pytest.raises(Findings) as error:
+        check_robot(path)
+    (finding,) = error.value.items
+    assert (finding.line, "upper" in finding.message) == (2, True)
+
+
+def test_a_pose_in_which_the_robot_meets_itself_is_told(tmp_path: Path) -> None:
+    text = ROBOT.replace("self_collision: []", "self_collision: [[upper, left]]")
+    path = write_robot(tmp_path, text.replace("sleep: [0.0, 1.0]", "sleep: [0.0, 3.0]"))
+    (tmp_path / "toy.urdf").write_text(URDF.replace('lower="-2" upper="2"', 'lower="-3.1" upper="3.1"'))
+    with pytest.raises(Findings) as error:
+        check_robot(path)
+    assert "the spheres of upper and left overlap by" in error.value.items[0].message
