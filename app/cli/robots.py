@@ -50,19 +50,29 @@ def _count(robot: "Robot") -> int:
 
 
 @app.command("show")
-def show_robot(robot: Name, as_json: AsJson = False) -> None:
+def show_robot(
+    robot: Name,
+    as_json: AsJson = False,
+    picture: Annotated[
+        Path | None, typer.Option(help="Also write a PNG file: the robot asleep, and its spheres beside it.")
+    ] = None,
+) -> None:
     """Show a robot's joints, tool, gripper and reach.
 
     Limits are those that hold: the file's, and where it gives none the URDF's.
 
     \b
     Example:
-      regrasp robots show ur5e
+      regrasp robots show ur5e --picture runs/ur5e.png
     """
     from regrasp.app.robots.description import described, described_in_words
     from regrasp.app.robots.robot_file import load_robot
 
     loaded = load_robot(resolve("robot", robot, Path()))
+    if picture is not None:
+        from regrasp.app.robots.picture import write_picture  # late: it brings the renderer
+
+        write_picture(loaded, picture)
     if as_json:
         typer.echo(json.dumps(described(loaded), indent=2, ensure_ascii=False))
         return

@@ -2,6 +2,8 @@ import json
 from pathlib import Path
 from typing import Any
 
+import cv2
+import numpy as np
 import pytest
 import yaml
 from toy_robot import ROBOT, write_robot
@@ -112,3 +114,15 @@ def test_a_missing_mesh_ends_the_fit_with_a_line(tmp_path: Path) -> None:
     ran = invoke("spheres", "toy.yaml")
     assert (ran.exit_code, ran.stderr.count("\n")) == (2, 1)
     assert ran.stderr.startswith("toy.yaml:2: the mesh ")
+
+
+def test_a_picture_shows_the_robot_and_its_spheres(tmp_path: Path) -> None:
+    file = tmp_path / "pictures" / "ur5e.png"
+    shown = invoke("show", "ur5e", "--picture", str(file))
+    assert shown.exit_code == 0, shown.output
+    picture = cv2.imread(str(file))
+    assert picture is not None
+    robot, spheres = np.split(picture.astype(int), 2, axis=1)
+    drawn = [np.abs(half - half[0, 0]).sum(axis=2) > 30 for half in (robot, spheres)]  # what is no background
+    assert drawn[0].mean() > 0.05
+    assert drawn[1][drawn[0]].mean() > 0.98  # the spheres cover it

@@ -1,0 +1,106 @@
+"""A picture of a robot asleep, and of the spheres that stand for it in collision checks."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import pybullet as p
+from numpy.typing import NDArray
+from scipy.spatial.transform import RigidTransform, Rotation
+
+from regrasp.interfaces.arrays import FloatArray
+from regrasp.interfaces.fields import Color, Vector
+from regrasp.interfaces.frame import Intrinsics
+from regrasp.interfaces.robot.robot import Robot
+from regrasp.sim.render.renderer import LightState, make_renderer
+from regrasp.sim.render.visuals import Visuals
+from regrasp.sim.robot.load import joint_numbers, load_robot_body
+
+
+@dataclass(frozen=True)
+class PortraitParameters:
+    """What a portrait looks like; all is choice."""
+
+    size: int = 640  # pixels, of each half
+    field_deg: float = 35.0
+    seen_from: Vector = (1.0, -0.8, 0.6)  # direction from the robot to the camera, of any length
+    light_from: Vector = (0.6, -0.9, 1.0)  # direction from the robot to the light, of any length
+    largest: float = 0.25  # m; a larger sphere, of which only a cap stands for something, is left out
+    still: Color = (0.55, 0.55, 0.58)  # of spheres that nothing around can meet
+    colors: tuple[Color, ...] = ((0.85, 0.45, 0.2), (0.2, 0.5, 0.8))  # of the other links' spheres, in turn
+
+
+def portrait(robot: Robot, parameters: PortraitParameters = PortraitParameters()) -> NDArray[np.uint8]:
+    """The picture (size, 2 size, 3) RGB: the robot at the left, its spheres at the right."""
+    links, spheres = _placed_spheres(robot, parameters.largest)
+    middle = 0.5 * (spheres[:, :3].min(axis=0) + spheres[:, :3].max(axis=0))
+    radius = float(np.max(np.linalg.norm(spheres[:, :3] - middle, axis=1) + spheres[:, 3]))
+    camera = _camera(middle, radius, parameters)
+    return np.hstack(
+        [
+            _drawn(lambda client: _place_robot(client, robot), camera, parameters),
+            _drawn(lambda client: _place_spheres(client, robot, links, spheres, parameters), camera, parameters),
+        ]
+    )
+
+
+def _positions(robot: Robot) -> dict[str, float]:
+    """Positions of the URDF's joints with the robot asleep and the jaw open."""
+    asleep = dict(zip(robot.urdf_joints, (robot.signs * robot.asleep).tolist(), strict=True))
+    return asleep | robot.gripper_positions(robot.gripper.opening)
+
+
+def _placed_spheres(robot: Robot, largest: float) -> tuple[NDArray[np.int64], FloatArray]:
+    """Of spheres up to `largest` m: the chain's links (n,), centres and radii (n, 4), m, in the URDF's root frame."""
+    positions, rows = _positions(robot), []
+    for link, group in robot.spheres.items():
+        pose = robot.tree.frame(link, positions)
+        for x, y, z, radius in group:
+            rows.append([*(pose[:3, :3] @ (x, y, z) + pose[:3, 3]), radius])
+    spheres = np.array(rows)
+    shown = spheres[:, 3] <= largest
+    return robot.body.links[shown], spheres[shown]
+
+
+def _place_robot(client: int, robot: Robot) -> None:
+    body, _ = load_robot_body(client, robot, RigidTransform.from_matrix(robot.tree.frame(robot.base_link)))
+    joints = joint_numbers(client, body)
+    for name, position in _positions(robot).items():
+        p.resetJointState(body, joints[name], position, physicsClientId=client)
+
+
+def _place_spheres(
+    client: int, robot: Robot, links: NDArray[np.int64], spheres: FloatArray, parameters: PortraitParameters
+) -> None:
+    for (x, y, z, radius), link in zip(spheres.tolist(), links.tolist(), strict=True):
+        moving = link >= robot.body.first_moving
+        color = parameters.colors[link % len(parameters.colors)] if moving else parameters.still
+        shape = p.createVisualShape(p.GEOM_SPHERE, radius=radius, rgbaColor=[*color, 1], physicsClientId=client)
+        p.createMultiBody(0, -1, shape, [x, y, z], physicsClientId=client)
+
+
+def _drawn(
+    place: Callable[[int], None], world_from_camera: RigidTransform, parameters: PortraitParameters
+) -> NDArray[np.uint8]:
+    client = p.connect(p.DIRECT)
+    try:
+        place(client)
+        visuals = Visuals(client)
+        renderer = make_renderer(visuals)
+        intrinsics = Intrinsics.from_fov(parameters.size, parameters.size, float(np.deg2rad(parameters.field_deg)))
+        light = LightState(parameters.light_from, 0.5, 0.5)
+        picture = renderer.render_color(visuals.snapshot(), world_from_camera, intrinsics, light)
+        renderer.close()
+    finally:
+        p.disconnect(client)
+    return picture
+
+
+def _camera(middle: FloatArray, radius: float, parameters: PortraitParameters) -> RigidTransform:
+    """world_from_camera (x right, y down, z forward): it looks at the middle of what fits into a ball of `radius` m."""
+    away = np.array(parameters.seen_from) / np.linalg.norm(parameters.seen_from)
+    right = np.cross(-away, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    turn = np.column_stack([right, np.cross(-away, right), -away])
+    distance = radius / np.sin(np.deg2rad(parameters.field_deg) / 2)
+    return RigidTransform.from_components(middle + distance * away, Rotation.from_matrix(turn))
