@@ -1,4 +1,4 @@
-"""What is wrong with a robot file beyond its form: its meshes, limits, poses and spheres."""
+"""What is wrong with a robot file beyond its form and its URDF: its limits, poses and spheres."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -8,7 +8,7 @@ import numpy as np
 from regrasp.app.files.findings import Finding, Findings
 from regrasp.app.files.yaml_lines import Document
 from regrasp.app.robots.cover import LinkMeasure, measure_cover
-from regrasp.app.robots.meshes import missing_meshes, surfaces
+from regrasp.app.robots.meshes import surfaces
 from regrasp.app.robots.robot_file import read_robot
 from regrasp.app.robots.self_collision import meetings
 from regrasp.interfaces.robot.parts import Joint
@@ -25,7 +25,7 @@ Found = tuple[tuple[str | int, ...], str]  # where in the file, and what
 def check_robot(path: Path) -> list[LinkMeasure]:
     """The measured cover of a robot file in which nothing is wrong. Raises `Findings` otherwise."""
     robot, document = read_robot(path)
-    _raise(document, [*_meshes(robot), *_limits(robot), *_poses(robot), *_names(robot)])
+    _raise(document, [*_limits(robot), *_poses(robot), *_names(robot)])
     try:
         measures = measure_cover(robot)
     except RobotError as error:
@@ -37,12 +37,6 @@ def check_robot(path: Path) -> list[LinkMeasure]:
 def _raise(document: Document, found: list[Found]) -> None:
     if found:
         raise Findings([Finding(*document.place(path), message) for path, message in found])
-
-
-def _meshes(robot: Robot) -> Iterator[Found]:
-    for link, message in missing_meshes(robot.element()):
-        attached = robot.attached is not None and link.startswith(robot.attached.prefix or "\0")
-        yield (("attached", "urdf") if attached else ("urdf",)), message
 
 
 def _limits(robot: Robot) -> Iterator[Found]:

@@ -1,5 +1,6 @@
 """Reads and checks robot files."""
 
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,7 @@ from regrasp.app.files.overrides import merge_into
 from regrasp.app.files.resources import read_text, resolve
 from regrasp.app.files.validation import validated
 from regrasp.app.files.yaml_lines import Document, Place, parse
+from regrasp.app.robots.meshes import missing_meshes
 from regrasp.interfaces.quote import quoted
 from regrasp.interfaces.robot.robot import Robot
 from regrasp.interfaces.robot.urdf import RobotError
@@ -34,16 +36,23 @@ def read_robot(path: Path, where: Place | None = None) -> tuple[Robot, Document]
 
 def robot_named(name: str, beside: Path, where: Place) -> dict[str, Any]:
     """The content of the robot file that a cell in the folder `beside` names. Raises `Findings`, as `load_robot`."""
-    return _content(resolve("robot", name, beside, where).resolve(), where)
+    path = resolve("robot", name, beside, where).resolve()
+    return _content(path, path.stat().st_mtime_ns if path.exists() else 0, where)
 
 
 @cache
-def _content(path: Path, where: Place) -> dict[str, Any]:
+def _content(path: Path, changed: int, where: Place) -> dict[str, Any]:
     return load_robot(path, where).model_dump(mode="json", exclude_unset=True)
 
 
-def _read(path: Path, where: Place | None) -> Document:
-    """The document, on top of the robot that it names as its `base`."""
+def _missing_meshes(document: Document, robot: Robot) -> Iterator[Finding]:
+    for link, message in missing_meshes(robot.element()):
+        attached = robot.attached is not None and link.startswith(robot.attached.prefix or "\0")
+        yield Finding(*document.place(("attached", "urdf") if attached else ("urdf",)), message)
+
+
+def _read(path: Path, where: Place | None, above: tuple[Path, ...] = ()) -> Document:
+    """The document, on top of the robot that it names as its `base`; the files `above` stand on this one."""
     document = parse(read_text(path, where), shown(path))
     value = document.value
     if isinstance(value, dict) and "folder" not in value and _is_beside(value):
@@ -53,7 +62,10 @@ def _read(path: Path, where: Place | None) -> Document:
     name, place = value.pop("base"), document.place(("base",))
     if not isinstance(name, str):
         raise Findings([Finding(*place, f"base is {quoted(name)}; expected the name of a robot or a path to its file")])
-    below = _read(resolve("robot", name, path.parent, place), place)
+    base = resolve("robot", name, path.parent, place).resolve()
+    if base in (path.resolve(), *above):
+        raise Findings([Finding(*place, f"base is {quoted(name)}, which stands on this robot itself; name another")])
+    below = _read(base, place, (path.resolve(), *above))
     merge_into(below, document)
     return below
 
@@ -74,7 +86,7 @@ def _check(document: Document, robot: Robot) -> None:
         _ = robot.body
     except RobotError as error:
         raise Findings([Finding(*document.place(error.path), str(error))]) from None
-    found = []
+    found = [*_missing_meshes(document, robot)]
     poses = enumerate(robot.calibration.poses)
     rows = [(("sleep",), robot.sleep), *((("calibration", "poses", i), pose) for i, pose in poses)]
     for path, row in rows:

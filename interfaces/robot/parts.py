@@ -149,7 +149,7 @@ class Calibration(Model):
     The stated error is the tool's mean over the `poses`.
     """
 
-    poses: tuple[tuple[JointAngle, ...], ...]
+    poses: Annotated[tuple[tuple[JointAngle, ...], ...], Field(min_length=1)]
     encoder_step: Annotated[float, Field(gt=0, le=0.1)] = 1e-4  # rad
 
 
