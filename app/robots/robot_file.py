@@ -46,9 +46,12 @@ def _content(path: Path, changed: int, where: Place) -> dict[str, Any]:
 
 
 def _missing_meshes(document: Document, robot: Robot) -> Iterator[Finding]:
-    for link, message in missing_meshes(robot.element()):
+    missing = [*missing_meshes(robot.element())]
+    if missing:
+        link, message = missing[0]
         attached = robot.attached is not None and link.startswith(robot.attached.prefix or "\0")
-        yield Finding(*document.place(("attached", "urdf") if attached else ("urdf",)), message)
+        more = f" ({len(missing) - 1} more are missing)" if missing[1:] else ""
+        yield Finding(*document.place(("attached", "urdf", "path") if attached else ("urdf", "path")), message + more)
 
 
 def _read(path: Path, where: Place | None, above: tuple[Path, ...] = ()) -> Document:
