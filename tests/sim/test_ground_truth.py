@@ -48,7 +48,7 @@ def test_a_body_s_pixels_are_those_of_the_newest_frame(world: World[Plate]) -> N
     k = world.cell.known.camera("rear").intrinsics
     distance = PLACE[0] - world.cameras["rear"].true_pose().translation[0]
     assert truth.pixels("rear", plate) == pytest.approx((0.06 * k.fx / distance) ** 2, rel=0.25)
-    wrist = world.arms["left"].links["wrist_link"]
+    wrist = world.arms["left"].links["vx300s/wrist_link"]
     ids = world.cameras["rear"].true_ids()
     assert ids is not None
     assert truth.pixels("rear", world.arms["left"].body, wrist) < np.count_nonzero(ids > -1)
