@@ -82,14 +82,16 @@ def _respell(document: Document, model: type[M], root: Schema) -> tuple[list[Err
     """Correct misspelt keys in the document; returns an error for each, and the new paths."""
     errors: list[Error] = []
     respelt: set[Path] = set()
+    renamed: set[Path] = set()  # a key may be near two that are missing
     for _ in range(MAX_RESPELL_ROUNDS):
         for path, right in list(misspelt(document.value, model, root)):
             new = (*path[:-1], right)
-            if new not in respelt:
+            if new not in respelt and path not in renamed:
                 message = f"unknown key {quoted(path[-1])}; did you mean {right!r}?"
                 errors.append(Error(path, Finding(*document.place(path), message), is_misspelt=True))
                 document.rename(path, right)
                 respelt.add(new)
+                renamed.add(path)
     return errors, respelt
 
 

@@ -267,6 +267,11 @@ def test_a_cell_beside_the_scenario_is_found_from_elsewhere(scenario: Path, monk
     assert load_scenario(str(scenario)).tree == scenario.parent / "tree.xml"
 
 
+def test_a_key_that_may_mean_either_of_two_that_are_missing_is_told_once(scenario: Path) -> None:
+    changed(scenario, "type: jaw_opens, when", "type#when")
+    assert sum("unknown key 'type#when'; did you mean " in finding for finding in findings()) == 1
+
+
 _TOKENS = st.sampled_from(
     ["", "\n", " ", "  ", ":", "- ", "[", "]", "{", "}", "&a ", "*a", "<<: *a", "!!str ", "'", '"', "#", "1e3", ".nan",
      "-1", "99999", "null", "true", "\t", "\x00", "\\U99999999", "---\n", "%", "|", ">", "?", "ä", "0x1f"]
@@ -286,8 +291,10 @@ def test_a_damaged_file_gives_findings_or_loads(scenario: Path, edits: list[tupl
         at = int(share * len(text))
         text = text[:at] + token + text[at + cut :]
     scenario.write_bytes(text.encode("utf-8", "surrogatepass"))
-    found = findings_if_any()
-    scenario.write_text(original, encoding="utf-8")
+    try:
+        found = findings_if_any()
+    finally:
+        scenario.write_text(original, encoding="utf-8")
     assert all(f.line >= 0 and str(f).isprintable() for f in found)
 
 
