@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -181,6 +181,13 @@ class Robot(Model):
         if self.mount is None:
             raise RobotError(("mount",), f"the robot {self.title} has no mount for a camera; give it one")
         return self.mount
+
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """A copy in which what follows from the file is worked out anew."""
+        made = super().model_copy(update=update, deep=deep)
+        for name in made.__dict__.keys() - type(self).model_fields.keys():
+            del made.__dict__[name]
+        return made
 
     def __hash__(self) -> int:
         return hash((self.title, self.urdf.path, self.joint_names, self.folder))

@@ -10,7 +10,7 @@ from regrasp.motion.robots.poses import multiply, rotation_matrix
 
 ANY_AXIS, SLIDE = 3, 4  # kinds of joints; 0, 1 and 2 turn about x, y and z
 # Columns of a joint table; compiled functions take one array in half the time that they take four.
-_AXIS, _KIND, SIGN = 3, 6, 7
+_AXIS, KIND, SIGN = 3, 6, 7
 
 
 def joint_table(chain: Chain) -> FloatArray:
@@ -27,7 +27,7 @@ def joint_table(chain: Chain) -> FloatArray:
 
 def joint_kinds(joints: FloatArray) -> NDArray[np.int64]:
     """The kinds (n,) in a joint table."""
-    return joints[:, _KIND].astype(np.int64)
+    return joints[:, KIND].astype(np.int64)
 
 
 @nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
@@ -41,7 +41,7 @@ def link_frames_in(base: FloatArray, joints: FloatArray, q: FloatArray) -> Float
             frame[r, 3] = parent[r, 3]
             for k in range(3):
                 frame[r, 3] += parent[r, k] * joints[i, k]
-        a = int(joints[i, _KIND])
+        a = int(joints[i, KIND])
         if a < ANY_AXIS:
             angle = joints[i, SIGN] * q[i]
             c, s = np.cos(angle), np.sin(angle)
@@ -101,7 +101,7 @@ def tool_jacobian(base: FloatArray, joints: FloatArray, last_from_tool: FloatArr
         for r in range(3):
             for k in range(3):
                 axis[r] += frames[i, r, k] * joints[i, _AXIS + k]
-        if joints[i, _KIND] == SLIDE:
+        if joints[i, KIND] == SLIDE:
             out[:3, i] = axis
         else:
             out[:3, i] = np.cross(axis, tool[:3, 3] - frames[i + 1, :3, 3])

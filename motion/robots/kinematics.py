@@ -11,7 +11,9 @@ from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.robot.robot import Chain, Robot
 from regrasp.motion.robots.forward import (
     ANY_AXIS,
+    KIND,
     SIGN,
+    SLIDE,
     joint_kinds,
     joint_table,
     link_frames_in,
@@ -25,7 +27,7 @@ from regrasp.motion.robots.poses import inverse, multiply, rotation_vector
 _ROUNDING = 1e-9  # rad past a joint's limit that are rounding errors
 _REFINEMENTS = 8  # steps of Gauss and Newton that improve an answer of the solver; three are common
 _NEAR = 0.003  # m and rad that a least-squares answer may be off to be improved; others belong to no branch
-_STRAIGHT = 1e-6  # sine of the joint before the last at which a wrist is straight
+_STRAIGHT = 1e-3  # sine of the joint before the last at which a wrist is straight
 _NO_WRIST = -1
 
 
@@ -81,7 +83,10 @@ class ArmKinematics:
         tolerances = np.array([parameters.position, parameters.angle, parameters.distinct])
         wrist = _straight_wrist_axis(self.joints)
         self._arm = (self.base, self.joints, self.tip, wrist, self._turning, tolerances)
-        self._solver, self.closed_form = _solver(chain, int(self._rail))
+        self._search = NumericalSolver(chain.without(int(self._rail)))
+        closed = _closed_form(chain, int(self._rail))
+        self._solver: Solver = self._search if closed is None else closed
+        self.closed_form = closed is not None
 
     def __len__(self) -> int:
         """How many joints are driven."""
@@ -141,30 +146,42 @@ class ArmKinematics:
 
     def _answers(self, world_from_tip: FloatArray, near: FloatArray | None, rail: float) -> FloatArray:
         """As `ik_tip`, with the rail at that m."""
+        around = self._zero if near is None else near
         raw = self._raw(world_from_tip, near, rail)
-        return np.asarray(_answers(*self._arm, raw, world_from_tip, self._bounds, self._zero if near is None else near))
+        found = np.asarray(_answers(*self._arm, raw, world_from_tip, self._bounds, around))
+        if len(found) or not self.closed_form or not _any_straight(raw):
+            return found
+        # With a straight wrist the closed form takes one of many solutions, which may be out of reach.
+        first = int(self._rail)
+        searched = self._search.solve(self._in_base(world_from_tip, rail), None if near is None else near[first:])
+        rows = np.column_stack([np.full((len(searched), first), rail), searched])
+        return np.asarray(_answers(*self._arm, rows, world_from_tip, self._bounds, around))
 
     def _raw(self, world_from_tip: FloatArray, near: FloatArray | None = None, rail: float = 0.0) -> FloatArray:
         """The solver's answers (k, n), some of which miss the pose."""
+        found = self._solver.solve(
+            self._in_base(world_from_tip, rail), near if near is None else near[int(self._rail) :]
+        )
+        return np.column_stack([np.full(len(found), rail), found]) if self._rail else found
+
+    def _in_base(self, world_from_tip: FloatArray, rail: float) -> FloatArray:
+        """The tip's pose (4, 4) in the frame of the first joint's parent, of a rail's carriage."""
         target = multiply(self._base_inverse, world_from_tip)
-        if not self._rail:
-            return self._solver.solve(target, near)
-        target[:3, 3] -= self.chain.origins[0] + rail * self.chain.axes[0]
-        found = self._solver.solve(target, None if near is None else near[1:])
-        return np.column_stack([np.full(len(found), rail), found])
+        if self._rail:
+            target[:3, 3] -= self.chain.origins[0] + rail * self.chain.axes[0]
+        return np.asarray(target)
 
     def within_limits(self, rows: FloatArray, near: FloatArray | None = None) -> FloatArray:
         """The rows (k, n) within the joint limits, rounding errors aside; whole turns nearest to `near` (n,)."""
         return np.asarray(_within_limits(rows, self._bounds, self._turning, self._zero if near is None else near))
 
 
-def _solver(chain: Chain, first: int) -> tuple[Solver, bool]:
-    """What solves the joints from number `first` on, and whether that is a closed form."""
-    if len(chain) - first == 6 and not chain.slides[first:].any():
-        closed = _ClosedForm(chain, first)
-        if closed.known:
-            return closed, True
-    return NumericalSolver(chain.without(first)), False
+def _closed_form(chain: Chain, first: int) -> _ClosedForm | None:
+    """What solves the joints from number `first` on by a closed form; None if there is none."""
+    if len(chain) - first != 6 or chain.slides[first:].any():
+        return None
+    closed = _ClosedForm(chain, first)
+    return closed if closed.known else None
 
 
 def _straight_wrist_axis(joints: FloatArray) -> int:
@@ -216,7 +233,7 @@ def _with_straight_wrist(base, joints, axis, raw, target):  # type: ignore[no-un
 
 @nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
 def _refined(base, joints, tip, q, target):  # type: ignore[no-untyped-def]
-    """The solution `q` (n,) brought nearer to the tip's target (4, 4) by Gauss and Newton's method."""
+    """The solution `q` (n,) brought nearer to the tip's target (4, 4) by Gauss and Newton's method. A rail stays."""
     last = np.eye(4)
     last[:3, 3] = tip
     for _ in range(_REFINEMENTS):
@@ -226,8 +243,16 @@ def _refined(base, joints, tip, q, target):  # type: ignore[no-untyped-def]
         error[3:] = rotation_vector(multiply(target, inverse(pose))[:3, :3])
         if np.max(np.abs(error)) < 1e-10:
             break
-        q = q + np.linalg.lstsq(tool_jacobian(base, joints, last, q), error, 1e-9)[0]
+        jacobian = tool_jacobian(base, joints, last, q)
+        if joints[0, KIND] == SLIDE:
+            jacobian[:, 0] = 0.0
+        q = q + np.linalg.lstsq(jacobian, error, 1e-9)[0]
     return q
+
+
+def _any_straight(raw: FloatArray) -> bool:
+    """Whether the joint before the last is straight in any of the rows (k, n)."""
+    return bool(np.any(np.abs(np.sin(raw[:, -2])) < _STRAIGHT))
 
 
 @nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
@@ -260,8 +285,7 @@ def _solutions(base, joints, tip, wrist, turning, tolerances, raw, target):  # t
     for row in range(raw.shape[0]):
         q = wrapped[row]
         if not _reaches(base, joints, tip, q, target, max_distance, max_angle):
-            straight = abs(np.sin(q[-2])) < _STRAIGHT  # where the solver does not turn the last joint
-            if wrist == _NO_WRIST and not (straight or _reaches(base, joints, tip, q, target, _NEAR, _NEAR)):
+            if wrist == _NO_WRIST and not _reaches(base, joints, tip, q, target, _NEAR, _NEAR):
                 continue
             if wrist == _NO_WRIST:
                 q = _refined(base, joints, tip, q, target)

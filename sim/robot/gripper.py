@@ -228,8 +228,8 @@ class SimParallelGripper(SimGripper):
 class SimLinkageGripper(SimGripper):
     r"""Two fingers on linkages. PyBullet ignores `mimic`: gears couple all joints to the driven one.
 
-    A finger's force follows from the drive's torque by virtual work: with the opening :math:`g(	heta)` each finger
-    moves by :math:`g/2`, so that :math:`	au = F |dg/d	heta| / 2` on each side.
+    A finger's force follows from the drive's torque by virtual work: with the opening :math:`g(\theta)` each finger
+    moves by :math:`g/2`, so that :math:`\tau = F |dg/d\theta| / 2` on each side.
     """
 
     def true_gap(self) -> float:
