@@ -34,7 +34,10 @@ def ik_view(
         return _by_the_last_link(kin, wanted, link_from_camera, parameters)
     along = float(kin.chain.axes[-1] @ link_from_camera[:3, 2])
     if index != len(kin) - 1 or kin.robot.rail or abs(along) < 1 - 1e-6:
-        raise ValueError(f"the camera must look along the last joint's axis or sit behind it: {kin.robot.title}")
+        raise ValueError(
+            f"the mount of {kin.robot.title} must be on the last link, or on the one before and look along the last "
+            "joint's axis, and then on no rail"
+        )
     found = np.array(list(_solutions(kin, wanted, link_from_camera, along, parameters))).reshape(-1, len(kin))
     tolerances = parameters.camera_position, np.sin(parameters.camera_axis)
     near, upright = _views(kin.base, kin.joints, index, found, wanted, link_from_camera, *tolerances)
