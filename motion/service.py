@@ -20,7 +20,7 @@ from regrasp.motion.failure import PlanningError
 from regrasp.motion.grasping.approach import Cylinder, PickParameters, find_approaches, pick_candidates, points_beyond
 from regrasp.motion.grasping.grasps import Grasp
 from regrasp.motion.planning.planner import PlannerParameters, plan
-from regrasp.motion.planning.straight import straight_line
+from regrasp.motion.planning.straight import can_continue, straight_line
 from regrasp.motion.request import MotionRequest
 from regrasp.motion.robots.arm_offsets import JointOffsetParameters, joint_offsets
 from regrasp.motion.scene.collision import Clearances, CollisionModel
@@ -83,18 +83,33 @@ class Motion(PlanningScene):
 
         return self.execution.request(arm, steps())
 
-    def move_tool(self, arm: str, world_from_tool: RigidTransform, *, margin: float | None = None) -> MotionRequest:
-        """As `move`, to any joints that bring the tool to a pose. A rail stays where it is if that will do."""
+    def move_tool(
+        self,
+        arm: str,
+        world_from_tool: RigidTransform,
+        *,
+        onward: Sequence[RigidTransform] = (),
+        margin: float | None = None,
+    ) -> MotionRequest:
+        """As `move`, to any joints that bring the tool to a pose. A rail stays where it is if that will do.
+
+        From there the tool must also reach the poses `onward` (goal_from_tool) in straight lines.
+        """
 
         def steps() -> Iterator[None]:
             kin, q = self.kinematics[arm], self.joints(arm)
-            model, goals = self.start_model(arm), kin.ik(world_from_tool, q)
+            model = self.start_model(arm)
+
+            def path_to(ends: FloatArray) -> FloatArray:
+                goals = [end for end in ends if can_continue(kin, end, onward)]
+                return self._plan(model, q, np.array(goals).reshape(-1, len(kin)), margin)
+
             try:
-                path = self._plan(model, q, goals, margin)
+                path = path_to(kin.ik(world_from_tool, q))
             except PlanningError:
                 if kin.robot.rail is None:
                     raise
-                path = self._plan(model, q, kin.ik(world_from_tool), margin)
+                path = path_to(kin.ik(world_from_tool))
             yield from self.execution.follow(arm, path, 1.0)
 
         return self.execution.request(arm, steps())

@@ -189,6 +189,9 @@ class Robot(Model):
             del made.__dict__[name]
         return made
 
+    def __repr__(self) -> str:
+        return f"Robot({self.title!r}, {len(self.joint_names)} joints)"
+
     def __hash__(self) -> int:
         return hash((self.title, self.urdf.path, self.joint_names, self.folder))
 

@@ -51,12 +51,6 @@ def carry_paths(
             yield path
 
 
-def can_continue(kin: ArmKinematics, q: FloatArray, onward: Sequence[RigidTransform], step: float = 0.02) -> bool:
-    """Whether the tool at joints (6,) can go on in straight lines to the poses `onward`, given in its own frame."""
-    tool = kin.tool_matrix(q)
-    return straight_lines(kin, q, [multiply(tool, pose.as_matrix()) for pose in onward], step) is not None
-
-
 def first_free(
     models: Sequence[CollisionModel], margins: Sequence[float], paths: Iterable[FloatArray]
 ) -> FloatArray | None:

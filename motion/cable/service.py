@@ -16,13 +16,14 @@ from regrasp.interfaces.cell import Box
 from regrasp.interfaces.devices import Arm, Clock, Gripper
 from regrasp.interfaces.request import Request
 from regrasp.motion.cable.cable_shape import cable_course, connector_points
-from regrasp.motion.cable.carry_paths import CarryPathParameters, can_continue, carry_paths, first_free
+from regrasp.motion.cable.carry_paths import CarryPathParameters, carry_paths, first_free
 from regrasp.motion.cable.held import connector_spheres
 from regrasp.motion.cable.search import SearchMotion, SearchMotionParameters
 from regrasp.motion.cable.seating import SeatingParameters, poses_before, seated_pose
 from regrasp.motion.failure import PlanningError
 from regrasp.motion.grasping.approach import pick_candidates
 from regrasp.motion.grasping.gap_test import GripWatch
+from regrasp.motion.planning.straight import can_continue
 from regrasp.motion.request import MotionRequest
 from regrasp.motion.scene.collision import CollisionModel
 from regrasp.motion.scene.planning_scene import NO_POINTS

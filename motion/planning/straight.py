@@ -1,6 +1,6 @@
 """Straight lines of the tool (Cartesian paths)."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +10,7 @@ from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cause import CauseCode
 from regrasp.motion.failure import PlanningError
 from regrasp.motion.robots.kinematics import ArmKinematics
-from regrasp.motion.robots.poses import poses_between
+from regrasp.motion.robots.poses import multiply, poses_between
 
 
 def straight_line(
@@ -45,6 +45,12 @@ def straight_lines(
             return None
         path.append(found[1:])
     return np.concatenate(path)
+
+
+def can_continue(kin: ArmKinematics, q: FloatArray, onward: Sequence[RigidTransform], step: float = 0.02) -> bool:
+    """Whether the tool at joints (6,) can go on in straight lines to the poses `onward`, given in its own frame."""
+    tool = kin.tool_matrix(q)
+    return straight_lines(kin, q, [multiply(tool, pose.as_matrix()) for pose in onward], step) is not None
 
 
 @dataclass(frozen=True)

@@ -73,7 +73,7 @@ class ButtonMotion(Motion):
     def go_before(self, arm: str, place: FloatArray) -> MotionRequest:
         """Bring the tool 12 cm before a place (3,) m, and point it there along the world's x."""
         before = RigidTransform.from_translation(place - [0.12, 0.0, 0.0])
-        return self.move_tool(arm, before)
+        return self.move_tool(arm, before, onward=[RigidTransform.from_translation([0.115, 0.0, 0.0])])
 
 
 @dataclass
