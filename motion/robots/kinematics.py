@@ -127,8 +127,8 @@ class ArmKinematics:
     def ik_tip(self, world_from_tip: FloatArray, near: FloatArray | None = None) -> FloatArray:
         """As `ik`, for the pose (4, 4) of the tip."""
         if not self._rail:
-            return self._answers(world_from_tip, near, 0.0)
-        if near is not None and len(here := self._answers(world_from_tip, near, near[0])):
+            return self._searched(world_from_tip, near, 0.0)
+        if near is not None and len(here := self._searched(world_from_tip, near, near[0])):
             return here
         found = np.empty((0, len(self)))
         for count in self._parameters.rail_places:
@@ -142,26 +142,32 @@ class ArmKinematics:
 
     def solve(self, world_from_tip: FloatArray) -> FloatArray:
         """All solutions (k, n) for the tip's pose (4, 4), wrapped, whatever the limits; with a rail at zero."""
-        return np.asarray(_solutions(*self._arm, self._raw(world_from_tip, None, 0.0), world_from_tip))
+        return np.asarray(_solutions(*self._arm, self._raw(self._solver, world_from_tip, None, 0.0), world_from_tip))
 
     def _answers(self, world_from_tip: FloatArray, near: FloatArray | None, rail: float) -> FloatArray:
         """As `ik_tip`, with the rail at that m."""
-        around = self._zero if near is None else near
-        raw = self._raw(world_from_tip, near, rail)
-        found = np.asarray(_answers(*self._arm, raw, world_from_tip, self._bounds, around))
+        return self._right(self._raw(self._solver, world_from_tip, near, rail), world_from_tip, near)
+
+    def _searched(self, world_from_tip: FloatArray, near: FloatArray | None, rail: float) -> FloatArray:
+        """As `_answers`; a pose with a straight wrist for which the closed form has none is searched.
+
+        There it takes one of many solutions, which may be out of reach.
+        """
+        raw = self._raw(self._solver, world_from_tip, near, rail)
+        found = self._right(raw, world_from_tip, near)
         if len(found) or not self.closed_form or not _any_straight(raw):
             return found
-        # With a straight wrist the closed form takes one of many solutions, which may be out of reach.
-        first = int(self._rail)
-        searched = self._search.solve(self._in_base(world_from_tip, rail), None if near is None else near[first:])
-        rows = np.column_stack([np.full((len(searched), first), rail), searched])
-        return np.asarray(_answers(*self._arm, rows, world_from_tip, self._bounds, around))
+        return self._right(self._raw(self._search, world_from_tip, near, rail), world_from_tip, near)
 
-    def _raw(self, world_from_tip: FloatArray, near: FloatArray | None = None, rail: float = 0.0) -> FloatArray:
-        """The solver's answers (k, n), some of which miss the pose."""
-        found = self._solver.solve(
-            self._in_base(world_from_tip, rail), near if near is None else near[int(self._rail) :]
-        )
+    def _right(self, raw: FloatArray, world_from_tip: FloatArray, near: FloatArray | None) -> FloatArray:
+        """Those of the rows (k, n) that bring the tip to its pose, within the limits and nearest to `near` (n,)."""
+        around = self._zero if near is None else near
+        return np.asarray(_answers(*self._arm, raw, world_from_tip, self._bounds, around))
+
+    def _raw(self, solver: Solver, world_from_tip: FloatArray, near: FloatArray | None, rail: float) -> FloatArray:
+        """A solver's answers (k, n), some of which miss the pose."""
+        start = None if near is None else near[int(self._rail) :]
+        found = solver.solve(self._in_base(world_from_tip, rail), start)
         return np.column_stack([np.full(len(found), rail), found]) if self._rail else found
 
     def _in_base(self, world_from_tip: FloatArray, rail: float) -> FloatArray:
