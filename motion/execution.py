@@ -8,7 +8,7 @@ import numpy as np
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.devices import Arm, Clock, Gripper
-from regrasp.interfaces.robot.robot import Chain
+from regrasp.interfaces.robot.chain import Chain
 from regrasp.interfaces.trajectory import Trajectory
 from regrasp.motion.failure import GraspEmptyError, PlanningError
 from regrasp.motion.grasping.gap_test import GapParameters, GripWatch

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from regrasp.interfaces.arrays import FloatArray
-from regrasp.interfaces.robot.robot import Chain
+from regrasp.interfaces.robot.chain import Chain
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Self
@@ -15,6 +15,8 @@ from regrasp.interfaces.arrays import FloatArray, Mask
 from regrasp.interfaces.fields import Color, JointAngle, Model
 from regrasp.interfaces.quote import nearest, quoted
 from regrasp.interfaces.robot import urdf
+from regrasp.interfaces.robot.chain import Chain
+from regrasp.interfaces.robot.linkage import Linkage
 from regrasp.interfaces.robot.parts import (
     Attached,
     Calibration,
@@ -35,38 +37,6 @@ BEAM, CARRIAGE = "rail_beam", "rail_carriage"  # links of a rail
 _CARRIAGE_MASS, _CARRIAGE_INERTIA = 10.0, 0.1  # kg, kg m2; choice: a drive as strong as a rail's moves it anyhow
 # kg and kg m2 of links without inertia: frames, to which PyBullet would give 1 kg and 1 kg m2
 _FRAME_MASS, _FRAME_INERTIA = 1e-3, 1e-6
-_OPENINGS = 201  # places at which a linkage's opening is worked out; between them it is interpolated
-
-
-@dataclass(frozen=True, eq=False)
-class Chain:
-    """The joints from the base to the tool, by axes and offsets at zero (product of exponentials).
-
-    Link 0 is the base, link i + 1 moves with joint i. At zero all link frames are parallel to the base's; each has
-    its origin on its joint's axis. `origins` (n, 3) m are those of the joints in the link before, `axes` (n, 3) unit
-    vectors, `slides` (n,) says which joints are prismatic. Limits are (n,), rad or m and their derivatives; `torques`
-    are N m or N, `levers` m that the far end moves by a rad, about.
-    """
-
-    names: tuple[str, ...]
-    origins: FloatArray
-    axes: FloatArray
-    slides: Mask
-    lower: FloatArray
-    upper: FloatArray
-    speeds: FloatArray
-    accelerations: FloatArray
-    torques: FloatArray
-    levers: FloatArray
-    last_from_tool: FloatArray
-
-    def __len__(self) -> int:
-        return len(self.names)
-
-    def without(self, first: int) -> "Chain":
-        """The chain from joint number `first` on; its base is the link before that joint."""
-        rows = {f.name: getattr(self, f.name)[first:] for f in fields(self) if f.name != "last_from_tool"}
-        return replace(self, **rows)
 
 
 class Robot(Model):
@@ -217,7 +187,7 @@ class Robot(Model):
         return dict(zip(gripper.joints, (finger, -finger), strict=True))
 
     @cached_property
-    def linkage(self) -> "Linkage":
+    def linkage(self) -> Linkage:
         """How the jaw of a linkage gripper opens."""
         assert isinstance(self.gripper, LinkageGripper)
         return Linkage.of(self.tree, self.gripper)
@@ -271,61 +241,6 @@ class Robot(Model):
     def _given_levers(self, levers: FloatArray) -> FloatArray:
         given = [*([None] if self.rail else []), *(joint.lever for joint in self.joints)]
         return np.array([own if own else lever for own, lever in zip(given, levers, strict=True)])
-
-
-@dataclass(frozen=True, eq=False)
-class Linkage:
-    """A linkage gripper's `openings` (k,) m, falling, over its driven joint's `driven` positions (k,) rad."""
-
-    driven: FloatArray
-    openings: FloatArray
-    followers: dict[str, tuple[float, float]]  # multiplier and offset of each joint, the driven one with (1, 0)
-
-    @classmethod
-    def of(cls, tree: UrdfTree, gripper: LinkageGripper) -> "Linkage":
-        """Raises RobotError: the URDF lacks the joint or a pad, or the jaw does not close."""
-        if gripper.joint not in tree.joints:
-            right = nearest(gripper.joint, list(tree.joints))
-            raise RobotError(("gripper", "joint"), f"the URDF has no joint {quoted(gripper.joint)}; {right}")
-        for side, pad in enumerate(gripper.pads):
-            if pad not in tree.links:
-                right = nearest(pad, tree.links)
-                raise RobotError(("gripper", "pads", side), f"the URDF has no link {quoted(pad)}; {right}")
-        followers = {
-            name: joint.mimic[1:]
-            for name, joint in tree.joints.items()
-            if joint.mimic is not None and joint.mimic[0] == gripper.joint
-        }
-        followers[gripper.joint] = (1.0, 0.0)
-        limits = tree.joints[gripper.joint].limits
-        driven = np.linspace(limits.get("lower", 0.0), limits.get("upper", 0.0), _OPENINGS)
-        openings = np.array([_pad_gap(tree, gripper, followers, q) for q in driven])
-        falling = int(np.argmin(openings)) + 1
-        if falling < 2 or np.any(np.diff(openings[:falling]) >= 0):
-            message = f"the pads do not come nearer to each other while {gripper.joint} rises; name the joint that does"
-            raise RobotError(("gripper", "joint"), message)
-        return cls(driven[:falling], openings[:falling], followers)
-
-    def position(self, opening: float) -> float:
-        """The driven joint's position, rad, with the pads `opening` m apart."""
-        return float(np.interp(-opening, -self.openings, self.driven))
-
-    def opening(self, position: float) -> float:
-        """The pads' distance, m, with the driven joint at `position` rad."""
-        return float(np.interp(position, self.driven, self.openings))
-
-    def positions(self, opening: float) -> dict[str, float]:
-        """The positions of all its joints, rad."""
-        driven = self.position(opening)
-        return {name: multiplier * driven + offset for name, (multiplier, offset) in self.followers.items()}
-
-
-def _pad_gap(
-    tree: UrdfTree, gripper: LinkageGripper, followers: Mapping[str, tuple[float, float]], driven: float
-) -> float:
-    positions = {name: multiplier * driven + offset for name, (multiplier, offset) in followers.items()}
-    left, right = (tree.frame(pad, positions)[:3, 3] for pad in gripper.pads)
-    return float(np.linalg.norm(left - right)) - gripper.thickness
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,7 @@ import numpy as np
 
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.reading import JointReading
-from regrasp.interfaces.robot.robot import Chain
+from regrasp.interfaces.robot.chain import Chain
 from regrasp.interfaces.trajectory import Trajectory
 
 

@@ -5,7 +5,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regrasp.interfaces.arrays import FloatArray
-from regrasp.interfaces.robot.robot import Chain
+from regrasp.interfaces.robot.chain import Chain
 from regrasp.motion.robots.poses import multiply, rotation_matrix
 
 ANY_AXIS, SLIDE = 3, 4  # kinds of joints; 0, 1 and 2 turn about x, y and z

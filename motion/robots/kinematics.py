@@ -8,7 +8,8 @@ from eaik.IK_HP import HPRobot
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import FloatArray
-from regrasp.interfaces.robot.robot import Chain, Robot
+from regrasp.interfaces.robot.chain import Chain
+from regrasp.interfaces.robot.robot import Robot
 from regrasp.motion.robots.forward import (
     ANY_AXIS,
     KIND,

@@ -4,7 +4,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from regrasp.interfaces.arrays import FloatArray
-from regrasp.interfaces.robot.robot import Chain
+from regrasp.interfaces.robot.chain import Chain
 from regrasp.motion.robots.forward import joint_table, tool_frame, tool_jacobian
 from regrasp.motion.robots.poses import rotation_vector
 

@@ -9,8 +9,9 @@ import pybullet as p
 
 from regrasp.interfaces.hidden_world import Errors, GripperSpec
 from regrasp.interfaces.reading import GripperReading
+from regrasp.interfaces.robot.linkage import Linkage
 from regrasp.interfaces.robot.parts import LinkageGripper, ParallelGripper
-from regrasp.interfaces.robot.robot import Linkage, Robot, finger_position
+from regrasp.interfaces.robot.robot import Robot, finger_position
 from regrasp.sim.robot.model import pad_links
 
 

@@ -14,7 +14,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cell import WristMount
-from regrasp.interfaces.robot.robot import Chain
+from regrasp.interfaces.robot.chain import Chain
 from regrasp.motion.robots.ik_parameters import InverseKinematicsParameters
 from regrasp.motion.robots.kinematics import ArmKinematics, wrap
 from regrasp.motion.robots.views import ik_view
