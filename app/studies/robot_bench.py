@@ -169,12 +169,18 @@ def _planning(
 
 
 def _plan_all(model: CollisionModel, ends: FloatArray, margin: float) -> tuple[list[float], list[FloatArray]]:
-    """Seconds that each query took, and the paths that were found: from a start to where the tool is at a goal."""
+    """Seconds that each query took, and the paths that were found: from a start to where the tool is at a goal.
+
+    As `Motion.move_tool`: a rail is moved where the arm finds no path without.
+    """
     seconds, paths, kin = [], [], model.kinematics
     for n, (start, goal) in enumerate(zip(*ends, strict=True)):
         began = time.perf_counter()
-        with suppress(PlanningError):
-            paths.append(plan(model, start, kin.ik(kin.tool_matrix(goal), start), n, margin))
+        pose = kin.tool_matrix(goal)
+        for near in (start, None) if kin.robot.rail else (start,):
+            with suppress(PlanningError):
+                paths.append(plan(model, start, kin.ik(pose, near), n, margin))
+                break
         seconds.append(time.perf_counter() - began)
     return seconds, paths
 

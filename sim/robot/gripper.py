@@ -25,7 +25,10 @@ class GripperParameters:
     spinning_friction: float = 0.005  # of the pads, against rotation about a contact's normal (PyBullet's unit)
     gear_force: float = 500.0  # N or N m, limit of the constraints that couple the fingers
     gear_error_reduction: float = 0.3  # share of the coupling's error that is corrected in a step
-    linkage_error_reduction: float = 0.9  # the same of a linkage: with 0.3 its fingers give by 0.1 rad at 40 N
+    linkage_error_reduction: float = 0.9  # the same of a linkage
+    # kg m2 of each bar of a linkage, for the drive's inertia as its gearing reflects it. Choice: with the bars' own, a
+    # millionth, PyBullet's solver lets the fingers give by 0.1 rad at 40 N.
+    linkage_inertia: float = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -268,10 +271,12 @@ class SimLinkageGripper(SimGripper):
         ]
         self._drives = tuple(joints[name] for name in sides)
         for name, (multiplier, _) in self._linkage.followers.items():
-            p.setJointMotorControl2(self._body, joints[name], p.VELOCITY_CONTROL, force=0, physicsClientId=self._client)
+            bar, inertia = joints[name], [self._parameters.linkage_inertia] * 3
+            p.setJointMotorControl2(self._body, bar, p.VELOCITY_CONTROL, force=0, physicsClientId=self._client)
+            p.changeDynamics(self._body, bar, localInertiaDiagonal=inertia, physicsClientId=self._client)
             if name != gripper.joint:
                 axis = tuple(tree.joints[name].axis.tolist())
-                self._couple(driven, joints[name], -multiplier, axis, self._parameters.linkage_error_reduction)
+                self._couple(driven, bar, -multiplier, axis, self._parameters.linkage_error_reduction)
         self.place_at(gripper.closed)
 
     def _drive_at(self, speed: float, force: float) -> None:

@@ -14,7 +14,6 @@ from regrasp.sim.robot.arm import SimArm
 
 STROKE = 0.085  # m, the maker's
 GAP = 0.001  # m
-FORCE = 20.0  # N of each finger; the maker's least
 THICKNESS = 0.03  # m of the block
 MASS = 0.2  # kg
 
@@ -59,19 +58,26 @@ def test_the_pads_stay_parallel(arm: SimArm) -> None:
         assert abs(float(axes[0] @ axes[1])) > np.cos(np.deg2rad(1.0))
 
 
-def test_it_presses_with_the_force_that_it_is_told_and_holds_a_block_by_friction(arm: SimArm) -> None:
+@pytest.mark.parametrize("force", [20.0, 40.0])  # N of each finger; the least by the maker, and what grips a connector
+@pytest.mark.parametrize("shape", ["box", "cylinder"])
+def test_it_presses_with_the_force_that_it_is_told_and_holds_a_block_by_friction(
+    arm: SimArm, force: float, shape: str
+) -> None:
     arm.gripper.open(0.07)
     run(arm, 2.0)
     tool, client = arm.tool_pose(), arm.client
-    shape = p.createCollisionShape(p.GEOM_BOX, halfExtents=[0.02, THICKNESS / 2, 0.02], physicsClientId=client)
+    if shape == "box":
+        solid = p.createCollisionShape(p.GEOM_BOX, halfExtents=[0.02, THICKNESS / 2, 0.02], physicsClientId=client)
+    else:
+        solid = p.createCollisionShape(p.GEOM_CYLINDER, radius=THICKNESS / 2, height=0.04, physicsClientId=client)
     turn = tool.rotation.as_quat().tolist()
-    block = p.createMultiBody(MASS, shape, -1, tool.translation.tolist(), turn, physicsClientId=client)
+    block = p.createMultiBody(MASS, solid, -1, tool.translation.tolist(), turn, physicsClientId=client)
     p.changeDynamics(block, -1, lateralFriction=0.8, physicsClientId=client)
-    arm.gripper.close(FORCE)
+    arm.gripper.close(force)
     run(arm, 1.5)
     for pad in arm.gripper.pads:
         contacts = p.getContactPoints(block, arm.body, -1, pad, physicsClientId=client)
-        assert sum(contact[9] for contact in contacts) == pytest.approx(FORCE, rel=0.05)
+        assert sum(contact[9] for contact in contacts) == pytest.approx(force, rel=0.05)
     assert arm.gripper.true_gap() == pytest.approx(THICKNESS, abs=GAP)
     place = np.array(p.getBasePositionAndOrientation(block, physicsClientId=client)[0])
     p.setGravity(0, 0, -EARTH_GRAVITY, physicsClientId=client)
