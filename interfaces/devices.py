@@ -31,7 +31,7 @@ class Arm(Protocol):
         ...
 
     def stop(self) -> None:
-        """Brake within the joints' acceleration limits and hold."""
+        """Brake, no joint harder than the acceleration in its robot's file, and hold."""
         ...
 
     def is_moving(self) -> bool:

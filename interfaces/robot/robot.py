@@ -63,7 +63,6 @@ class Robot(Model):
     untouchable: tuple[LinkName, ...] = ()
     paint: Color | None = None  # in place of the URDF's colours and textures
     draw: Annotated[str, Field(pattern="^(visual|collision)$")] = "visual"  # which of the URDF's meshes are drawn
-    braking: Annotated[float, Field(gt=0, le=1000)] | None = None  # rad/s2 or m/s2; None: the joints' acceleration
     folder: str = ""
 
     def element(self) -> ET.Element:

@@ -65,7 +65,6 @@ class SimArm:
         self._speed_share = np.ones(count)  # of the joints' speeds; less by a fault
         self._encoder_slip = np.zeros(count)  # rad that the encoders read too much, by a fault
         self._late_joints = False  # whether the last command was more than some servo can do in a step
-        self._braking = np.full(count, self.robot.braking) if self.robot.braking else chain.accelerations
         self._gains = [parameters.position_gain] * count, [parameters.velocity_gain] * count, chain.torques.tolist()
         self._trajectory: Trajectory | None = None
         self._started = 0.0
@@ -110,13 +109,13 @@ class SimArm:
         self._trajectory, self._started = trajectory, self.now()
 
     def stop(self) -> None:
-        """See `regrasp.interfaces.devices.Arm`: all joints come to rest together, none brakes harder than it may."""
+        """See `regrasp.interfaces.devices.Arm`: all joints come to rest together."""
         if self._trajectory is None:
             return
         q, v = self._trajectory.sample(self.now() - self._started)
         late = self._late(q)
         q, v = np.where(late, self._servo, q), np.where(late, 0.0, v)
-        seconds = float(np.max(np.abs(v) / self._braking))
+        seconds = float(np.max(np.abs(v) / self._chain.accelerations))
         if seconds < self._dt:
             self._trajectory = None
             self._drive(q, np.zeros(len(q)))
