@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from regrasp.app.cli import calibrate, migrate, records, robots, run, scenarios, snapshot, trees
+from regrasp.app.cli import calibrate, campaign, migrate, records, robots, run, scenarios, snapshot, trees
 from regrasp.app.cli.options import EXIT_BAD_INPUT, EXIT_UNMET
 from regrasp.app.files.findings import Findings
 from regrasp.app.interrupts import EXIT_INTERRUPTED
@@ -18,6 +18,7 @@ COMMANDS = (  # in the order in which a newcomer uses them; those that only a ta
     "explain",
     "replay",
     "diff",
+    "campaign",
     "scenarios",
     "migrate",
     "trees",
@@ -60,6 +61,7 @@ class _Group(TyperGroup):
 app = typer.Typer(cls=_Group, no_args_is_help=True, rich_markup_mode=None, pretty_exceptions_enable=False)
 run.add_to(app)
 records.add_to(app)
+app.add_typer(campaign.app, name="campaign")
 app.add_typer(scenarios.app, name="scenarios")
 app.add_typer(trees.app, name="trees")
 app.add_typer(robots.app, name="robots")

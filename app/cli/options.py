@@ -1,16 +1,13 @@
 """Options that several commands take, and how commands exit."""
 
-import re
 from collections.abc import Iterator
 from typing import Annotated, Literal
 
 import typer
 
 from regrasp.app.files.findings import Finding, Findings
-from regrasp.interfaces.quote import quoted
-from regrasp.interfaces.seed import MAX_SEED
+from regrasp.interfaces.seed import MAX_SEED, seed_range
 
-MAX_SEEDS = 10_000  # of one study
 EXIT_UNMET = 1  # something did not come out as expected, or is not as it should be
 EXIT_BAD_INPUT = 2
 
@@ -51,11 +48,7 @@ Sets = Annotated[
 
 def parse_seeds(text: str) -> range:
     """The seeds of "A:B", without B. Raises `Findings` for anything else."""
-    first, after = map(int, text.split(":")) if re.fullmatch(r"\d{1,10}:\d{1,10}", text) else (0, 0)
-    if not first < after <= MAX_SEED:
-        right = f"write A:B with A below B and B at most {MAX_SEED}, such as 0:20"
-        raise Findings([Finding("--seeds", 0, f"{quoted(text)} is no range of seeds; {right}")])
-    seeds = range(first, after)
-    if len(seeds) > MAX_SEEDS:
-        raise Findings([Finding("--seeds", 0, f"{len(seeds)} seeds; ask for at most {MAX_SEEDS} in one study")])
-    return seeds
+    try:
+        return seed_range(text)
+    except ValueError as error:
+        raise Findings([Finding("--seeds", 0, str(error))]) from None

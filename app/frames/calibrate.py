@@ -10,11 +10,11 @@ import numpy as np
 import typer
 from numpy.typing import NDArray
 
+from regrasp.app.campaigns.table import print_table
 from regrasp.app.files.findings import Finding, Findings, shown
 from regrasp.app.files.whole_file import write_whole
 from regrasp.app.frames.calibration_file import IMAGE_SUFFIXES, CalibrationFile, write_calibration
 from regrasp.app.frames.image_files import read_rgb
-from regrasp.app.studies.table import print_table
 from regrasp.interfaces.cell import CameraSpec
 from regrasp.interfaces.frame import Intrinsics
 from regrasp.perception.camera.calibration import Calibration, calibrate_intrinsics, find_checkerboard

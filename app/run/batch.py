@@ -57,6 +57,7 @@ class Row:
     succeeded: bool
     cause: dict[str, Any] | None
     peak_memory_mb: float
+    renderer: str = "software"
     measured: dict[str, Any] = field(default_factory=dict)  # by the task's judge
     unintended_force: float | None = None
     unmet: list[str] = field(default_factory=list)
@@ -81,17 +82,7 @@ def run_all(
     dies, its outcome is an internal error; a run that takes longer than the wall limit is stopped. `episode` replaces
     `run_episode` in tests.
     """
-    tasks = [
-        partial(
-            episode or _run_episode,
-            run.scenario,
-            run.folder,
-            seed=run.seed,
-            video=settings.video,
-            renderer=settings.renderer,
-        )
-        for run in runs
-    ]
+    tasks = [run_task(run, settings, episode) for run in runs]
     rows: dict[int, Row] = {}
     try:
         with contextlib.closing(run_each(tasks, jobs, settings.wall_limit)) as ended:
@@ -99,12 +90,24 @@ def run_all(
                 row = rows[done.number] = row_of(runs[done.number], done)
                 keep([rows[i] for i in sorted(rows)])
                 if not settings.quiet:
-                    told = f"[{len(rows)}/{len(runs)}] {runs[done.number]}: {_summary(row)}"
+                    told = f"[{len(rows)}/{len(runs)}] {runs[done.number]}: {summary(row)}"
                     print(told, file=sys.stderr, flush=True)
     except KeyboardInterrupt:
         print(f"interrupted; {len(rows)} of {len(runs)} runs were done", file=sys.stderr)
         return dict(sorted(rows.items())), True
     return dict(sorted(rows.items())), False
+
+
+def run_task(run: Run, settings: Settings, episode: RunEpisode | None = None) -> Callable[[], Result]:
+    """What does the run when it is called, picklable. `episode` replaces `run_episode` in tests."""
+    return partial(
+        episode or _run_episode,
+        run.scenario,
+        run.folder,
+        seed=run.seed,
+        video=settings.video,
+        renderer=settings.renderer,
+    )
 
 
 def _run_episode(*args: Any, **kwargs: Any) -> Result:
@@ -114,9 +117,10 @@ def _run_episode(*args: Any, **kwargs: Any) -> Result:
     return run_episode(*args, **kwargs)
 
 
-def _summary(row: Row) -> str:
-    verdict = row.outcome if row.succeeded else f"{row.outcome}, not as expected"
-    return f"{verdict}, {row.sim_seconds:.1f} s simulated, {row.real_time_factor:.2f} x real time"
+def summary(row: Row) -> str:
+    """How a run came out, in a line of the progress."""
+    figures = f"{row.sim_seconds:.1f} s simulated, {row.real_time_factor:.2f} x real time"
+    return f"{row.outcome}, {figures}" if row.succeeded else f"{row.outcome}, not as expected, {figures}"
 
 
 def result_of(run: Run, done: Done[Result]) -> Result:
@@ -153,6 +157,7 @@ def row_of(run: Run, done: Done[Result]) -> Row:
         wall_by_part=result.wall_by_part,
         longest_tick=result.longest_tick,
         peak_memory_mb=round(done.peak_memory_mb, 1),
+        renderer=result.renderer or "software",
     )
 
 

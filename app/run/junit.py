@@ -1,32 +1,43 @@
 """Writes the runs of a scenario's cases as JUnit XML, for build servers."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple
 from xml.etree import ElementTree as ET
 
 from regrasp.app.files.findings import Findings
 from regrasp.app.files.whole_file import write_whole
-from regrasp.app.run.batch import Row, Run
+from regrasp.app.run.batch import Row
 from regrasp.interfaces.quote import printable
 
 ERRORS = ("internal_error", "wall_limit")  # outcomes that say nothing about the robot
 
 
-def write_junit(path: Path, name: str, runs: Sequence[Run], rows: Mapping[int, Row]) -> None:
+class TestCase(NamedTuple):
+    """A run as JUnit has it. One without a row was interrupted; one without a folder left no record."""
+
+    scenario: str
+    name: str
+    row: Row | None
+    folder: Path | None
+
+
+def write_junit(path: Path, name: str, cases: Sequence[TestCase]) -> None:
     """Write one testcase per run: its wall time, why it failed (in a sentence and in full), its record's folder.
 
-    `rows` go by the runs' numbers; a run without a row was interrupted and counts as skipped.
+    A run that was interrupted counts as skipped.
 
     Raises:
         OSError: the file cannot be written.
     """
-    errors = sum(row.outcome in ERRORS for row in rows.values())
+    rows = [case.row for case in cases if case.row is not None]
+    errors = sum(row.outcome in ERRORS for row in rows)
     counts = {
-        "tests": len(runs),
-        "failures": sum(not row.succeeded for row in rows.values()) - errors,
+        "tests": len(cases),
+        "failures": sum(not row.succeeded for row in rows) - errors,
         "errors": errors,
-        "skipped": len(runs) - len(rows),
-        "time": f"{sum(row.wall_seconds for row in rows.values()):.3f}",
+        "skipped": len(cases) - len(rows),
+        "time": f"{sum(row.wall_seconds for row in rows):.3f}",
     }
     told = {key: str(value) for key, value in counts.items()}
     above = {
@@ -34,15 +45,16 @@ def write_junit(path: Path, name: str, runs: Sequence[Run], rows: Mapping[int, R
     }  # the common JUnit schema has no `skipped` there
     suites = ET.Element("testsuites", {"name": "regrasp", **above})
     suite = ET.SubElement(suites, "testsuite", {"name": printable(name), **told})
-    for number, run in enumerate(runs):
-        _testcase(suite, run, rows.get(number))
+    for case in cases:
+        _testcase(suite, case)
     ET.indent(suites)
     text = ET.tostring(suites, encoding="unicode")
     write_whole(path, f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n')
 
 
-def _testcase(suite: ET.Element, run: Run, row: Row | None) -> None:
-    about = {"classname": printable(run.scenario.name), "name": printable(run.scenario.case)}
+def _testcase(suite: ET.Element, run: TestCase) -> None:
+    row = run.row
+    about = {"classname": printable(run.scenario), "name": printable(run.name)}
     case = ET.SubElement(suite, "testcase", {**about, "time": f"{row.wall_seconds if row else 0.0:.3f}"})
     if row is None:
         ET.SubElement(case, "skipped", {"message": "interrupted before its end"})

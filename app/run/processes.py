@@ -27,6 +27,7 @@ class Done(NamedTuple, Generic[T]):
     error: str
     peak_memory_mb: float
     timed_out: bool = False
+    killed: bool = False  # by somebody else, as by the kernel when memory ends
 
 
 @dataclass(frozen=True)
@@ -123,7 +124,8 @@ class _Pool:
         elif value is None and not error:
             error = f"the process died with exit code {worker.process.exitcode}"
         assert worker.number is not None
-        return Done(worker.number, value, error, peak, timed_out)
+        killed = value is None and not worker.signalled and worker.process.exitcode == -signal.SIGKILL
+        return Done(worker.number, value, error, peak, timed_out, killed)
 
 
 def _started(task: Callable[[], Any]) -> _Worker:

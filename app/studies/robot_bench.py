@@ -18,10 +18,10 @@ from importlib.util import find_spec
 import numpy as np
 from scipy.spatial.transform import RigidTransform
 
+from regrasp.app.campaigns.table import print_table
 from regrasp.app.files.resources import shipped
 from regrasp.app.robots.robot_file import load_robot
 from regrasp.app.studies.mesh_check import MeshCheck
-from regrasp.app.studies.table import print_table
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cell import Box
 from regrasp.interfaces.robot.urdf import pose_of

@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 from py_trees.parsers.behaviour_tree_xml import parse_behaviour_tree_xml
 from scipy.spatial.transform import RigidTransform, Rotation
 
+from regrasp.app.campaigns.table import print_table
 from regrasp.app.files.resources import shipped
 from regrasp.app.run.attempts import Attempts
 from regrasp.app.run.batch import Run, run_all
 from regrasp.app.run.tick_log import TickLog
 from regrasp.app.scenario.load import cases, load_scenario
-from regrasp.app.studies.table import print_table
 from regrasp.app.studies.wall_parts import PARTS_HEADER, part_lines
 from regrasp.app.tasks.cable.cells import cable_cell
 from regrasp.app.tasks.cable.studies.demo import SCENARIOS

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
+from regrasp.app.campaigns.statistics import wilson_interval
 from regrasp.app.records.result import Result
 from regrasp.app.scenario.load import Scenario
-from regrasp.app.studies.statistics import wilson_interval
 from regrasp.app.task.expectation import Expectation
 from regrasp.app.tasks.cable.studies.demo import run_demo
 from regrasp.interfaces.cable.cause import CableCause

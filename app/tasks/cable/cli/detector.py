@@ -149,8 +149,8 @@ def _detector(cell: "CableCell", model: Path | None) -> Any:
 
 
 def _print(figures: dict[str, Any]) -> None:
-    from regrasp.app.studies.statistics import wilson_interval
-    from regrasp.app.studies.table import print_table
+    from regrasp.app.campaigns.statistics import wilson_interval
+    from regrasp.app.campaigns.table import print_table
 
     lines = [
         (name, f"{right}/{all_}", "{:.1f} to {:.1f} %".format(*(100 * x for x in wilson_interval(right, all_))))

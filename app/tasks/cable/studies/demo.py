@@ -7,13 +7,13 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
+from regrasp.app.campaigns.statistics import wilson_interval
+from regrasp.app.campaigns.table import print_table
 from regrasp.app.files.whole_file import write_whole
 from regrasp.app.records.folders import folder_name
 from regrasp.app.records.result import plain, versions
 from regrasp.app.run.batch import Row, Run, RunEpisode, Settings, run_all
 from regrasp.app.scenario.load import Scenario, cases
-from regrasp.app.studies.statistics import wilson_interval
-from regrasp.app.studies.table import print_table
 from regrasp.app.studies.wall_parts import PARTS_HEADER, part_lines
 
 SCENARIOS = ("no_obstacle", "short_obstacle", "tall_obstacle")

@@ -9,10 +9,10 @@ from itertools import pairwise
 
 import numpy as np
 
+from regrasp.app.campaigns.table import print_table
 from regrasp.app.run.compose import build_world
 from regrasp.app.scenario.load import load_scenario
 from regrasp.app.scenario.sampling import draw_obstacles
-from regrasp.app.studies.table import print_table
 from regrasp.app.tasks.cable.studies.birrt import Birrt, Planner
 from regrasp.app.tasks.cable.studies.planner_queries import Query, draw_queries
 from regrasp.interfaces.arrays import FloatArray

@@ -13,10 +13,10 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform
 from scipy.stats import chi2
 
+from regrasp.app.campaigns.statistics import wilson_interval
+from regrasp.app.campaigns.table import print_table
 from regrasp.app.files.whole_file import write_whole
 from regrasp.app.records.result import plain, versions
-from regrasp.app.studies.statistics import wilson_interval
-from regrasp.app.studies.table import print_table
 from regrasp.app.tasks.cable.studies.pose.scenes import HEADLINE
 from regrasp.app.tasks.cable.studies.pose.tasks import run_tasks
 from regrasp.app.tasks.cable.studies.pose.trial import Setup

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from regrasp.app.studies.statistics import wilson_interval
+from regrasp.app.campaigns.statistics import wilson_interval
 from regrasp.app.tasks.cable.studies.pose.scenes import CONFIGURATIONS, HEADLINE
 from regrasp.app.tasks.cable.studies.pose.trial import Trial
 

@@ -12,10 +12,10 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
+from regrasp.app.campaigns.statistics import wilson_interval
+from regrasp.app.campaigns.table import print_table
 from regrasp.app.files.whole_file import write_whole
 from regrasp.app.records.result import plain, versions
-from regrasp.app.studies.statistics import wilson_interval
-from regrasp.app.studies.table import print_table
 from regrasp.app.tasks.cable.studies.pose.both_cameras import BOTH, run_both
 from regrasp.app.tasks.cable.studies.pose.negatives import Negative, run_negatives
 from regrasp.app.tasks.cable.studies.pose.scenes import CONFIGURATIONS, HEADLINE

@@ -2,7 +2,7 @@ import re
 
 import pytest
 
-from regrasp.app.studies.table import print_table
+from regrasp.app.campaigns.table import print_table
 
 HEADER = ("case", "as expected", "outcome", "seconds")
 NAMES = ["gravity=zero,light.brightness=0.75,seed=2", "gravity=earth,[bold]=0.5,seed=13"]

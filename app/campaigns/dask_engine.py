@@ -1,0 +1,121 @@
+"""An engine: the workers of a Dask scheduler, on this machine or a cluster. Needs the extra `cluster`."""
+
+import logging
+import pickle
+import subprocess
+import sys
+import threading
+from collections.abc import Generator, Iterable
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Self
+
+from distributed import Client, as_completed
+from distributed.scheduler import KilledWorker
+
+from regrasp.app.campaigns.campaign import Job
+from regrasp.app.campaigns.remote import Delivery, Order
+from regrasp.app.files.findings import Finding, Findings
+from regrasp.app.run.processes import Done
+
+CONNECT_SECONDS = 10.0  # until a scheduler counts as not there
+
+
+@dataclass(frozen=True)
+class Dask:
+    """The workers of a scheduler. Each run is done in a process that the worker starts: its crash is a result.
+
+    The workers need the same sources and packages. A record's files travel back with the result, so no common disk is
+    needed. When a worker is lost, Dask gives its runs to others.
+    """
+
+    client: Client
+    address: str
+
+    @classmethod
+    def connected(cls, address: str) -> Self:
+        """To the scheduler at an address such as tcp://10.0.0.5:8786. Raises `Findings` if it is not there."""
+        logging.getLogger("distributed").setLevel(logging.CRITICAL)  # it tells of each lost connection by a traceback
+        try:
+            client = Client(address, timeout=CONNECT_SECONDS, set_as_default=False)
+        except (OSError, ValueError, TypeError) as error:
+            why = str(error).splitlines()[0] if str(error) else type(error).__name__
+            message = f"no scheduler answers at {address} ({why}); start one with `dask scheduler`, or name another"
+            raise Findings([Finding("--scheduler", 0, message)]) from None
+        if not client.scheduler_info()["workers"]:
+            client.close()
+            message = f"the scheduler at {address} has no workers; start some with `dask worker {address}`"
+            raise Findings([Finding("--scheduler", 0, message)])
+        return cls(client, address)
+
+    def __call__(
+        self, jobs: Iterable[tuple[Job, Path | None]], program: str, wall_limit: float
+    ) -> Generator[Done[Any]]:
+        """See `Engine`."""
+        folders: dict[str, tuple[int, Path | None]] = {}
+        futures = []
+        for number, (job, folder) in enumerate(jobs):
+            order = pickle.dumps(Order(program, job.task, folder is not None, wall_limit))
+            future = self.client.submit(deliver, order, key=f"{job.key}-{number}", pure=False, retries=0)
+            folders[future.key] = number, folder
+            futures.append(future)
+        try:
+            ended = as_completed(futures)
+            del futures  # a future that is held keeps its result in the cluster's memory
+            for future in ended:
+                number, folder = folders[future.key]
+                yield self._received(future, number, folder)
+        finally:
+            with suppress(Exception):  # the scheduler may be gone
+                self.client.cancel(list(ended.futures) if "ended" in locals() else [])
+            self.client.close(timeout=2)
+
+    def _received(self, future: Any, number: int, folder: Path | None) -> Done[Any]:
+        """A run's result, its record's files written to the folder."""
+        if future.status == "finished":
+            try:
+                delivery: Delivery = pickle.loads(future.result(timeout=60))
+            except Exception as error:
+                raise self._lost(str(error)) from None
+            if folder is not None and delivery.files:
+                folder.mkdir(parents=True)
+                for name, content in delivery.files.items():
+                    (folder / name).write_bytes(content)
+            return delivery.done._replace(number=number)
+        raised = future.exception() if future.status == "error" else None
+        if isinstance(raised, KilledWorker):
+            return Done(number, None, "each worker that had it was lost", 0.0)
+        if raised is not None:
+            return Done(number, None, f"{type(raised).__name__}: {raised}", 0.0)
+        raise self._lost(f"its task was {future.status}")
+
+    def _lost(self, why: str) -> Findings:
+        message = f"the scheduler at {self.address} is lost ({why}); what is done is kept: give the same command again"
+        return Findings([Finding("--scheduler", 0, message)])
+
+
+_idle: list["subprocess.Popen[bytes]"] = []  # of this Dask worker: programs that do runs
+_idle_lock = threading.Lock()
+
+
+def deliver(order: bytes) -> bytes:
+    """In a Dask worker: have a program do a pickled `Order`, and return its pickled `Delivery`."""
+    with _idle_lock:
+        program = _idle.pop() if _idle else None
+    if program is None or program.poll() is not None:
+        program = subprocess.Popen(
+            [sys.executable, "-m", "regrasp.app.campaigns.remote"], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+        )
+    assert program.stdin is not None
+    assert program.stdout is not None
+    try:
+        program.stdin.write(order)
+        program.stdin.flush()
+        delivery: Delivery = pickle.load(program.stdout)
+    except (EOFError, OSError, pickle.UnpicklingError):
+        program.kill()
+        return pickle.dumps(Delivery(Done(0, None, "the process died", 0.0, killed=True), {}))
+    with _idle_lock:
+        _idle.append(program)
+    return pickle.dumps(delivery)
