@@ -412,11 +412,11 @@ def _cell(value: Any) -> Any:
 
 def _write_junit(path: Path, store: "Store", version: "Version") -> None:
     from regrasp.app.campaigns.episodes import row_in
-    from regrasp.app.run.junit import TestCase, write_junit
+    from regrasp.app.run.junit import JunitCase, write_junit
 
     assert store.folder is not None
     cases = [
-        TestCase(
+        JunitCase(
             row_in(stored).scenario,
             f"{row_in(stored).case} seed {row_in(stored).seed}",
             row_in(stored),
