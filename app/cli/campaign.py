@@ -93,7 +93,7 @@ def run_campaign(
     \b
     A campaign file:
       scenarios:
-        - {scenario: no_obstacle, seeds: 0:50}
+        - {scenario: no_obstacle, seeds: "0:50"}
         - {scenario: mine.yaml, set: [gravity=earth], seeds: [3, 7]}
 
     \b

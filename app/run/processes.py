@@ -78,7 +78,11 @@ def run_each(
                     yield pool.received(next(worker for worker in pool.busy if worker.pipe is ready))
                 _enforce_deadlines(pool.busy, grace)
     finally:
-        _stop([worker.process for worker in (*pool.busy, *pool.idle)], grace)
+        for worker in pool.idle:
+            worker.pipe.close()  # it ends by itself
+        _stop([worker.process for worker in pool.busy], grace)
+        for worker in pool.idle:
+            worker.process.join()
 
 
 @dataclass
