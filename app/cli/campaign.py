@@ -133,11 +133,12 @@ def run_campaign(
         tell_of_compilation()
     settings = Settings(renderer=renderer)
     effort = Effort(wall_limit=math.inf if wall_limit is None else wall_limit)
+    where = _engine(scheduler, jobs)
     with Store.create(folder, KIND) as store:
         version = this_version(store)
         _tell_of_other_versions(store, version)
         asked = jobs_of(runs, settings)
-        interrupted = do_all(asked, store, _engine(scheduler, jobs), Stored(runs, keep), Progress(quiet), effort)
+        interrupted = do_all(asked, store, where, Stored(runs, keep), Progress(quiet), effort)
         low = _print_cases(store, version, {job.key for job in asked})
     if interrupted:
         raise typer.Exit(EXIT_INTERRUPTED)

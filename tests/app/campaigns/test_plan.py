@@ -26,7 +26,7 @@ def test_a_scenario_runs_every_case_with_every_seed() -> None:
 
 
 def test_a_campaign_file(tmp_path: Path) -> None:
-    (tmp_path / "own.yaml").write_text("cell: thesis\ntree: recovery\ngravity: earth\nseed: 11\n")
+    (tmp_path / "own.yaml").write_text("description: mine\ncell: thesis\ntree: recovery\ngravity: earth\nseed: 11\n")
     file = written(
         tmp_path,
         """
@@ -64,7 +64,7 @@ scenarios:
         ("scenarios:\n- {scenario: no_obstacle, set: [gravty=zero]}\n", "many.yaml:2: no_obstacle: --set gravty=zero"),
         ("scenarios:\n- {scenario: no_obstacle, set: ['vary.seed=[1]'], seeds: '0:2'}\n", "varies its seed itself"),
         (
-            "seeds: '0:1'\nscenarios:\n- scenario: no_obstacle\n- {scenario: no_obstacle, set: [limits.sim_seconds=5]}\n",
+            "seeds: '0:1'\nscenarios:\n- scenario: no_obstacle\n- {scenario: no_obstacle, set: [inputs.tries=5]}\n",
             "is asked for twice with other values",
         ),
     ],
