@@ -83,6 +83,7 @@ class Dask:
             if folder is not None and delivery.files:
                 folder.mkdir(parents=True)
                 for name, content in delivery.files.items():
+                    (folder / name).parent.mkdir(exist_ok=True)
                     (folder / name).write_bytes(content)
             return delivery.done._replace(number=number)
         raised = future.exception() if future.status == "error" else None

@@ -65,7 +65,7 @@ def _orders(stream: BinaryIO) -> Iterator[Order]:
 
 
 def taken(folder: Path) -> Files:
-    """The files of a folder, which is removed."""
-    files = {path.name: path.read_bytes() for path in folder.glob("*") if path.is_file()}
+    """The files of a folder by their paths in it; it is removed."""
+    files = {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
     shutil.rmtree(folder, ignore_errors=True)
     return files

@@ -74,6 +74,9 @@ def run_campaign(
         str | None, typer.Option(metavar="ADDRESS", help="With --engine dask: such as tcp://10.0.0.5:8786.")
     ] = None,
     keep: Annotated[Literal["all", "failed", "none"], typer.Option(help="Which runs' records are kept.")] = "failed",
+    pictures: Annotated[
+        bool, typer.Option("--pictures", help="Keep the cameras' frames at events in the records, as JPEG.")
+    ] = False,
     require: Annotated[
         float | None,
         typer.Option(
@@ -131,7 +134,7 @@ def run_campaign(
         raise Findings(found)
     if not quiet:
         tell_of_compilation()
-    settings = Settings(renderer=renderer)
+    settings = Settings(pictures=pictures, renderer=renderer)
     effort = Effort(wall_limit=math.inf if wall_limit is None else wall_limit)
     where = _engine(scheduler, jobs)
     with Store.create(folder, KIND) as store:
@@ -304,6 +307,9 @@ def rerun(
     row: Annotated[int, typer.Argument(min=1, help="The run's row, as `failures` names it.")],
     out: Annotated[Path | None, typer.Option(help="The record's folder; default in runs/.")] = None,
     video: Annotated[bool, typer.Option("--video", help="Film the run into the record.")] = False,
+    pictures: Annotated[
+        bool, typer.Option("--pictures", help="Keep the cameras' frames at events in the record, as JPEG.")
+    ] = False,
     quiet: Annotated[bool, typer.Option("--quiet", help="No progress; only the summary.")] = False,
 ) -> None:
     """Do a campaign's run again, with a record, and a film if you like.
@@ -333,7 +339,8 @@ def rerun(
 
     renderer: Any = row_in(stored).renderer
     with shown_progress(quiet) as observers:
-        result = run_episode(run.scenario, into, seed=run.seed, video=video, renderer=renderer, observers=observers)
+        how = {"video": video, "pictures": pictures, "renderer": renderer, "observers": observers}
+        result = run_episode(run.scenario, into, seed=run.seed, **how)
     typer.echo(run_summary(result, into))
     raise typer.Exit(exit_code(result))
 
