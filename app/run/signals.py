@@ -26,7 +26,7 @@ def engine_signals(world: "World[Any]", services: "Services") -> list[SignalGrou
 def _of_arm(name: str, world: "World[Any]", services: "Services") -> SignalGroup:
     arm, motion, spec = world.arms[name], services.motion, services.known.arm(name)
     kinematics = ArmKinematics(spec.robot, spec.world_from_base)
-    count = len(kinematics)
+    count, recent = len(kinematics), "largest since the row before"
     signals = (
         Signal(f"{name}.joints", "rad or m", count, "joint positions as the encoders read, corrected by what is known"),
         Signal(f"{name}.joints_true", "rad or m", count, "joint positions"),
@@ -34,15 +34,8 @@ def _of_arm(name: str, world: "World[Any]", services: "Services") -> SignalGroup
         Signal(f"{name}.tool_true", POSE, 12, "world_from_tool"),
         Signal(f"{name}.gap", "m", 1, "between the pads, as the gripper reads"),
         Signal(f"{name}.gap_true", "m", 1, "between the pads"),
-        Signal(
-            f"{name}.forbidden_force_true", "N", 1, "largest since the row before against what the arm must not touch"
-        ),
-        Signal(
-            f"{name}.force_true",
-            "N",
-            1,
-            "largest sum since the row before of the arm's other contacts, a grasp among them",
-        ),
+        Signal(f"{name}.forbidden_force_true", "N", 1, f"{recent} against what the arm must not touch"),
+        Signal(f"{name}.force_true", "N", 1, f"{recent} of its other contacts together, as of a grasp"),
     )
 
     def sample() -> Sequence[float]:

@@ -22,7 +22,7 @@ def test_a_record_of_it_is_read_and_explained(folder: Path) -> None:
     assert record.result is not None
     assert record.remarks == ()
     assert (record.result.outcome, record.result.task, record.result.seed) == ("time_limit", "cable", 0)
-    assert [event.event for event in record.events][0] == "begin"
+    assert record.events[0].event == "begin"
     assert record.ticks
     assert (record.signals() is not None) == (folder / "signals.f32").exists()
     page = CliRunner().invoke(app, ["explain", str(folder)])
