@@ -203,7 +203,8 @@ def test_a_result_is_written_to_its_end(tmp_path: Path, monkeypatch: pytest.Monk
     with pytest.raises(KeyboardInterrupt), Record(tmp_path / "run", "s", 1):
         pass
     assert json.loads((tmp_path / "run/result.json").read_text())["scenario"] == "s"
-    assert sorted(path.name for path in (tmp_path / "run").iterdir()) == ["events.jsonl", "result.json", "ticks.jsonl"]
+    kept = ["events.jsonl", "result.json", "signals.f32", "ticks.jsonl"]
+    assert sorted(path.name for path in (tmp_path / "run").iterdir()) == kept
 
 
 def test_a_process_that_died_gets_its_result_from_the_parent(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -26,6 +26,7 @@ def test_a_command_is_one_of_ours(command: str) -> None:
     words = shlex.split(command)[1:]
     context = group.make_context("regrasp", list(words))
     while hasattr(group, "resolve_command"):
+        words = [*context._protected_args, *context.args]  # a group may put its default command in front
         name, group, words = group.resolve_command(context, words)
         context = group.make_context(name, list(words), parent=context)
     assert context.command is group

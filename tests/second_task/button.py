@@ -107,7 +107,7 @@ class FindButton(StepsLeaf):
 
 
 class Press(StepsLeaf):
-    """Presses the button that was found, and draws back."""
+    """Presses the button that was found until the arm stands still, and draws back."""
 
     NEEDS: ClassVar[Keys] = (PLACE,)
     services: ButtonServices
@@ -115,7 +115,10 @@ class Press(StepsLeaf):
     def steps(self) -> LeafSteps:
         motion, arm = self.services.motion, self.services.known.button.arm
         yield motion.go_before(arm, self.read(PLACE))
-        yield motion.shift(arm, [0.115, 0.0, 0.0], checked=False)
+        reached, step = -np.inf, 0.006
+        while (x := motion.kinematics[arm].tool(motion.joints(arm)).translation[0]) > reached + step / 2:
+            reached = x
+            yield motion.shift(arm, [step, 0.0, 0.0], checked=False)
         yield motion.shift(arm, [-0.08, 0.0, 0.0], checked=False)
 
 

@@ -104,7 +104,8 @@ def test_a_run_cut_short_leaves_a_whole_record(tmp_path: Path, error: BaseExcept
     assert (tmp_path / "run" / "ticks.jsonl").read_text() == '{"t": 0.0}\n'
     assert record.ticks.closed
     assert record.events.closed
-    assert sorted(p.name for p in (tmp_path / "run").iterdir()) == ["events.jsonl", "result.json", "ticks.jsonl"]
+    kept = ["events.jsonl", "result.json", "signals.f32", "ticks.jsonl"]
+    assert sorted(p.name for p in (tmp_path / "run").iterdir()) == kept
 
 
 def test_a_result_given_before_the_interrupt_is_kept(tmp_path: Path) -> None:
@@ -159,7 +160,7 @@ def test_of_two_runs_that_take_a_folder_at_once_the_second_is_told(
         "regrasp.app.records.record.folders.run_folder_findings", lambda _folder: []
     )  # as both saw it before either began
     first = Record(tmp_path / "run", "s", 1)
-    with pytest.raises(Findings, match=r"run: holds a run already \(events.jsonl, ticks.jsonl\); name another folder"):
+    with pytest.raises(Findings, match=r"run: holds a run already \(events.jsonl, .*\); name another folder"):
         Record(tmp_path / "run", "s", 2)
     with first:
         pass

@@ -155,10 +155,11 @@ def test_bad_input_is_one_line(arguments: list[str], told: str) -> None:
     assert len(result.stderr.splitlines()) == 1
 
 
-def test_a_folder_with_a_study_is_refused(tmp_path: Path) -> None:
+def test_a_folder_with_other_things_is_refused_and_left_alone(tmp_path: Path) -> None:
     (tmp_path / "pose.json").write_text("{}")
     result = CliRunner().invoke(app, ["study", "pose", "--out", str(tmp_path)])
-    assert (result.exit_code, "already holds a study" in result.stderr) == (2, True)
+    assert (result.exit_code, "holds other things (pose.json)" in result.stderr) == (2, True)
+    assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [("pose.json", "{}")]
 
 
 @pytest.mark.filterwarnings("error")
