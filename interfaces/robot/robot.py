@@ -32,6 +32,7 @@ from regrasp.interfaces.robot.parts import (
     Sphere,
 )
 from regrasp.interfaces.robot.urdf import DECIMALS, RobotError, UrdfJoint, UrdfTree, snapped
+from regrasp.interfaces.robot.urdf_validation import DRIVEN
 
 BEAM, CARRIAGE = "rail_beam", "rail_carriage"  # links of a rail
 _CARRIAGE_MASS, _CARRIAGE_INERTIA = 10.0, 0.1  # kg, kg m2; choice: a drive as strong as a rail's moves it anyhow
@@ -220,6 +221,9 @@ class Robot(Model):
                 right = nearest(joint.in_urdf, [name for name, known in tree.joints.items() if known.kind != "fixed"])
                 path = ("joints", i, "urdf" if joint.urdf else "name")
                 raise RobotError(path, f"the URDF has no joint {quoted(joint.in_urdf)}; {right}")
+            if (kind := tree.joints[joint.in_urdf].kind) not in DRIVEN:
+                message = f"the URDF's joint {quoted(joint.in_urdf)} is {kind}; driven ones are {', '.join(DRIVEN)}"
+                raise RobotError(("joints", i), message)
         for key, link in (("tool", self.tool.link), ("base_link", self.base_link)):
             if link not in tree.links:
                 here: tuple[str, ...] = (key, "link") if key == "tool" else (key,)
@@ -373,6 +377,9 @@ def _limits(i: int, joint: Joint, known: UrdfJoint) -> tuple[float, float, float
     for key, value in values.items():
         if value is None:
             message = f"neither the file nor the URDF says {words[key]} of {joint.name}; write {words[key]}: a number"
+            raise RobotError(("joints", i), message)
+        if key in ("velocity", "effort") and value <= 0:
+            message = f"{key} of {joint.in_urdf} is {value:g} in the URDF; write {words[key]}: a number above 0"
             raise RobotError(("joints", i), message)
     lower, upper = float(values["lower"] or 0.0), float(values["upper"] or 0.0)
     if lower >= upper:

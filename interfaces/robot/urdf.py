@@ -16,6 +16,7 @@ import numpy as np
 
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.robot.parts import Placed, Source
+from regrasp.interfaces.robot.urdf_validation import problem_of
 
 _DIRECTION = 1e-9  # an entry of a rotation that is nearer to -1, 0 or 1 is that: URDFs write 1.5707963 for pi / 2
 DECIMALS = 12  # of lengths in m: far below what any arm can do, so that sums of decimals come out as decimals
@@ -86,7 +87,7 @@ class UrdfTree:
 def read_urdf(source: Source, folder: Path) -> ET.Element:
     """The root element of a source, whose mesh files are absolute paths. `folder` holds the robot file.
 
-    Raises RobotError: there is no such package or file, or it is no XML.
+    Raises RobotError: there is no such package or file, or it is no URDF.
     """
     return ET.fromstring(_text(source.model_dump_json(), folder))
 
@@ -102,7 +103,10 @@ def _text(source_json: str, folder: Path) -> str:
     try:
         root = ET.fromstring(_bound(_expanded(path, source.arguments)))
     except ET.ParseError as error:
-        raise RobotError(("path",), f"{path} is no URDF: {error}") from None
+        message = f"{path}:{error.position[0]}: no XML: {error}; mend it there, or name a URDF file"
+        raise RobotError(("path",), message) from None
+    if problem := problem_of(root):
+        raise RobotError(("path",), f"{path}: {problem}")
     for mesh in root.iter("mesh"):
         mesh.set("filename", str(_mesh_file(mesh.get("filename", ""), path, base, source.ros_packages)))
     return ET.tostring(root, encoding="unicode")
@@ -117,7 +121,10 @@ def _package(name: str) -> Path:
 
 def _expanded(path: Path, arguments: Mapping[str, str]) -> str:
     if path.suffix != ".xacro":
-        return path.read_text(encoding="utf-8")
+        try:
+            return path.read_text(encoding="utf-8-sig")
+        except UnicodeDecodeError:
+            raise RobotError(("path",), f"{path} is no text; name a URDF file") from None
     import xacro
 
     try:
