@@ -25,7 +25,7 @@ Found = tuple[tuple[str | int, ...], str]  # where in the file, and what
 def check_robot(path: Path) -> list[LinkMeasure]:
     """The measured cover of a robot file in which nothing is wrong. Raises `Findings` otherwise."""
     robot, document = read_robot(path)
-    _raise(document, [*_limits(robot), *_poses(robot), *_names(robot)])
+    _raise(document, [*_limits(robot), *_poses(robot)])
     try:
         measures = measure_cover(robot)
     except RobotError as error:
@@ -75,12 +75,6 @@ def _poses(robot: Robot) -> Iterator[Found]:
         for (a, b), depth in meetings(robot, values, SELF_OVERLAP):
             message = f"here the spheres of {a} and {b} overlap by {1000 * depth:.1f} mm; at most"
             yield path, f"{message} {1000 * SELF_OVERLAP:.0f} mm are let pass: change the pose, or the spheres"
-
-
-def _names(robot: Robot) -> Iterator[Found]:
-    for link in robot.cover.links:
-        if link not in robot.tree.links:
-            yield ("cover", "links", link), f"the URDF has no link {link!r}"
 
 
 def _bare(robot: Robot, measures: list[LinkMeasure]) -> Iterator[Found]:

@@ -113,6 +113,12 @@ class _Gripper(Model):
     speed: Annotated[float, Field(ge=1e-3, le=10)]  # m/s of each finger
     friction: Friction  # of the pads
 
+    @model_validator(mode="after")
+    def _closes(self) -> Self:
+        if self.closed >= self.opening:
+            raise ValueError(f"closed {self.closed:g} is not below opening {self.opening:g}; exchange them")
+        return self
+
 
 class ParallelGripper(_Gripper):
     """Two sliding fingers that one drive moves: the URDF's joints have opposite signs, the left one opens upwards."""

@@ -5,11 +5,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
+from pydantic.json_schema import SkipJsonSchema
 
 from regrasp.interfaces.arrays import FloatArray, Mask
 from regrasp.interfaces.fields import Color, JointAngle, Model
@@ -55,26 +56,26 @@ class Robot(Model):
     sleep: tuple[JointAngle, ...]
     calibration: Calibration
     footprint: Footprint
-    spheres: dict[LinkName, tuple[Sphere, ...]]  # by link, in its frame
+    # By link, in its frame. Only a file to which spheres are yet to be fitted has none; no cell takes it.
+    spheres: dict[LinkName, tuple[Sphere, ...]] = Field(default_factory=dict)
     # Pairs of links that can meet; links not named together are kept apart by the joints' limits.
-    self_collision: tuple[tuple[LinkName, LinkName], ...]
+    self_collision: tuple[tuple[LinkName, LinkName], ...] = ()
     cover: Cover = Cover()
     still: tuple[LinkName, ...] = ()  # links that turn on the spot, which nothing around can meet
     # Links that touch nothing in the world: PyBullet takes their hulls, which fill what is open between the fingers.
     untouchable: tuple[LinkName, ...] = ()
     paint: Color | None = None  # in place of the URDF's colours and textures
-    draw: Annotated[str, Field(pattern="^(visual|collision)$")] = "visual"  # which of the URDF's meshes are drawn
-    folder: str = ""
+    draw: Literal["visual", "collision"] = "visual"  # which of the URDF's meshes are drawn
+    folder: SkipJsonSchema[str] = ""  # no key for a person to write
 
     def element(self) -> ET.Element:
         """The whole URDF: arm, gripper and rail; mesh files are absolute paths. A new tree each time.
 
-        Raises RobotError: a source cannot be read.
+        Raises RobotError: a source cannot be read, or the parts do not fit together.
         """
         root = _at("urdf", self.urdf, self.folder)
         if self.attached is not None:
-            part = _at("attached", self.attached.urdf, self.folder)
-            urdf.attach(root, urdf.prefixed(part, self.attached.prefix), self.attached.at, "gripper_mount")
+            _attach(root, self.attached, self.folder)
         if self.rail is not None:
             _add_rail(root, self.rail, self.base_link)
         for link in root.findall("link"):
@@ -124,7 +125,7 @@ class Robot(Model):
         origins: FloatArray = np.asarray(np.round(steps, DECIMALS) + 0.0, float)
         axes = np.array([pose[:3, :3] @ joint.axis for pose, joint in zip(zero, joints, strict=True)])
         slides = np.array([joint.kind == "prismatic" for joint in joints])
-        last_from_tool = self._in_body(self.tool)[1]
+        last_from_tool = self._in_body(self.tool, "tool")[1]
         lower, upper, speeds, accelerations, torques = self._limits(joints)
         return Chain(
             names=self.joint_names,
@@ -143,7 +144,7 @@ class Robot(Model):
     @cached_property
     def mounted(self) -> tuple[int, FloatArray]:
         """The chain's link that carries a camera, and link_from_mount (4, 4). Raises RobotError without a mount."""
-        return self._in_body(self.camera_mount)
+        return self._in_body(self.camera_mount, "mount")
 
     @property
     def camera_mount(self) -> Placed:
@@ -192,8 +193,11 @@ class Robot(Model):
         assert isinstance(self.gripper, LinkageGripper)
         return Linkage.of(self.tree, self.gripper)
 
-    def _in_body(self, frame: Placed) -> tuple[int, FloatArray]:
-        return self._placed(frame.link, urdf.pose_of(frame.xyz, frame.rpy), {})
+    def _in_body(self, frame: Placed, key: str) -> tuple[int, FloatArray]:
+        try:
+            return self._placed(frame.link, urdf.pose_of(frame.xyz, frame.rpy), {})
+        except RobotError as error:
+            raise RobotError((key, "link"), str(error)) from None
 
     def _placed(self, link: str, link_from_frame: FloatArray, jaw: Mapping[str, float]) -> tuple[int, FloatArray]:
         try:
@@ -288,7 +292,7 @@ class Body:
             np.array(spheres, float).reshape(-1, 4),
             np.array(fingers, float).reshape(-1, 3),
             np.array(pairs, np.int64).reshape(-1, 2),
-            max(still, default=-1) + 1,
+            max(still | {0}) + 1,  # the first link stands still whatever the file says
             robot,
         )
 
@@ -345,8 +349,27 @@ def _at(key: str, source: Source, folder: str) -> ET.Element:
         raise RobotError((*inside, *error.path), str(error)) from None
 
 
+def _attach(root: ET.Element, attached: Attached, folder: str) -> None:
+    tree, part = UrdfTree(root), urdf.prefixed(_at("attached", attached.urdf, folder), attached.prefix)
+    if attached.at.link not in tree.links:
+        message = f"the URDF has no link {quoted(attached.at.link)}; {nearest(attached.at.link, tree.links)}"
+        raise RobotError(("attached", "at", "link"), message)
+    added = UrdfTree(part)
+    if both := {*tree.links, *tree.joints} & {*added.links, *added.joints}:
+        message = f"{quoted(min(both))} is a name in both URDFs; give the gripper's names another prefix"
+        raise RobotError(("attached", "prefix"), message)
+    urdf.attach(root, part, attached.at, "gripper_mount")
+
+
 def _add_rail(root: ET.Element, rail: Rail, base: str) -> None:
     """The beam as the new root, and a carriage on it that carries the base."""
+    tree = UrdfTree(root)
+    if base not in tree.roots:
+        message = f"a rail carries the whole robot; the URDF's first link is {tree.roots[0]}, name that"
+        raise RobotError(("base_link",), message)
+    if rail.name in tree.joints:
+        message = f"the URDF has a joint {quoted(rail.name)}, too; give the rail another name"
+        raise RobotError(("rail", "name"), message)
     beam, carriage = (ET.SubElement(root, "link", name=name) for name in (BEAM, CARRIAGE))
     along = "xyz".index(rail.axis)
     size, middle = [rail.beam[0], rail.beam[0], rail.beam[1]], [0.0, 0.0, 0.0]
