@@ -5,9 +5,11 @@ from collections.abc import Iterator
 import numpy as np
 
 from regrasp.interfaces.quote import nearest, quoted
+from regrasp.interfaces.robot.parts import ParallelGripper
 from regrasp.interfaces.robot.robot import Robot
 
 Found = tuple[tuple[str | int, ...], str]  # where in the file, and what
+_CLOSE = 1e-6  # m by which a limit may be rounded
 _ON_LINE = 1e-6  # m and rad by which axes of joints may be off one line
 
 
@@ -18,7 +20,7 @@ def inconsistencies(robot: Robot) -> list[Found]:
     _ = robot.chain, robot.body
     if robot.mount is not None:
         _ = robot.mounted
-    return [*_base(robot), *_still(robot)]
+    return [*_base(robot), *_still(robot), *_finger_limits(robot)]
 
 
 def _doubled_joints(robot: Robot) -> Iterator[Found]:
@@ -64,6 +66,23 @@ def _still(robot: Robot) -> Iterator[Found]:
             moved_by = robot.joint_names[last]
             message = f"{link} does not only turn on the spot: {moved_by} moves it along; write still without it"
             yield ("still", n), message
+
+
+def _finger_limits(robot: Robot) -> Iterator[Found]:
+    """Positions of sliding fingers that their joints do not reach."""
+    if not isinstance(robot.gripper, ParallelGripper):
+        return
+    for key, gap in (("opening", robot.gripper.opening), ("closed", robot.gripper.closed)):
+        positions = robot.parallel_jaw.positions(gap)
+        for joint in robot.parallel_jaw.joints:
+            lower, upper = joint.limits.get("lower", 0.0), joint.limits.get("upper", 0.0)
+            if not lower - _CLOSE <= positions[joint.name] <= upper + _CLOSE:
+                stands = f"{joint.name} would stand at {positions[joint.name]:g} m with the pads {gap:g} m apart"
+                yield (
+                    ("gripper", key),
+                    f"{stands}, beyond the URDF's {lower:g} to {upper:g}; correct {key} or pads",
+                )
+                break
 
 
 def _turning_on_the_spot(robot: Robot) -> int:

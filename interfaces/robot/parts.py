@@ -94,7 +94,7 @@ class Rail(Model):
 
 
 class Pads(Model):
-    """Rubber pads that are added to two fingers, as boxes; the URDF has none."""
+    """Rubber pads that are added to two fingers, as boxes; the URDF has none. "Along the finger" is the tool's x."""
 
     links: tuple[LinkName, LinkName]  # of the left and the right finger, whose faces look at each other
     face: Number  # m from a finger link's origin to its inner face, against the way it opens
@@ -121,7 +121,7 @@ class _Gripper(Model):
 
 
 class ParallelGripper(_Gripper):
-    """Two sliding fingers that one drive moves: the URDF's joints have opposite signs, the left one opens upwards."""
+    """Two sliding fingers that one drive moves. Which way each of their joints opens follows from the URDF."""
 
     type: Literal["parallel"]
     joints: tuple[str, str]  # of the left and the right finger

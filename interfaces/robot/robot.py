@@ -18,6 +18,7 @@ from regrasp.interfaces.quote import nearest, quoted
 from regrasp.interfaces.robot import urdf
 from regrasp.interfaces.robot.chain import Chain
 from regrasp.interfaces.robot.linkage import Linkage
+from regrasp.interfaces.robot.parallel_jaw import ParallelJaw
 from regrasp.interfaces.robot.parts import (
     Attached,
     Calibration,
@@ -27,6 +28,7 @@ from regrasp.interfaces.robot.parts import (
     Joint,
     LinkageGripper,
     LinkName,
+    ParallelGripper,
     Placed,
     Rail,
     Source,
@@ -184,8 +186,13 @@ class Robot(Model):
         gripper = self.gripper
         if isinstance(gripper, LinkageGripper):
             return self.linkage.positions(opening)
-        finger = finger_position(opening, gripper.pads.face, gripper.pads.thickness)
-        return dict(zip(gripper.joints, (finger, -finger), strict=True))
+        return self.parallel_jaw.positions(opening)
+
+    @cached_property
+    def parallel_jaw(self) -> ParallelJaw:
+        """How the jaw of a parallel gripper opens."""
+        assert isinstance(self.gripper, ParallelGripper)
+        return ParallelJaw.of(self.tree, self.gripper, self.tool)
 
     @cached_property
     def linkage(self) -> Linkage:
@@ -327,18 +334,13 @@ def _finger_ways(robot: Robot) -> dict[str, FloatArray]:
     """In which direction (3,) of the last chain link each finger's link moves as a parallel jaw opens."""
     if isinstance(robot.gripper, LinkageGripper):
         return {}
-    ways = {}
+    ways, jaw = {}, robot.parallel_jaw
     for link in (link for link in robot.spheres if link in robot.tree.links):
-        for name, side in zip(robot.gripper.joints, (1.0, -1.0), strict=True):
-            joint = next((joint for joint in robot.tree.way_to(link) if joint.name == name), None)
-            if joint is not None:
-                ways[link] = side * (robot.link_place(joint.child)[1][:3, :3] @ joint.axis)
+        above = [joint.name for joint in robot.tree.way_to(link)]
+        for joint, sign in zip(jaw.joints, jaw.signs, strict=True):
+            if joint.name in above:
+                ways[link] = sign * (robot.link_place(joint.child)[1][:3, :3] @ joint.axis)
     return ways
-
-
-def finger_position(gap: float, face: float, thickness: float) -> float:
-    """Position, m, of a parallel gripper's left finger joint at which the pads are `gap` m apart; see `Pads`."""
-    return gap / 2 + face + thickness
 
 
 def _at(key: str, source: Source, folder: str) -> ET.Element:

@@ -241,8 +241,18 @@ def pose_of(xyz: tuple[float, ...], rpy: tuple[float, ...]) -> FloatArray:
     return pose
 
 
+def rpy_of(rotation: FloatArray) -> tuple[float, float, float]:
+    """The roll, pitch and yaw of a rotation (3, 3), as `pose_of` takes them; yaw is 0 where roll can stand for it."""
+    across = float(np.hypot(rotation[0, 0], rotation[1, 0]))
+    pitch = np.arctan2(-rotation[2, 0], across)
+    if across < _DIRECTION:
+        return float(np.arctan2(-rotation[1, 2], rotation[1, 1])) + 0.0, float(pitch), 0.0
+    roll, yaw = np.arctan2(rotation[2, 1], rotation[2, 2]), np.arctan2(rotation[1, 0], rotation[0, 0])
+    return float(roll) + 0.0, float(pitch) + 0.0, float(yaw) + 0.0
+
+
 def snapped(rotation: FloatArray) -> FloatArray:
-    """The rotation (3, 3) with entries that are nearly -1, 0 or 1 exactly so."""
+    """The rotation (3, 3), or rows of one, with entries that are nearly -1, 0 or 1 exactly so."""
     whole = np.rint(rotation)
     return np.asarray(np.where(np.abs(rotation - whole) < _DIRECTION, whole + 0.0, rotation))
 
