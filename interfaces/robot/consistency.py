@@ -8,7 +8,8 @@ from regrasp.interfaces.quote import nearest, quoted
 from regrasp.interfaces.robot.parts import ParallelGripper
 from regrasp.interfaces.robot.robot import Robot
 
-Found = tuple[tuple[str | int, ...], str]  # where in the file, and what
+Where = tuple[str | int, ...]  # a place in the file
+Found = tuple[Where, str]  # where, and what
 _CLOSE = 1e-6  # m by which a limit may be rounded
 _ON_LINE = 1e-6  # m and rad by which axes of joints may be off one line
 
@@ -43,7 +44,7 @@ def _pairs(robot: Robot) -> Iterator[Found]:
 
 def _unknown_links(robot: Robot) -> Iterator[Found]:
     links = robot.tree.links
-    named: list[tuple[tuple[str | int, ...], str]] = [(("cover", "links", link), link) for link in robot.cover.links]
+    named: list[tuple[Where, str]] = [(("cover", "links", link), link) for link in robot.cover.links]
     named += [(("untouchable", n), link) for n, link in enumerate(robot.untouchable)]
     for path, link in named:
         if link not in links:

@@ -16,6 +16,7 @@ from regrasp.interfaces.fields import (
     Vector,
 )
 
+JointName = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$", max_length=40, examples=["wrist_1"])]
 LinkName = Annotated[str, Field(min_length=1, max_length=80)]
 Sphere = tuple[Number, Number, Number, Annotated[float, Field(gt=0, le=2)]]  # centre and radius, m
 
@@ -46,7 +47,7 @@ class Joint(Model):
     Units are rad, rad/s, rad/s2 and N m; of a sliding joint m, m/s, m/s2 and N.
     """
 
-    name: Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$", max_length=40)]
+    name: JointName
     urdf: str | None = None  # its name there, if that is another
     sign: Literal[1, -1] = 1  # -1: we count the other way round
     lower: Number | None = None
@@ -75,7 +76,7 @@ class Rail(Model):
     long as the way of the carriage and stays where it is.
     """
 
-    name: Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$", max_length=40)] = "rail"
+    name: JointName = "rail"
     axis: Literal["x", "y", "z"] = "y"  # of the base's frame
     lower: Number
     upper: Number

@@ -4,6 +4,7 @@ import xml.etree.ElementTree as ET
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import zip_longest
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -188,6 +189,14 @@ class Robot(Model):
             return self.linkage.positions(opening)
         return self.parallel_jaw.positions(opening)
 
+    def pad_places(self, opening: float) -> FloatArray:
+        """The pads' middles (2, 3), m, in the URDF's root with the arm's joints at zero and this opening, m."""
+        gripper, positions = self.gripper, self.gripper_positions(opening)
+        if isinstance(gripper, LinkageGripper):
+            return np.array([self.tree.frame(link, positions)[:3, 3] for link in gripper.pads])
+        pads = zip(gripper.pads.links, self.parallel_jaw.pads, strict=True)
+        return np.array([(self.tree.frame(link, positions) @ pose)[:3, 3] for link, pose in pads])
+
     @cached_property
     def parallel_jaw(self) -> ParallelJaw:
         """How the jaw of a parallel gripper opens."""
@@ -240,10 +249,26 @@ class Robot(Model):
                 here: tuple[str, ...] = (key, "link") if key == "tool" else (key,)
                 raise RobotError(here, f"the URDF has no link {quoted(link)}; {nearest(link, tree.links)}")
         way = [joint for joint in tree.way_to(self.tool.link) if joint.kind != "fixed"]
-        if [joint.name for joint in way] != [*self.urdf_joints]:
-            there, given = ", ".join(joint.name for joint in way) or "none", ", ".join(self.urdf_joints)
-            raise RobotError(("joints",), f"the joints that move the tool are {there}, in this order, not {given}")
+        self._compare_joints([joint.name for joint in way])
         return way
+
+    def _compare_joints(self, there: list[str]) -> None:
+        """Raise RobotError for the first joint that is another than on the URDF's way to the tool."""
+        given, on_rail = [*self.urdf_joints], int(self.rail is not None)
+        if there == given:
+            return
+        n = next(i for i, (a, b) in enumerate(zip_longest(there, given)) if a != b)
+        path: tuple[str | int, ...] = ("joints", n - on_rail) if n < len(given) else ("joints",)
+        if n == len(given):
+            wrong = f"{there[n]} is missing at the end"
+        elif given[n] not in there:
+            wrong = f"{given[n]} does not move the tool"
+        elif n == len(there):
+            wrong = f"{given[n]} stands twice"
+        else:
+            wrong = f"{there[n]} {'comes' if there[n] in given else 'is missing'} before {given[n]}"
+        in_order = ", ".join(there[on_rail:]) or "none"
+        raise RobotError(path, f"{wrong}; the URDF's joints from the base to the tool are {in_order}")
 
     def _limits(self, joints: list[UrdfJoint]) -> FloatArray:
         """Lower and upper limits, speeds, accelerations and torques (5, n)."""

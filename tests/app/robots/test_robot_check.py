@@ -63,6 +63,34 @@ WRONG = {
         "  upper:",
         ["upper stand out by up to 59.9"],
     ),
+    "a joint of the fingers": (
+        ("  - {name: bend", "  - {name: left, acceleration: 5.0}\n  - {name: bend"),
+        "- {name: left",
+        ["left does not move the tool; the URDF's joints from the base to the tool are turn, bend"],
+    ),
+    "a joint too few": (("  - {name: turn, acceleration: 5.0}\n", ""), "- {name: be", ["turn is missing before bend"]),
+    "a joint too few at the end": (
+        ("  - {name: bend, acceleration: 5.0, lower: -1.5}\n", ""),
+        "joints:",
+        ["bend is missing at the end"],
+    ),
+    "joints in another order": (
+        (
+            "{name: turn, acceleration: 5.0}",
+            "{name: one, urdf: bend, acceleration: 5.0}\n  - {name: turn, acceleration: 1}",
+        ),
+        "- {name: one",
+        ["turn comes before bend"],
+    ),
+    "no sign": (("{name: bend", "{sign: 2, name: bend"), "- {sign", ["joints.1.sign is 2; expected one of 1, -1"]),
+    "a name that is none": (("name: bend", 'name: "j 2;é"'), '- {name: "j', ["expected text such as 'wrist_1'"]),
+    "a tool that is turned": (
+        ("rpy: [0.0,", "rpy: [0.2,"),
+        "tool:",
+        ["the tool's y is turned by 11 degrees from the way in which the fingers close"],
+    ),
+    "a tool off the pads": (("0.0, 0.24]", "0.0, 0.30]"), "tool:", ["the tool lies 60 mm from the pads' middle"]),
+    "no spheres": ((ROBOT[ROBOT.index("spheres:") :], "spheres: {}\n"), "spheres:", ["no spheres; `regrasp robots sp"]),
     "a promise for no link": (("excess: 0.06}", "links: {uper: {}}}"), "cover:", ["no link 'uper'"]),
 }
 
@@ -107,3 +135,31 @@ def test_a_pose_in_which_the_robot_meets_itself_is_told(tmp_path: Path) -> None:
     with pytest.raises(Findings) as error:
         check_robot(path)
     assert "the spheres of upper and left overlap by" in error.value.items[0].message
+
+
+def test_the_same_meeting_in_several_poses_is_told_once(tmp_path: Path) -> None:
+    text = ROBOT.replace("self_collision: []", "self_collision: [[upper, left]]").replace("0.0, 1.0]", "0.0, 3.0]")
+    path = write_robot(tmp_path, text.replace("[[0.0, 0.0]]", "[[0.0, 3.05], [0.1, 3.1]]"))
+    (tmp_path / "toy.urdf").write_text(URDF.replace('lower="-2" upper="2"', 'lower="-3.2" upper="3.2"'))
+    with pytest.raises(Findings) as error:
+        check_robot(path)
+    (found,) = error.value.items
+    assert found.line == ROBOT[: ROBOT.index("sleep:")].count("\n") + 1
+    assert found.message.startswith("here, and in 2 more poses the spheres of upper and left overlap by ")
+
+
+def test_what_fits_spheres_names_the_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    path = write_robot(tmp_path, ROBOT.replace("  left: [[0, 0, 0, 0.03]]\n", ""))
+    with pytest.raises(Findings) as error:
+        check_robot(path)
+    assert "`regrasp robots spheres toy.yaml --links left` fits them" in error.value.items[0].message
+
+
+def test_a_wrong_item_does_not_make_its_list_too_short(tmp_path: Path) -> None:
+    joints = ROBOT[ROBOT.index("  - {name: turn") : ROBOT.index("tool:")]
+    path = write_robot(tmp_path, ROBOT.replace(joints, '  - {name: "j 2", acceleration: 5.0}\n'))
+    with pytest.raises(Findings) as error:
+        check_robot(path)
+    (found,) = error.value.items
+    assert found.message.startswith("joints.0.name is 'j 2'; expected text such as 'wrist_1'")

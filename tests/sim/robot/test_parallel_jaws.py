@@ -149,8 +149,8 @@ WRONG = {
     ),
     "too close": ("face: 0.005", "face: -0.006", "left would stand at -0.002 m with the pads 0 m apart"),
     "a tool across": (
-        "0.24]}",
-        "0.24], rpy: [0.0, 0.0, 1.57]}",
+        "rpy: [0.0, -1.5707963267948966, 0.0]",
+        "rpy: [0.0, 0.0, 1.57]",
         "the tool's x lies along the way in which",
     ),
 }
