@@ -8,13 +8,14 @@ import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from regrasp.interfaces.arrays import FloatArray
+from regrasp.interfaces.quote import quoted
 from regrasp.interfaces.robot.parts import Placed, Source
 from regrasp.interfaces.robot.urdf_validation import problem_of
 
@@ -99,7 +100,7 @@ def _text(source_json: str, folder: Path) -> str:
     path = base / source.path
     if not path.is_file():
         where = f"the package {source.package}" if source.package else "the robot file's folder"
-        raise RobotError(("path",), f"{where} has no file {source.path}; write its path from there")
+        raise RobotError(("path",), f"{where} has no file {quoted(source.path)}; write its path from there")
     try:
         root = ET.fromstring(_bound(_expanded(path, source.arguments)))
     except ET.ParseError as error:
@@ -113,10 +114,20 @@ def _text(source_json: str, folder: Path) -> str:
 
 
 def _package(name: str) -> Path:
+    """The folder of an installed package, found without running it: any module may be named."""
+    first, *inside = name.split(".")
     try:
-        return Path(str(files(name)))
-    except (ModuleNotFoundError, TypeError, ValueError):
-        raise RobotError(("package",), f"no package {name} is installed; pip install it, or name another") from None
+        spec = find_spec(first) if name.isascii() and all(map(str.isidentifier, (first, *inside))) else None
+    except ValueError:  # such as __main__, which has none
+        spec = None
+    if spec is None:
+        message = f"no package {quoted(name)} is installed; pip install it, or name another"
+        raise RobotError(("package",), message)
+    folders = [Path(place, *inside) for place in spec.submodule_search_locations or ()]
+    found = next((folder for folder in folders if folder.is_dir()), None)
+    if found is None:
+        raise RobotError(("package",), f"{quoted(name)} is no package with files; name one that has the URDF")
+    return found
 
 
 def _expanded(path: Path, arguments: Mapping[str, str]) -> str:

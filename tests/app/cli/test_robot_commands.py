@@ -138,6 +138,29 @@ def test_a_picture_of_a_robot_without_spheres_shows_the_robot_alone(tmp_path: Pa
     assert drawn == [True, False]
 
 
+@pytest.mark.parametrize("name", ["toy.jpg", "toy", "toy.yaml"])
+def test_a_picture_that_is_no_png_is_refused(tmp_path: Path, name: str) -> None:
+    before = {file: file.read_bytes() for file in tmp_path.iterdir()}
+    ran = invoke("show", "toy.yaml", "--picture", name)
+    assert (ran.exit_code, ran.stdout) == (2, "")
+    assert ran.stderr == f"--picture: '{name}' is no PNG file; write a name with .png\n"
+    assert {file: file.read_bytes() for file in tmp_path.iterdir()} == before
+
+
+@pytest.mark.parametrize("place", ["toy.urdf/a.yaml", "/proc/a/b.yaml", "folder"])
+def test_where_nothing_can_be_written_is_told_before_the_fit(tmp_path: Path, place: str) -> None:
+    (tmp_path / "folder").mkdir()
+    ran = invoke("spheres", "toy.yaml", "-o", place)
+    assert (ran.exit_code, ran.stderr.count("\n")) == (2, 1), ran.stderr
+    assert ran.stderr.startswith(f"{place}: ")
+
+
+def test_folders_on_the_way_to_the_spheres_are_made(tmp_path: Path) -> None:
+    ran = invoke("spheres", "toy.yaml", "--links", "left", "-o", "some/where/made.yaml")
+    assert ran.exit_code == 0, ran.output
+    assert "left" in yaml.safe_load((tmp_path / "some/where/made.yaml").read_text())["spheres"]
+
+
 def test_spheres_are_fitted_to_a_file_that_has_none(robot: Path) -> None:
     first = "".join(line for line in ROBOT.splitlines(True) if not line.startswith(("still", "self_coll", "cover")))
     robot.write_text(first[: first.index("spheres:")])

@@ -32,8 +32,25 @@ WRONG = {
         "tool:",
         ["no link 'flange'", "base, left, lower"],
     ),
-    "no such package": (("{path: toy.urdf}", "{package: toy_models, path: a}"), "urdf:", ["no package toy_models"]),
-    "no such URDF": (("path: toy.urdf", "path: tory.urdf"), "urdf:", ["no file tory.urdf"]),
+    "no such package": (
+        ("{path: toy.urdf}", "{package: toy_models, path: a}"),
+        "urdf:",
+        ["no package 'toy_models' is installed"],
+    ),
+    "a package of no name": (("{path: toy.urdf}", '{package: "", path: a}'), "urdf:", ["no package '' is installed"]),
+    "a module that is no package": (
+        ("{path: toy.urdf}", "{package: math, path: a}"),
+        "urdf:",
+        ["'math' is no package with files"],
+    ),
+    "a package inside that is not there": (
+        ("{path: toy.urdf}", "{package: pybullet_data.gone, path: a}"),
+        "urdf:",
+        ["'pybullet_data.gone' is no package with files"],
+    ),
+    "a path upwards": (("{path: toy.urdf}", "{package: .., path: a}"), "urdf:", ["no package '..' is installed"]),
+    "no path": (("path: toy.urdf", 'path: ""'), "urdf:", ["has no file ''"]),
+    "no such URDF": (("path: toy.urdf", "path: tory.urdf"), "urdf:", ["no file 'tory.urdf'"]),
     "a limit beyond the URDF's": (("lower: -1.5", "lower: -2.5"), "- {name: be", ["lower -2.5 of bend", "URDF's -2;"]),
     "limits in the wrong order": (
         ("lower: -1.5", "lower: 2.5, upper: 1"),
@@ -163,3 +180,18 @@ def test_a_wrong_item_does_not_make_its_list_too_short(tmp_path: Path) -> None:
         check_robot(path)
     (found,) = error.value.items
     assert found.message.startswith("joints.0.name is 'j 2'; expected text such as 'wrist_1'")
+
+
+def test_a_package_is_found_without_running_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("ran_alone.py", "ran_whole/__init__.py"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(f"open({str(tmp_path / 'ran')!r}, 'w')")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    path = write_robot(tmp_path, ROBOT.replace("{path: toy.urdf}", "{package: ran_alone, path: toy.urdf}"))
+    with pytest.raises(Findings, match="'ran_alone' is no package with files"):
+        check_robot(path)
+    for file in (tmp_path / "toy.urdf", tmp_path / "upper.stl"):
+        (tmp_path / "ran_whole" / file.name).write_bytes(file.read_bytes())
+    path.write_text(ROBOT.replace("{path: toy.urdf}", "{package: ran_whole, path: toy.urdf}"))
+    check_robot(path)
+    assert not (tmp_path / "ran").exists()
