@@ -112,6 +112,7 @@ def run(
     seed: int | None = None,
     out: str | Path | None = None,
     video: bool = False,
+    pictures: bool = False,
     gui: bool = False,
     renderer: Literal["software", "moderngl"] = "software",
     on_tick: Progress | None = None,
@@ -125,6 +126,7 @@ def run(
         seed: draws every error, noise and jitter; by default the scenario's.
         out: the folder for the record, which is made; None keeps no record.
         video: film the run into the record.
+        pictures: keep the cameras' frames at events in the record, as JPEG.
         gui: show PyBullet's window.
         renderer: what draws the cameras' pictures: compiled loops, or OpenGL (moderngl), for a graphics card.
         on_tick: called after each tick of the tree with the simulated second and the active leaf's name, "" for none.
@@ -145,8 +147,8 @@ def run(
     loaded = load_scenario(scenario) if isinstance(scenario, (str, Path)) else scenario
     folder = None if out is None else Path(out)
     _check_run(loaded, seed, renderer, on_tick, on_event, stop)
-    if video and folder is None:
-        raise ValueError("video is filmed into the record; name a folder with out")
+    if (video or pictures) and folder is None:
+        raise ValueError("video and pictures go into the record; name a folder with out")
     if folder is not None and (found := run_folder_findings(folder)):
         from regrasp.app.files.findings import Findings
 
@@ -166,6 +168,7 @@ def run(
             folder,
             seed=loaded.file.seed if seed is None else int(seed),
             video=video,
+            pictures=pictures,
             gui=gui,
             renderer=renderer,
             observers=Observers(tick=callbacks.tick, event=callbacks.event),

@@ -92,6 +92,10 @@ class World(Generic[ObjectsT]):
         """Note that the node with this tree path was entered now, for faults that wait for it."""
         self._triggers.nodes.setdefault(node, self.now())
 
+    def take_forces(self, arm: str) -> tuple[float, float]:
+        """See `ContactWatch.take_recent`; for the record."""
+        return self._contacts.take_recent(arm)
+
     def place_obstacle(self, name: str, center: FloatArray) -> None:
         """Move an obstacle that has no stand: the centre of its box to `center` (3,) m."""
         self._scene.place_obstacle(name, center)

@@ -4,7 +4,7 @@ import shutil
 from collections.abc import Callable, Generator, Iterable, Sequence
 from contextlib import closing
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -82,6 +82,7 @@ def checked(expected: str, task: Callable[[Path | None], Any], folder: Path | No
     return task(folder)
 
 
+@cache
 def program_digest() -> str:
     """A digest of `program()`."""
     return digest_of(program())
@@ -166,8 +167,10 @@ def _put_away(store: Store, version: int, job: Job, outcome: Ended, folder: Path
     record = ""
     if folder is not None and store.folder is not None and folder.is_dir():
         if outcome.keep and outcome.value is not None:
-            record = f"{RECORDS}/{job.record}-{job.key[:8]}-{version}"
             (store.folder / RECORDS).mkdir(exist_ok=True)
+            record = f"{RECORDS}/{job.record}"
+            if (store.folder / record).exists():  # of another version, or with other values
+                record = f"{record}-{job.key[:8]}-{version}"
             folder.replace(store.folder / record)
         else:
             shutil.rmtree(folder, ignore_errors=True)

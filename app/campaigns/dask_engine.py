@@ -36,7 +36,8 @@ class Dask:
     @classmethod
     def connected(cls, address: str) -> Self:
         """To the scheduler at an address such as tcp://10.0.0.5:8786. Raises `Findings` if it is not there."""
-        logging.getLogger("distributed").setLevel(logging.CRITICAL)  # it tells of each lost connection by a traceback
+        for name in [name for name in logging.root.manager.loggerDict if name.startswith("distributed")]:
+            logging.getLogger(name).setLevel(logging.CRITICAL + 1)  # a lost connection would be told by a traceback
         try:
             client = Client(address, timeout=CONNECT_SECONDS, set_as_default=False)
         except (OSError, ValueError, TypeError) as error:
@@ -57,11 +58,12 @@ class Dask:
         futures = []
         for number, (job, folder) in enumerate(jobs):
             order = pickle.dumps(Order(program, job.task, folder is not None, wall_limit))
-            future = self.client.submit(deliver, order, key=f"{job.key}-{number}", pure=False, retries=0)
+            kind = f"{program} {wall_limit}"
+            future = self.client.submit(deliver, order, kind, key=f"{job.key}-{number}", pure=False, retries=0)
             folders[future.key] = number, folder
             futures.append(future)
         try:
-            ended = as_completed(futures)
+            ended = as_completed(futures, loop=self.client.loop)
             del futures  # a future that is held keeps its result in the cluster's memory
             for future in ended:
                 number, folder = folders[future.key]
@@ -81,13 +83,15 @@ class Dask:
             if folder is not None and delivery.files:
                 folder.mkdir(parents=True)
                 for name, content in delivery.files.items():
+                    (folder / name).parent.mkdir(exist_ok=True)
                     (folder / name).write_bytes(content)
             return delivery.done._replace(number=number)
         raised = future.exception() if future.status == "error" else None
         if isinstance(raised, KilledWorker):
             return Done(number, None, "each worker that had it was lost", 0.0)
         if raised is not None:
-            return Done(number, None, f"{type(raised).__name__}: {raised}", 0.0)
+            message = f"its workers cannot do runs ({type(raised).__name__}: {raised}); give them what this machine has"
+            raise Findings([Finding("--scheduler", 0, message)])
         raise self._lost(f"its task was {future.status}")
 
     def _lost(self, why: str) -> Findings:
@@ -95,18 +99,20 @@ class Dask:
         return Findings([Finding("--scheduler", 0, message)])
 
 
-_idle: list["subprocess.Popen[bytes]"] = []  # of this Dask worker: programs that do runs
+# Not python -m: pickles would name classes of __main__, which the Dask worker does not have.
+_PROGRAM = "from regrasp.app.campaigns.remote import main; main()"
+_idle: list[tuple[str, "subprocess.Popen[bytes]"]] = []  # of this Dask worker: programs that do runs, by kind
 _idle_lock = threading.Lock()
 
 
-def deliver(order: bytes) -> bytes:
-    """In a Dask worker: have a program do a pickled `Order`, and return its pickled `Delivery`."""
-    with _idle_lock:
-        program = _idle.pop() if _idle else None
-    if program is None or program.poll() is not None:
-        program = subprocess.Popen(
-            [sys.executable, "-m", "regrasp.app.campaigns.remote"], stdin=subprocess.PIPE, stdout=subprocess.PIPE
-        )
+def deliver(order: bytes, kind: str) -> bytes:
+    """In a Dask worker: have a program do a pickled `Order`, and return its pickled `Delivery`.
+
+    `kind` tells apart what one program cannot do after the other: other sources, another wall limit.
+    """
+    program = _taken(kind)
+    if program is None:
+        program = subprocess.Popen([sys.executable, "-c", _PROGRAM], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
     assert program.stdin is not None
     assert program.stdout is not None
     try:
@@ -117,5 +123,15 @@ def deliver(order: bytes) -> bytes:
         program.kill()
         return pickle.dumps(Delivery(Done(0, None, "the process died", 0.0, killed=True), {}))
     with _idle_lock:
-        _idle.append(program)
+        _idle.append((kind, program))
     return pickle.dumps(delivery)
+
+
+def _taken(kind: str) -> "subprocess.Popen[bytes] | None":
+    """An idle program of that kind that lives; those of other kinds end, for their campaign is over."""
+    with _idle_lock:
+        for other, program in _idle:
+            if other != kind:
+                program.terminate()
+        _idle[:] = [(other, program) for other, program in _idle if other == kind and program.poll() is None]
+        return _idle.pop()[1] if _idle else None

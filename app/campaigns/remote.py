@@ -1,7 +1,7 @@
-"""Does the runs of a Dask worker: `python -m regrasp.app.campaigns.remote`, a program that the worker talks to.
+"""Does the runs of a Dask worker: a program of its own, which the worker starts and talks to.
 
-Tasks come on stdin and go back on stdout, each a pickle. A program of its own, because a Dask worker may have no
-children of `multiprocessing`; and a run's native crash shall end neither the worker nor this program.
+Tasks come on stdin and go back on stdout, each a pickle. It is no child of `multiprocessing`, which a Dask worker may
+not have; it does each run in one, whose native crash ends neither the worker nor this program.
 """
 
 import pickle
@@ -65,11 +65,7 @@ def _orders(stream: BinaryIO) -> Iterator[Order]:
 
 
 def taken(folder: Path) -> Files:
-    """The files of a folder, which is removed."""
-    files = {path.name: path.read_bytes() for path in folder.glob("*") if path.is_file()}
+    """The files of a folder by their paths in it; it is removed."""
+    files = {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
     shutil.rmtree(folder, ignore_errors=True)
     return files
-
-
-if __name__ == "__main__":
-    main()

@@ -74,6 +74,9 @@ def run_campaign(
         str | None, typer.Option(metavar="ADDRESS", help="With --engine dask: such as tcp://10.0.0.5:8786.")
     ] = None,
     keep: Annotated[Literal["all", "failed", "none"], typer.Option(help="Which runs' records are kept.")] = "failed",
+    pictures: Annotated[
+        bool, typer.Option("--pictures", help="Keep the cameras' frames at events in the records, as JPEG.")
+    ] = False,
     require: Annotated[
         float | None,
         typer.Option(
@@ -93,7 +96,7 @@ def run_campaign(
     \b
     A campaign file:
       scenarios:
-        - {scenario: no_obstacle, seeds: 0:50}
+        - {scenario: no_obstacle, seeds: "0:50"}
         - {scenario: mine.yaml, set: [gravity=earth], seeds: [3, 7]}
 
     \b
@@ -131,13 +134,14 @@ def run_campaign(
         raise Findings(found)
     if not quiet:
         tell_of_compilation()
-    settings = Settings(renderer=renderer)
+    settings = Settings(pictures=pictures, renderer=renderer)
     effort = Effort(wall_limit=math.inf if wall_limit is None else wall_limit)
+    where = _engine(scheduler, jobs)
     with Store.create(folder, KIND) as store:
         version = this_version(store)
         _tell_of_other_versions(store, version)
         asked = jobs_of(runs, settings)
-        interrupted = do_all(asked, store, _engine(scheduler, jobs), Stored(runs, keep), Progress(quiet), effort)
+        interrupted = do_all(asked, store, where, Stored(runs, keep), Progress(quiet), effort)
         low = _print_cases(store, version, {job.key for job in asked})
     if interrupted:
         raise typer.Exit(EXIT_INTERRUPTED)
@@ -303,6 +307,9 @@ def rerun(
     row: Annotated[int, typer.Argument(min=1, help="The run's row, as `failures` names it.")],
     out: Annotated[Path | None, typer.Option(help="The record's folder; default in runs/.")] = None,
     video: Annotated[bool, typer.Option("--video", help="Film the run into the record.")] = False,
+    pictures: Annotated[
+        bool, typer.Option("--pictures", help="Keep the cameras' frames at events in the record, as JPEG.")
+    ] = False,
     quiet: Annotated[bool, typer.Option("--quiet", help="No progress; only the summary.")] = False,
 ) -> None:
     """Do a campaign's run again, with a record, and a film if you like.
@@ -332,7 +339,8 @@ def rerun(
 
     renderer: Any = row_in(stored).renderer
     with shown_progress(quiet) as observers:
-        result = run_episode(run.scenario, into, seed=run.seed, video=video, renderer=renderer, observers=observers)
+        how = {"video": video, "pictures": pictures, "renderer": renderer, "observers": observers}
+        result = run_episode(run.scenario, into, seed=run.seed, **how)
     typer.echo(run_summary(result, into))
     raise typer.Exit(exit_code(result))
 
@@ -412,11 +420,11 @@ def _cell(value: Any) -> Any:
 
 def _write_junit(path: Path, store: "Store", version: "Version") -> None:
     from regrasp.app.campaigns.episodes import row_in
-    from regrasp.app.run.junit import TestCase, write_junit
+    from regrasp.app.run.junit import JunitCase, write_junit
 
     assert store.folder is not None
     cases = [
-        TestCase(
+        JunitCase(
             row_in(stored).scenario,
             f"{row_in(stored).case} seed {row_in(stored).seed}",
             row_in(stored),

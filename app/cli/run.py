@@ -43,6 +43,9 @@ def run_scenario(
     ] = None,
     junit: Annotated[Path | None, typer.Option(metavar="FILE", help="With --all: write JUnit XML, too.")] = None,
     video: Annotated[bool, typer.Option("--video", help="Film the run into the record.")] = False,
+    pictures: Annotated[
+        bool, typer.Option("--pictures", help="Keep the cameras' frames at events in the record, as JPEG.")
+    ] = False,
     renderer: RendererOption = "software",
     wall_limit: WallLimitSeconds = None,
     dry_run: Annotated[
@@ -81,7 +84,7 @@ def run_scenario(
             wrong += folders.file_findings(junit) if junit else []
             _tell(_checked(partial(regrasp.load_cases, scenario, overrides), wrong, out), out)
             return
-        settings = Settings(video, renderer, quiet, wall_limit or math.inf)
+        settings = Settings(video, pictures, renderer, quiet, wall_limit or math.inf)
         raise typer.Exit(run_every(scenario, overrides, jobs or os.cpu_count() or 1, out, junit, settings, wrong))
     wrong += _given("is for many cases; write --all, too", jobs=jobs, junit=junit)
     [loaded] = _checked(lambda: [regrasp.load_scenario(scenario, overrides, case)], wrong, out)
@@ -89,7 +92,7 @@ def run_scenario(
         _tell([loaded], out)
         return
     folder = out or folders.new_folder(f"{loaded.name}-{loaded.file.seed}")
-    settings = Settings(video, renderer, quiet, wall_limit or math.inf)
+    settings = Settings(video, pictures, renderer, quiet, wall_limit or math.inf)
     here = partial(_run, loaded, folder, settings, gui, log_level)
     try:
         result = here() if wall_limit is None else _watched(Run(loaded, loaded.file.seed, folder), here, wall_limit)
@@ -125,6 +128,7 @@ def _run(scenario: "Scenario", folder: Path, settings: "Settings", gui: bool, lo
                 scenario,
                 out=folder,
                 video=settings.video,
+                pictures=settings.pictures,
                 gui=gui,
                 renderer=settings.renderer,
                 on_tick=observers.tick,

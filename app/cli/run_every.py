@@ -34,7 +34,7 @@ def run_every(
         OSError: the disk is full or the like.
     """
     from regrasp.app.run.batch import Run, Settings, run_all
-    from regrasp.app.run.junit import TestCase, write_junit
+    from regrasp.app.run.junit import JunitCase, write_junit
     from regrasp.app.scenario.load import cases
 
     found = [*wrong, *(folders.file_findings(junit) if junit else [])]
@@ -55,7 +55,7 @@ def run_every(
     rows, interrupted = run_all(runs, jobs, settings=settings or Settings(), episode=episode)
     if junit:
         junit.parent.mkdir(parents=True, exist_ok=True)
-        cases_done = [TestCase(r.scenario.name, r.scenario.case, rows.get(n), r.folder) for n, r in enumerate(runs)]
+        cases_done = [JunitCase(r.scenario.name, r.scenario.case, rows.get(n), r.folder) for n, r in enumerate(runs)]
         write_junit(junit, loaded[0].name, cases_done)
     _tell(loaded[0].name, runs, rows, into)
     if interrupted:

@@ -13,7 +13,7 @@ from regrasp.interfaces.quote import quoted
 
 RUNS = Path("runs")  # where records go by default
 RUN_FILES = ("result.json", "events.jsonl", "ticks.jsonl")  # by which a run's folder is known
-FILES = (*RUN_FILES, "scenario.yaml", "cell.yaml", "tree.xml")  # of a run's folder
+FILES = (*RUN_FILES, "signals.f32", "scenario.yaml", "cell.yaml", "tree.xml")  # of a run's folder
 
 
 def new_folder(name: str, within: Path = RUNS) -> Path:

@@ -15,6 +15,8 @@ from regrasp.app.files.findings import Finding, Findings, shown
 from regrasp.app.records import folders
 from regrasp.app.records.record import leaf_at_work
 from regrasp.app.records.result import SCHEMA, NodeStatus, Result
+from regrasp.app.records.signals import FILE as SIGNALS
+from regrasp.app.records.signals import Signals, read_signals
 from regrasp.app.task import find
 from regrasp.trees.wiring import MAX_TREE_DEPTH
 
@@ -70,6 +72,11 @@ class RunRecord:
         """The last simulated second in the record."""
         lines = (self.ticks[-1:], self.events[-1:])
         return max([line.t for last in lines for line in last] + [self.at_work[0] if self.at_work else 0.0])
+
+    def signals(self) -> Signals | None:
+        """Joints, poses, forces and estimates at each tick; None if there are none. Raises `Findings`."""
+        path = self.folder / SIGNALS
+        return read_signals(path) if os.path.lexists(path) else None
 
     @property
     def begin(self) -> dict[str, Any]:

@@ -17,7 +17,7 @@ import structlog
 from regrasp.app.files.findings import Findings
 from regrasp.app.files.whole_file import write_whole
 from regrasp.app.interrupts import WallLimit, signals_deferred
-from regrasp.app.records import folders
+from regrasp.app.records import folders, signals
 from regrasp.app.records.result import DEFAULT_CASE, Outcome, Result, plain
 from regrasp.interfaces.cause import Cause, CauseCode
 
@@ -32,8 +32,9 @@ OnEvent = Callable[[Mapping[str, Any]], None]  # called with each event as event
 class Record:
     """Context manager that writes a run's folder; without a folder everything stays in memory.
 
-    `ticks` is the stream for a `TickLog`. At the end the streams are closed and result.json is written: the result
-    given to `finish` or, if the run did not get so far, one that names the interrupt or the error.
+    `ticks` is the stream for a `TickLog`, `signals` for a `SignalWriter`. At the end the streams are closed and
+    result.json is written: the result given to `finish` or, if the run did not get so far, one that names the
+    interrupt or the error.
     """
 
     def __init__(
@@ -59,6 +60,7 @@ class Record:
         self._task = task
         self.events: TextIO = io.StringIO()
         self.ticks: TextIO = io.StringIO()
+        self.signals: BinaryIO = io.BytesIO()
         self._at_work: BinaryIO = io.BytesIO()
         self._longest = 0
         if folder is not None:
@@ -72,6 +74,7 @@ class Record:
             self._at_work = (folder / AT_WORK).open("wb", buffering=0)
             self.at_work(0.0, "")
             self.ticks = (folder / "ticks.jsonl").open("x", encoding="utf-8", newline="\n")
+            self.signals = (folder / signals.FILE).open("xb")
             for name, text in (copies or {}).items():
                 (folder / name).write_text(text, encoding="utf-8", newline="\n")
 
@@ -119,6 +122,7 @@ class Record:
             if self.folder is not None:
                 self.events.close()
                 self.ticks.close()
+                self.signals.close()
                 self._at_work.close()
                 write_whole(self.folder / "result.json", self.result.to_json())
                 (self.folder / AT_WORK).unlink(missing_ok=True)

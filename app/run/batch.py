@@ -27,6 +27,7 @@ class Settings:
     """How runs are done: what is rendered and shown, and how many seconds of wall time each may take."""
 
     video: bool = False
+    pictures: bool = False
     renderer: "RendererName" = "software"
     quiet: bool = False
     wall_limit: float = math.inf
@@ -107,6 +108,7 @@ def run_task(run: Run, settings: Settings, episode: RunEpisode | None = None) ->
         seed=run.seed,
         video=settings.video,
         renderer=settings.renderer,
+        **({"pictures": True} if settings.pictures else {}),
     )
 
 

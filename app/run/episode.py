@@ -2,7 +2,7 @@
 
 import gc
 import traceback
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,18 +14,22 @@ from py_trees.common import Status
 from regrasp.app.interrupts import WallLimit, raise_if_swallowed
 from regrasp.app.records.record import Progress, Record
 from regrasp.app.records.result import Link, Outcome, Result
+from regrasp.app.records.signals import SignalWriter
 from regrasp.app.run.compose import Episode, assemble, build_world
 from regrasp.app.run.fault_injection import EnteredNodes, FaultLog
 from regrasp.app.run.film import Film
 from regrasp.app.run.observers import Observers
+from regrasp.app.run.pictures import Pictures
+from regrasp.app.run.signals import engine_signals
 from regrasp.app.run.tick_log import TickLog, active_leaf, note_leaf_at_work, running_leaf
 from regrasp.app.scenario.copies import copies
 from regrasp.app.scenario.load import Scenario
 from regrasp.app.task.expectation import Expectation
+from regrasp.app.task.signals import SignalGroup
 from regrasp.behaviors.keys import causes
 from regrasp.interfaces.cause import Cause, CauseCode
 from regrasp.interfaces.devices import TICK
-from regrasp.interfaces.wall_time import WallTime, measured
+from regrasp.interfaces.wall_time import WallTime, counts_as, measured
 from regrasp.sim.render.renderer import RendererName
 from regrasp.trees import in_tree_order, node_paths
 
@@ -48,14 +52,16 @@ def run_episode(
     *,
     seed: int,
     video: bool = False,
+    pictures: bool = False,
     gui: bool = False,
     renderer: RendererName = "software",
     observers: Observers = Observers(),  # noqa: B008 - it does not change
 ) -> Result:
     """Run a scenario to its end and leave its record in the folder `out` (None: nowhere).
 
-    A KeyboardInterrupt, inside a leaf or from an observer, ends the run cleanly. An exception inside a leaf ends it
-    with the cause `internal_error`, and its traceback goes into the record.
+    `pictures`: the record has the cameras' frames at events, too. A KeyboardInterrupt, inside a leaf or from an
+    observer, ends the run cleanly. An exception inside a leaf ends it with the cause `internal_error`, and its
+    traceback goes into the record.
     """
     with (
         measured("start") as wall,
@@ -63,7 +69,13 @@ def run_episode(
     ):
         world = build_world(scenario, seed, renderer, gui)
         try:
-            log = record.logger(world.now, observers.event)
+            key_frames = Pictures(out if pictures else None, world)
+
+            def on_event(values: Mapping[str, Any]) -> None:
+                key_frames.note(values)
+                observers.event(values)
+
+            log = record.logger(world.now, on_event)
             log.info(
                 "begin",
                 scenario=scenario.name,
@@ -82,12 +94,18 @@ def run_episode(
             episode = assemble(scenario, world, seed, log)
             observers.assembled(episode)
             ticks = TickLog(episode.tree.root, record.ticks, world.now)
+            rows = None if out is None else SignalWriter(record.signals, _signals(episode), 1 / TICK)
             faults = [EnteredNodes(episode.tree.root, world.note_entered), FaultLog(world.faults, log)]
             episode.tree.visitors += [ticks, episode.attempts, *faults]
             note_leaf_at_work(episode.tree, lambda node: record.at_work(world.now(), node))
             with Film(out / "video.mp4" if video and out else None, world) as film, _garbage_of_the_run_alone():
                 wall.switch("tree")
-                ending = _run(episode, scenario, film, observers.tick, log, wall)
+
+                def on_tick(seconds: float, leaf: str) -> None:
+                    _noted(rows, key_frames)
+                    observers.tick(seconds, leaf)
+
+                ending = _run(episode, scenario, film, on_tick, log, wall)
                 wall.switch("film" if video else "record")
             ticks.finalise()
             episode.attempts.finalise()
@@ -111,6 +129,19 @@ def _garbage_of_the_run_alone() -> Iterator[None]:
         yield
     finally:
         gc.unfreeze()
+
+
+def _signals(episode: Episode) -> list[SignalGroup]:
+    of_task = episode.task.signals()(episode.world, episode.services)
+    return [*engine_signals(episode.world, episode.services), *of_task]
+
+
+@counts_as("record")
+def _noted(rows: SignalWriter | None, key_frames: Pictures) -> None:
+    """After a tick: what the record keeps of it besides its logs."""
+    if rows is not None:
+        rows.sample()
+    key_frames.take()
 
 
 def _run(episode: Episode, scenario: Scenario, film: Film, on_tick: Progress, log: Any, wall: WallTime) -> Ending:

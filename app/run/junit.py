@@ -13,7 +13,7 @@ from regrasp.interfaces.quote import printable
 ERRORS = ("internal_error", "wall_limit")  # outcomes that say nothing about the robot
 
 
-class TestCase(NamedTuple):
+class JunitCase(NamedTuple):
     """A run as JUnit has it. One without a row was interrupted; one without a folder left no record."""
 
     scenario: str
@@ -22,7 +22,7 @@ class TestCase(NamedTuple):
     folder: Path | None
 
 
-def write_junit(path: Path, name: str, cases: Sequence[TestCase]) -> None:
+def write_junit(path: Path, name: str, cases: Sequence[JunitCase]) -> None:
     """Write one testcase per run: its wall time, why it failed (in a sentence and in full), its record's folder.
 
     A run that was interrupted counts as skipped.
@@ -52,7 +52,7 @@ def write_junit(path: Path, name: str, cases: Sequence[TestCase]) -> None:
     write_whole(path, f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n')
 
 
-def _testcase(suite: ET.Element, run: TestCase) -> None:
+def _testcase(suite: ET.Element, run: JunitCase) -> None:
     row = run.row
     about = {"classname": printable(run.scenario), "name": printable(run.name)}
     case = ET.SubElement(suite, "testcase", {**about, "time": f"{row.wall_seconds if row else 0.0:.3f}"})

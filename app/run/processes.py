@@ -1,6 +1,7 @@
 """Tasks in processes, one at a time in each: py_trees' blackboard and PyBullet's globals exist once per process."""
 
 import contextlib
+import gc
 import math
 import os
 import signal
@@ -77,7 +78,11 @@ def run_each(
                     yield pool.received(next(worker for worker in pool.busy if worker.pipe is ready))
                 _enforce_deadlines(pool.busy, grace)
     finally:
-        _stop([worker.process for worker in (*pool.busy, *pool.idle)], grace)
+        for worker in pool.idle:
+            worker.pipe.close()  # it ends by itself
+        _stop([worker.process for worker in pool.busy], grace)
+        for worker in pool.idle:
+            worker.process.join()
 
 
 @dataclass
@@ -195,7 +200,8 @@ def _child(pipe: "Connection[Any, Any]", task: Callable[[], Any]) -> None:
             pipe.send((value, error, _memory_mb("VmHWM:"), _memory_mb("VmRSS:")))
             if error:
                 return
-            del value  # its memory is not the next task's
+            del value
+            gc.collect()  # a tree's nodes know each other: their memory, 40 MB a run, would come back only much later
             task = pipe.recv()
 
 

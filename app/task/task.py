@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from regrasp.app.files.yaml_lines import Document
     from regrasp.app.task.expect import Expect
     from regrasp.app.task.judge import Judge
+    from regrasp.app.task.signals import SignalGroup
     from regrasp.app.task.words import Words
     from regrasp.behaviors.services import Services
     from regrasp.interfaces.cell import Cell
@@ -50,6 +51,8 @@ class Task:
     services: Part["Callable[[World[Any], int, Any], Services]"] = Part("regrasp.app.run.compose:build_services")
     judge: Part["type[Judge[Any]]"] = Part("regrasp.app.task.judge:Judge")
     belief: Part["Callable[[Any], dict[str, Any]]"] = Part("regrasp.app.task.belief:belief")  # for the record
+    # Its signals in the record, besides the arms'.
+    signals: Part["Callable[[World[Any], Any], Iterable[SignalGroup]]"] = Part("regrasp.app.task.signals:no_signals")
     words: Part["Words"] = Part("regrasp.app.task.words:PLAIN")
     old_outcomes: Mapping[str, str] = field(default_factory=dict)  # of schema 1, and what is written today
     old_cell_keys: Mapping[str, str] = field(default_factory=dict)  # of cell files from before there were sections

@@ -83,6 +83,11 @@ class SimArm:
             gripper_parameters or GripperParameters(),
         )
 
+    def true_joints(self) -> FloatArray:
+        """True positions (n,) of the joints."""
+        states = p.getJointStates(self.body, self.joints, physicsClientId=self.client)
+        return np.asarray(self._signs * np.array([s[0] for s in states]))
+
     def reading(self) -> JointReading:
         """Quantised encoder positions, which are less than the truth by the offsets; velocities; servo torques."""
         states = p.getJointStates(self.body, self.joints, physicsClientId=self.client)
@@ -148,11 +153,16 @@ class SimArm:
 
     def in_tool(self, point: Sequence[float]) -> FloatArray:
         """A point (3,) m of the world in the frame of `tool_pose`, worked out faster."""
+        turn, middle = self.tool_frame()
+        return np.asarray((np.array(point) - middle) @ turn)
+
+    def tool_frame(self) -> tuple[FloatArray, FloatArray]:
+        """`tool_pose` as rotation matrix (3, 3) and position (3,) m, worked out faster."""
         left, right, hand = p.getLinkStates(self.body, self._tool_links, 0, 1, physicsClientId=self.client)
         turn = np.array(p.getMatrixFromQuaternion(hand[5])).reshape(3, 3)
         if self._tool_turn is not None:
             turn = turn @ self._tool_turn.as_matrix()
-        return np.asarray((np.array(point) - (np.array(left[4]) + np.array(right[4])) / 2) @ turn)
+        return turn, (np.array(left[4]) + np.array(right[4])) / 2
 
     def set_speed_share(self, joint: int, share: float) -> None:
         """A fault: the joint turns no faster than `share` of its rated speed; with 0 it does not turn."""

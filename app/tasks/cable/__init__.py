@@ -21,6 +21,7 @@ TASK = Task(
     services=Part(f"{_HERE}.services:cable_services"),
     judge=Part(f"{_HERE}.judge:CableJudge"),
     belief=Part(f"{_HERE}.belief:belief"),
+    signals=Part(f"{_HERE}.signals:cable_signals"),
     words=Part(f"{_HERE}.words:WORDS"),
     old_outcomes={"stowed": "success", "safe_stop": "failure"},
     old_cell_keys={

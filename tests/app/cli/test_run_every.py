@@ -13,7 +13,7 @@ from regrasp.app.files.findings import Findings
 from regrasp.app.records.record import Record
 from regrasp.app.records.result import Result
 from regrasp.app.run.batch import Row, Run, Settings, row_of
-from regrasp.app.run.junit import TestCase, write_junit
+from regrasp.app.run.junit import JunitCase, write_junit
 from regrasp.app.run.processes import Done
 from regrasp.app.scenario.load import Scenario, cases, load_scenario
 from regrasp.app.task.expectation import Expectation
@@ -109,7 +109,7 @@ def test_all_as_expected_exits_0_and_a_set_value_narrows(capfd: pytest.CaptureFi
 def test_ctrl_c_keeps_what_was_done_and_tells_what_was_not(tmp_path: Path) -> None:
     runs = [Run(case, case.file.seed, tmp_path / str(i)) for i, case in enumerate(cases("mine.yaml"))]
     done = row_of(runs[1], Done(1, good(runs[1].scenario, seed=1, video=False, renderer="software"), "", 0.0))
-    tested = [TestCase("mine", run.scenario.case, {1: done}.get(n), run.folder) for n, run in enumerate(runs)]
+    tested = [JunitCase("mine", run.scenario.case, {1: done}.get(n), run.folder) for n, run in enumerate(runs)]
     write_junit(tmp_path / "cut.xml", "mine", tested)
     [suite] = ET.parse(tmp_path / "cut.xml").getroot()
     assert (suite.attrib["tests"], suite.attrib["skipped"]) == ("4", "3")

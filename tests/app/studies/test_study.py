@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from regrasp.app.campaigns.statistics import wilson_interval
+from regrasp.app.files.findings import Findings
 from regrasp.app.records.result import Result
 from regrasp.app.scenario.load import Scenario
 from regrasp.app.task.expectation import Expectation
@@ -83,23 +84,21 @@ def test_a_study_goes_on_to_its_end_and_counts_every_run(tmp_path: Path, capfd: 
     assert "[12/12]" in err
 
 
-def test_a_folder_with_a_study_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_folder_that_holds_something_else_is_refused(tmp_path: Path) -> None:
     (tmp_path / "demo.json").write_text("{}")
-    assert run_demo(range(1), 1, tmp_path, episode=episode) == 2
-    assert "demo.json" in capsys.readouterr().err
+    with pytest.raises(Findings, match=r"holds other things \(demo.json\)"):
+        run_demo(range(1), 1, tmp_path, episode=episode)
 
 
 def slow_after_two(scenario: Scenario, out: Path | None, *, seed: int, video: bool, renderer: str) -> Result:
     """The third run waits for a signal that only the study can bring."""
     if seed == 2:
         assert out is not None
-        out.mkdir(parents=True)
         try:
-            (out / "started").touch()
             print("waiting", flush=True)
             signal.pause()
         except KeyboardInterrupt:
-            (out / "interrupted").touch()
+            (out.parents[2] / "interrupted").touch()
             raise
     return Result(scenario.name, seed, "success", succeeded=True)
 
@@ -123,7 +122,7 @@ def test_ctrl_c_keeps_what_was_done_and_stops_what_runs(tmp_path: Path) -> None:
         assert process.wait() == 130
     demo = json.loads((tmp_path / "study" / "demo.json").read_text())
     assert (demo["runs"], demo["succeeded"], demo["planned"]) == (2, 2, 18)
-    assert (tmp_path / "study" / "runs" / "no_obstacle-gravity=zero-2" / "interrupted").exists()
+    assert (tmp_path / "interrupted").exists()
 
 
 @pytest.mark.parametrize(

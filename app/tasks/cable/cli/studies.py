@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from regrasp.app.cli.options import RendererOption, Sets, WallLimitSeconds, parse_seeds
-from regrasp.app.files.findings import Finding, Findings, shown
+from regrasp.app.files.findings import Finding, Findings
 from regrasp.app.interrupts import late_imports
 from regrasp.app.records import folders
 from regrasp.interfaces.quote import nearest, quoted
@@ -24,7 +24,9 @@ def add_to(study: typer.Typer) -> None:
 def demo(
     seeds: Annotated[str, typer.Option(metavar="A:B", help="Seeds from A up to, not including, B.")],
     jobs: Annotated[int, typer.Option(min=1, help="Episodes side by side.")] = os.cpu_count() or 1,
-    out: Annotated[Path | None, typer.Option(help="Folder of demo.json and the runs' records.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder of demo.json and the runs' records; the same again goes on there.")
+    ] = None,
     sets: Sets = None,
     renderer: RendererOption = "software",
     wall_limit: WallLimitSeconds = None,
@@ -38,7 +40,7 @@ def demo(
       regrasp study demo --seeds 0:20 --jobs 2 --out results/demo
     """
     chosen = parse_seeds(seeds)
-    if wrong := _unfit(out, "demo.json"):
+    if out is not None and (wrong := folders.folder_findings(out)):
         raise Findings(wrong)
     with late_imports():
         from regrasp.app.run.batch import Settings
@@ -84,7 +86,7 @@ def pose(
     app/tasks/cable/studies/pose/.
     Exit code: 0 done, 1 a scene broke off, 2 bad input, 130 Ctrl-C.
     """
-    chosen, wrong = parse_seeds(seeds), _unfit(out, "pose.json")
+    chosen, wrong = parse_seeds(seeds), folders.folder_findings(out) if out is not None else []
     names = _techniques(techniques, wrong)
     with late_imports():
         from regrasp.app.tasks.cable.studies.pose.scenes import CONFIGURATIONS
@@ -116,7 +118,7 @@ def coverage(
     Example:
       regrasp study coverage --seeds 0:200 --techniques rgbd
     """
-    chosen, wrong = parse_seeds(seeds), _unfit(out, "coverage.json")
+    chosen, wrong = parse_seeds(seeds), folders.folder_findings(out) if out is not None else []
     names = _techniques(techniques, wrong)
     if wrong:
         raise Findings(wrong)
@@ -125,14 +127,6 @@ def coverage(
         from regrasp.app.tasks.cable.studies.pose.trial import setups_of
 
     raise typer.Exit(run_coverage(setups_of(names, cell, renderer=renderer), chosen, jobs, out))
-
-
-def _unfit(out: Path | None, file: str) -> list[Finding]:
-    """Why a study's `file` cannot be written to `out`."""
-    if out is None:
-        return []
-    taken = [Finding(shown(out), 0, "already holds a study; name another folder")] if (out / file).exists() else []
-    return folders.run_folder_findings(out) + taken
 
 
 def _techniques(text: str | None, wrong: list[Finding]) -> list[str]:

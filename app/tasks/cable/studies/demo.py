@@ -2,18 +2,20 @@
 
 import json
 import statistics
-import sys
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
+from regrasp.app.campaigns.campaign import Effort, Local, do_all, this_version
+from regrasp.app.campaigns.episodes import KIND, Stored, jobs_of, row_in
+from regrasp.app.campaigns.progress import Progress
 from regrasp.app.campaigns.statistics import wilson_interval
+from regrasp.app.campaigns.store import Store
 from regrasp.app.campaigns.table import print_table
 from regrasp.app.files.whole_file import write_whole
-from regrasp.app.records.folders import folder_name
 from regrasp.app.records.result import plain, versions
-from regrasp.app.run.batch import Row, Run, RunEpisode, Settings, run_all
-from regrasp.app.scenario.load import Scenario, cases
+from regrasp.app.run.batch import Row, Run, RunEpisode, Settings
+from regrasp.app.scenario.load import cases
 from regrasp.app.studies.wall_parts import PARTS_HEADER, part_lines
 
 SCENARIOS = ("no_obstacle", "short_obstacle", "tall_obstacle")
@@ -29,31 +31,29 @@ def run_demo(
 ) -> int:
     """Run every case of three scenarios with every seed, each run in its own process.
 
-    Progress goes to stderr, a table to stdout. With `out`, the runs' records go to out/runs/ and the figures to
-    out/demo.json, which is complete after every run. Returns the exit code: 0 when all runs came to an end, also to a
-    failure; 130 after Ctrl-C; 2 when `out` already holds a study. `episode` replaces `run_episode` in tests.
+    Progress goes to stderr, a table to stdout. With `out`, it is a campaign there: the runs' records go to out/runs/,
+    the same study again goes on where it stopped, and in the end the figures go to out/demo.json. Returns the exit
+    code: 0 when all runs came to an end, also to a failure; 130 after Ctrl-C. `episode` replaces `run_episode` in
+    tests.
 
     Raises:
         Findings: a scenario with these overrides is wrong.
         OSError: `out` cannot be written.
     """
-    if out is not None and (out / "demo.json").exists():
-        print(f"{out} holds a study already (demo.json)", file=sys.stderr)
-        return 2
     chosen = [case for name in SCENARIOS for case in cases(name, overrides)]
-    runs = [Run(case, seed, _folder(out, case, seed)) for case in chosen for seed in seeds]
-    done, interrupted = run_all(runs, jobs, lambda rows: _write(out, rows, runs, overrides), settings, episode)
-    rows = list(done.values())
+    runs = [Run(case, seed) for case in chosen for seed in seeds]
+    asked = jobs_of(runs, settings, episode)
+    with Store.create(out, KIND) as store:
+        effort = Effort(wall_limit=settings.wall_limit)
+        interrupted = do_all(asked, store, Local(jobs), Stored(runs, "all"), Progress(settings.quiet), effort)
+        done = {stored.key: row_in(stored) for stored in store.rows(this_version(store))}
+    rows = [done[job.key] for job in asked if job.key in done]
     _write(out, rows, runs, overrides)
     print_table(_HEADER, table_lines(rows))
     if parts := part_lines(rows):
         print()
         print_table(PARTS_HEADER, parts)
     return 130 if interrupted else 0
-
-
-def _folder(out: Path | None, case: Scenario, seed: int) -> Path | None:
-    return out and out / "runs" / f"{case.name}-{folder_name(case.case)}-{seed}"
 
 
 def _write(out: Path | None, rows: list[Row], runs: Sequence[Run], overrides: Sequence[str]) -> None:

@@ -10,18 +10,21 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic import TypeAdapter
 from scipy.spatial.transform import RigidTransform
 from scipy.stats import chi2
 
+from regrasp.app.campaigns.digest import digest_of
 from regrasp.app.campaigns.statistics import wilson_interval
 from regrasp.app.campaigns.table import print_table
 from regrasp.app.files.whole_file import write_whole
 from regrasp.app.records.result import plain, versions
 from regrasp.app.tasks.cable.studies.pose.scenes import HEADLINE
-from regrasp.app.tasks.cable.studies.pose.tasks import run_tasks
+from regrasp.app.tasks.cable.studies.pose.tasks import SceneTask, run_tasks
 from regrasp.app.tasks.cable.studies.pose.trial import Setup
 from regrasp.perception.pose.estimate import Estimate
 
+KIND = "scenes of a coverage study"
 LEVEL = 0.95
 POSITION_LIMIT, AXIS_LIMIT = float(chi2.ppf(LEVEL, 3)), float(chi2.ppf(LEVEL, 2))  # squared Mahalanobis distances
 
@@ -56,7 +59,7 @@ def run_coverage(setups: Sequence[Setup], seeds: range, jobs: int, out: Path | N
     """Give each technique the first frames of a scene for every seed, each frame by itself, and count.
 
     The seed also chooses the configuration. Progress goes to stderr, a table to stdout, the figures to
-    out/coverage.json. Returns the exit code of `run_tasks`.
+    out/coverage.json; each scene is kept in `out` as it ends. Returns the exit code of `run_tasks`.
 
     Raises:
         OSError: `out` cannot be written.
@@ -65,9 +68,10 @@ def run_coverage(setups: Sequence[Setup], seeds: range, jobs: int, out: Path | N
     for seed, setup in product(seeds, setups):
         name = HEADLINE[seed % len(HEADLINE)]
         title = f"{', '.join(setup.techniques)} in configuration {name} seed {seed}"
-        tasks[title] = partial(cover_scene, setup, name, seed, frames_per_seed)
+        run = partial(cover_scene, setup, name, seed, frames_per_seed)
+        tasks[title] = SceneTask(run, digest_of(title, setup.digest, frames_per_seed))
     techniques = [name for setup in setups for name in setup.techniques]
-    scenes, code = run_tasks(tasks, jobs, lambda so_far: _write(out, so_far, techniques, seeds))
+    scenes, code = run_tasks(tasks, jobs, out, KIND, TypeAdapter(list[SceneCoverage]))
     _write(out, scenes, techniques, seeds)
     print_table(_HEADER, [_line(name, coverage_figures(name, scenes)) for name in techniques])
     return code

@@ -12,6 +12,9 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
+from pydantic import TypeAdapter
+
+from regrasp.app.campaigns.digest import digest_of
 from regrasp.app.campaigns.statistics import wilson_interval
 from regrasp.app.campaigns.table import print_table
 from regrasp.app.files.whole_file import write_whole
@@ -19,7 +22,7 @@ from regrasp.app.records.result import plain, versions
 from regrasp.app.tasks.cable.studies.pose.both_cameras import BOTH, run_both
 from regrasp.app.tasks.cable.studies.pose.negatives import Negative, run_negatives
 from regrasp.app.tasks.cable.studies.pose.scenes import CONFIGURATIONS, HEADLINE
-from regrasp.app.tasks.cable.studies.pose.tasks import run_tasks
+from regrasp.app.tasks.cable.studies.pose.tasks import SceneTask, run_tasks
 from regrasp.app.tasks.cable.studies.pose.trial import Setup, Trial, run_trials
 
 # Hwang 2024, table 3: of 27 trials identified and grasped, mean error and its standard deviation in m.
@@ -29,7 +32,8 @@ THESIS: dict[str, dict[str, Any]] = {
     "detector": {"identified": [21, 27], "grasped": [17, 27], "mean_error_m": 0.02913, "std_m": 9.0e-3},
 }
 
-SceneTask = Callable[[], Sequence[Trial | Negative]]
+KIND = "scenes of a pose study"
+_VALUES: TypeAdapter[list[Trial | Negative]] = TypeAdapter(list[Trial | Negative])
 
 
 def run_pose(
@@ -42,24 +46,29 @@ def run_pose(
 ) -> int:
     """Try each technique in every configuration with every seed, and on pictures that show no connector.
 
-    Progress goes to stderr, tables to stdout. With `out`, the figures go to out/pose.json and out/pose.csv, which are
-    complete after every scene, and plots are written in the end. With `both`, each technique has a second row, with
-    both cameras. Returns the exit code: 0, 130 after Ctrl-C, 1 when a scene ended with an error.
+    Progress goes to stderr, tables to stdout. With `out`, each scene is kept there as it ends, and the same study goes
+    on where it stopped; in the end come out/pose.json, out/pose.csv and plots. With `both`, each technique has a
+    second row, with both cameras. Returns the exit code: 0, 130 after Ctrl-C, 1 when a scene ended with an error.
 
     Raises:
         OSError: `out` cannot be written.
     """
-    tasks: dict[str, SceneTask] = {}
+    tasks: dict[str, SceneTask[Trial | Negative]] = {}
+
+    def add(title: str, setup: Setup, run: Callable[[], Sequence[Trial | Negative]]) -> None:
+        tasks[title] = SceneTask(run, digest_of(title, setup.digest))
+
     for seed, setup in product(seeds, setups):
         for name in configurations:
             title = f"{', '.join(setup.techniques)} in configuration {name} seed {seed}"
-            tasks[title] = partial(run_trials, setup, name, seed)
+            add(title, setup, partial(run_trials, setup, name, seed))
             if both:
-                tasks[f"{title}, {BOTH}"] = partial(run_both, setup, name, seed)
-        tasks[f"{', '.join(setup.techniques)} without connector seed {seed}"] = partial(run_negatives, setup, seed)
+                add(f"{title}, {BOTH}", setup, partial(run_both, setup, name, seed))
+        title = f"{', '.join(setup.techniques)} without connector seed {seed}"
+        add(title, setup, partial(run_negatives, setup, seed))
     techniques = [name for setup in setups for name in setup.techniques]
     rows = [*techniques, *(f"{name}, {BOTH}" for name in techniques if both)]
-    found, code = run_tasks(tasks, jobs, lambda so_far: _write(out, so_far, rows, seeds))
+    found, code = run_tasks(tasks, jobs, out, KIND, _VALUES)
     _write(out, found, rows, seeds)
     trials = _trials(found)
     if out is not None and trials:

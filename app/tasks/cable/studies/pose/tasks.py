@@ -1,41 +1,56 @@
-"""Runs the scenes of a pose study, each in a process of its own, with a line on stderr when one is done."""
+"""Runs the scenes of a pose study as a campaign: in processes, each kept as it ends."""
 
-import sys
 from collections.abc import Callable, Mapping, Sequence
-from typing import TypeVar
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any, Generic, TypeVar
 
-from regrasp.app.run.processes import run_each
+from pydantic import TypeAdapter
+
+from regrasp.app.campaigns.campaign import Ended, Job, Local, do_all, this_version
+from regrasp.app.campaigns.progress import Progress
+from regrasp.app.campaigns.store import Store
+from regrasp.app.records.result import plain
+from regrasp.app.run.processes import Done
 
 T = TypeVar("T")
 
 
+@dataclass(frozen=True)
+class SceneTask(Generic[T]):
+    """What does a scene, and a digest of all that decides what comes out, but for the program."""
+
+    run: Callable[[], Sequence[T]]
+    key: str
+
+
 def run_tasks(
-    tasks: Mapping[str, Callable[[], Sequence[T]]], jobs: int, keep: Callable[[list[T]], None]
+    tasks: Mapping[str, SceneTask[T]], jobs: int, out: Path | None, kind: str, values: TypeAdapter[list[T]]
 ) -> tuple[list[T], int]:
     """Run tasks by their titles, `jobs` at a time: all their results in the tasks' order, and the exit code.
 
-    `keep` is called after each task with the results so far. The code is 1 when a task raised an error or its process
-    died, 130 after Ctrl-C, else 0.
+    With the folder `out` each is kept as it ends, and the same study again goes on where it stopped. `kind` says in
+    the store what they are, and `values` writes and reads them. The code is 1 when a task raised an error or its
+    process died, 130 after Ctrl-C, else 0.
     """
-    titles, found, code = list(tasks), dict[int, Sequence[T]](), 0
-    each = run_each(list(tasks.values()), jobs)
+    broken = []
 
-    def so_far() -> list[T]:
-        return [part for number in sorted(found) for part in found[number]]
+    def ended(number: int, done: Done[Any], folder: Path | None) -> Ended:
+        if done.value is None:
+            broken.append(number)
+            return Ended(None, done.error, succeeded=False)
+        words = ", ".join(map(str, done.value))
+        return Ended({"values": plain(values.dump_python(list(done.value), mode="json"))}, words)
 
-    try:
-        for count, done in enumerate(each, 1):
-            outcome = done.error
-            if done.value is None:
-                code = 1
-            else:
-                found[done.number] = done.value
-                outcome = ", ".join(map(str, done.value))
-                keep(so_far())
-            print(f"[{count}/{len(tasks)}] {titles[done.number]}: {outcome}", file=sys.stderr, flush=True)
-    except KeyboardInterrupt:
-        print(f"interrupted; {len(found)} of {len(tasks)} scenes were done", file=sys.stderr)
-        code = 130
-    finally:
-        each.close()
-    return so_far(), code
+    with Store.create(out, kind) as store:
+        scenes = [Job(title, task.key, partial(_alone, task.run)) for title, task in tasks.items()]
+        interrupted = do_all(scenes, store, Local(jobs), ended, Progress(noun="scenes done"))
+        stored = {row.key: row.value["values"] for row in store.rows(this_version(store))}
+    found = [value for job in scenes if job.key in stored for value in values.validate_python(stored[job.key])]
+    return found, 130 if interrupted else int(bool(broken))
+
+
+def _alone(run: Callable[[], Sequence[T]], _folder: Path | None) -> Sequence[T]:
+    """A scene leaves no record."""
+    return run()

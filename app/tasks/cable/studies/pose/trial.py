@@ -1,11 +1,12 @@
 """One trial of the pose study: a technique looks at a scene; its mean pose is compared with the truth and grasped."""
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import RigidTransform
 
+from regrasp.app.campaigns.digest import digest_of
 from regrasp.app.files.findings import Finding, Findings
 from regrasp.app.tasks.cable.studies.pose.grasp import grasp, services_of
 from regrasp.app.tasks.cable.studies.pose.scenes import CAMERA, StudyScene, study_cell
@@ -85,6 +86,12 @@ class Setup:
     def scene(self, configuration: str, seed: int) -> StudyScene:
         """A new scene; close it."""
         return StudyScene(self.cell, configuration, seed, self.renderer)
+
+    @property
+    def digest(self) -> str:
+        """A digest of all but the maker."""
+        parts = self.cell.model_dump(mode="json"), list(self.techniques), self.grasps, self.renderer
+        return digest_of(*parts, asdict(self.parameters))
 
     def technique(self, name: str) -> Technique:
         """A new technique, which has seen no frame yet."""

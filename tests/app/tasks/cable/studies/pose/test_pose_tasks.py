@@ -1,9 +1,13 @@
-from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 
 import pytest
+from pydantic import TypeAdapter
 
-from regrasp.app.tasks.cable.studies.pose.tasks import run_tasks
+from regrasp.app.files.findings import Findings
+from regrasp.app.tasks.cable.studies.pose.tasks import SceneTask, run_tasks
+
+NUMBERS = TypeAdapter(list[int])
 
 
 def twice(value: int) -> list[int]:
@@ -14,25 +18,29 @@ def broken() -> list[int]:
     raise ValueError("no such thing")
 
 
+def never() -> list[int]:
+    raise AssertionError("it was done before")
+
+
+ONE, TWO = SceneTask(partial(twice, 1), "1"), SceneTask(partial(twice, 2), "2")
+
+
 def test_what_the_tasks_gave_comes_in_their_order(capsys: pytest.CaptureFixture[str]) -> None:
-    kept: list[list[int]] = []
-    found, code = run_tasks({"one": partial(twice, 1), "two": partial(twice, 2)}, 2, kept.append)
-    assert (found, code) == ([1, 1, 2, 2], 0)
-    assert [len(some) for some in kept] == [2, 4]
+    assert run_tasks({"one": ONE, "two": TWO}, 2, None, "numbers", NUMBERS) == ([1, 1, 2, 2], 0)
     assert {line.split("] ")[1] for line in capsys.readouterr().err.splitlines()} == {"one: 1, 1", "two: 2, 2"}
 
 
-def test_one_that_breaks_off_leaves_the_others(capsys: pytest.CaptureFixture[str]) -> None:
-    tasks: dict[str, Callable[[], list[int]]] = {"bad": broken, "good": partial(twice, 3)}
-    found, code = run_tasks(tasks, 1, lambda _: None)
-    assert (found, code) == ([3, 3], 1)
+def test_one_that_breaks_off_leaves_the_others_and_is_done_again(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bad = SceneTask(broken, "3")
+    assert run_tasks({"bad": bad, "one": ONE}, 1, tmp_path / "study", "numbers", NUMBERS) == ([1, 1], 1)
     assert "[1/2] bad: ValueError: no such thing" in capsys.readouterr().err
+    again = {"bad": SceneTask(partial(twice, 3), "3"), "one": SceneTask(never, "1")}
+    assert run_tasks(again, 1, tmp_path / "study", "numbers", NUMBERS) == ([3, 3, 1, 1], 0)
 
 
-def test_ctrl_c_keeps_what_was_done(capsys: pytest.CaptureFixture[str]) -> None:
-    def interrupted(some: list[int]) -> None:
-        raise KeyboardInterrupt
-
-    found, code = run_tasks({"one": partial(twice, 1), "two": partial(twice, 2)}, 1, interrupted)
-    assert (found, code) == ([1, 1], 130)
-    assert "1 of 2 scenes were done" in capsys.readouterr().err
+def test_a_folder_with_other_things_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "mine.txt").touch()
+    with pytest.raises(Findings, match=r"holds other things \(mine.txt\)"):
+        run_tasks({"one": ONE}, 1, tmp_path, "numbers", NUMBERS)

@@ -1,0 +1,64 @@
+"""Key frames of a run: what the cameras saw at its events, as JPEG files in the record."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+
+from regrasp.interfaces.wall_time import counts_as
+from regrasp.sim.world import World
+
+FOLDER = "pictures"
+
+
+@dataclass(frozen=True)
+class PictureParameters:
+    """How many pictures are kept."""
+
+    quality: int = 80  # of JPEG, 0 to 100
+    every: float = 0.5  # simulated s between two pictures of a camera, at least
+    max_bytes: int = 3_000_000  # of all pictures of a run; later ones are left out
+
+
+class Pictures:
+    """Keeps the newest frame of each camera when an event has come. Without a folder it does nothing.
+
+    A frame is drawn the same whoever reads it, so no log changes.
+    """
+
+    def __init__(
+        self, folder: Path | None, world: World[Any], parameters: PictureParameters = PictureParameters()
+    ) -> None:
+        self._folder, self._world, self._parameters = folder and folder / FOLDER, world, parameters
+        self._event = ""
+        self._taken: dict[str, tuple[int, float]] = {}  # of a camera: frame number, second
+        self._bytes = 0
+
+    def note(self, values: Mapping[str, Any]) -> None:
+        """An event has come."""
+        if self._folder is not None and values["level"] != "debug":
+            self._event = self._event or str(values["event"])
+
+    @counts_as("record")
+    def take(self) -> None:
+        """After a tick: keep the frames if an event has come in it."""
+        event, self._event = self._event, ""
+        if not event or self._folder is None:
+            return
+        now = self._world.now()
+        for name, camera in self._world.cameras.items():
+            number, at = self._taken.get(name, (-1, float("-inf")))
+            frame = camera.latest() if now - at >= self._parameters.every else None
+            if frame is None or frame.number == number:
+                continue
+            settings = [cv2.IMWRITE_JPEG_QUALITY, self._parameters.quality]
+            data = cv2.imencode(".jpg", cv2.cvtColor(frame.rgb, cv2.COLOR_RGB2BGR), settings)[1].tobytes()
+            self._taken[name] = frame.number, now
+            self._bytes += len(data)
+            if self._bytes > self._parameters.max_bytes:
+                return
+            self._folder.mkdir(exist_ok=True)
+            words = "".join(letter if letter.isalnum() else "_" for letter in event)[:40]
+            (self._folder / f"{now:07.2f}-{name}-{words}.jpg").write_bytes(data)
