@@ -1,6 +1,7 @@
 """`regrasp robots`: list, show and check robots, and fit spheres to them."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -68,6 +69,8 @@ def show_robot(
     from regrasp.app.robots.description import described, described_in_words
     from regrasp.app.robots.robot_file import load_robot
 
+    if picture is not None and picture.suffix.lower() != ".png":
+        raise Findings([Finding("--picture", 0, f"{quoted(str(picture))} is no PNG file; write a name with .png")])
     loaded = load_robot(resolve("robot", robot, Path()))
     if picture is not None:
         from regrasp.app.robots.picture import write_picture  # late: it brings the renderer
@@ -150,12 +153,14 @@ def fit_robot_spheres(
       regrasp robots spheres my/robot.yaml --margin 0.03 --margin '*finger*=0.006' > spheres.yaml
       regrasp robots spheres my/robot.yaml --links wrist_3_link --margin 0.01
     """
-    from regrasp.app.files.whole_file import write_whole
+    from regrasp.app.files.whole_file import write_named
     from regrasp.app.robots.proposal import as_yaml, propose, table
     from regrasp.app.robots.robot_file import read_robot
     from regrasp.interfaces.robot.urdf import RobotError
 
     margins = _margins(margin or [])
+    if out is not None and (out.is_dir() or out.is_file() or not out.exists()):  # a pipe is written to as it is
+        _can_write(out)
     loaded, document = read_robot(resolve("robot", robot, Path()))
     _known_links(loaded, links or [], "--links")
     _known_links(loaded, [pattern for pattern, _ in margins.of_links], "--margin")
@@ -169,7 +174,15 @@ def fit_robot_spheres(
     if out is None:
         typer.echo(text, nl=False)
     else:
-        write_whole(out, text)
+        write_named(out, text)
+
+
+def _can_write(out: Path) -> None:
+    """Raise `Findings` if it cannot be written; a fit takes long, and is not to be lost."""
+    from regrasp.app.records.folders import file_findings
+
+    if found := file_findings(out):
+        raise Findings([replace(finding, source=shown(out)) for finding in found])
 
 
 def _margins(texts: list[str]) -> "Margins":

@@ -66,8 +66,14 @@ def first_errors(value: Value, model: type[BaseModel]) -> list[ModelError]:
     try:
         model.model_validate_json(json.dumps(value), strict=True)
     except ValidationError as error:
-        return _best_branches(value, error.errors())
+        return _without_lengths(_best_branches(value, error.errors()))
     return []
+
+
+def _without_lengths(errors: list[ModelError]) -> list[ModelError]:
+    """Without those of lists that are too short only because pydantic does not count the items that are wrong."""
+    parents = {error.path[:length] for error in errors for length in range(len(error.path))}
+    return [error for error in errors if error.details["type"] != "too_short" or error.path not in parents]
 
 
 def _identity(error: ModelError) -> tuple[Path, str, str]:

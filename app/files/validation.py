@@ -168,7 +168,7 @@ def _expected(document: Document, root: Schema, path: Path) -> str:
 
 def _words(node: Schema, key: str) -> str:
     if "const" in node or "enum" in node:
-        return "one of " + ", ".join(node.get("enum", [node.get("const")]))
+        return "one of " + ", ".join(map(str, node.get("enum", [node.get("const")])))
     kind = node.get("type")
     if kind == "array":
         items = node.get("prefixItems", [])
@@ -179,7 +179,7 @@ def _words(node: Schema, key: str) -> str:
         keys = ", ".join(node.get("properties", {}))
         return f"a mapping of {keys}" if keys else "a mapping"
     if kind == "string" and "pattern" in node:
-        return f"text such as {node['examples'][0]!r}"
+        return f"text such as {node['examples'][0]!r}" if "examples" in node else f"text like {node['pattern']}"
     if kind in ("number", "integer"):
         unit = f" in {_UNITS[key]}" if key in _UNITS else ""
         return ("a whole number" if kind == "integer" else "a number") + unit + range_words(node)

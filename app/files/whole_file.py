@@ -4,7 +4,16 @@ import errno
 import os
 from pathlib import Path
 
-from regrasp.app.files.findings import real_path
+from regrasp.app.files.findings import Finding, Findings, real_path, shown
+
+
+def write_named(path: Path, content: str | bytes) -> None:
+    """`write_whole` of a file that a user named, with the folders on its way. Raises `Findings` if it cannot."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_whole(path, content)
+    except OSError as error:
+        raise Findings([Finding(shown(path), 0, f"cannot write it: {error.strerror}; name another file")]) from None
 
 
 def write_whole(path: Path, content: str | bytes) -> None:

@@ -4,8 +4,7 @@ from pathlib import Path
 
 import cv2
 
-from regrasp.app.files.findings import Finding, Findings, shown
-from regrasp.app.files.whole_file import write_whole
+from regrasp.app.files.whole_file import write_named
 from regrasp.interfaces.robot.robot import Robot
 from regrasp.sim.robot.portrait import portrait
 
@@ -13,8 +12,4 @@ from regrasp.sim.robot.portrait import portrait
 def write_picture(robot: Robot, path: Path) -> None:
     """Write the picture. Raises `Findings` if the file cannot be written."""
     image = cv2.imencode(".png", cv2.cvtColor(portrait(robot), cv2.COLOR_RGB2BGR))[1]
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write_whole(path, image.tobytes())
-    except OSError as error:
-        raise Findings([Finding(shown(path), 0, f"cannot write it: {error.strerror}; name another file")]) from None
+    write_named(path, image.tobytes())

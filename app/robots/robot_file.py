@@ -12,6 +12,7 @@ from regrasp.app.files.validation import validated
 from regrasp.app.files.yaml_lines import Document, Place, parse
 from regrasp.app.robots.meshes import missing_meshes
 from regrasp.interfaces.quote import quoted
+from regrasp.interfaces.robot.consistency import inconsistencies
 from regrasp.interfaces.robot.robot import Robot
 from regrasp.interfaces.robot.urdf import RobotError
 
@@ -58,7 +59,10 @@ def _read(path: Path, where: Place | None, above: tuple[Path, ...] = ()) -> Docu
     """The document, on top of the robot that it names as its `base`; the files `above` stand on this one."""
     document = parse(read_text(path, where), shown(path))
     value = document.value
-    if isinstance(value, dict) and "folder" not in value and _is_beside(value):
+    if isinstance(value, dict) and "folder" in value:
+        message = "unknown key 'folder'; leave it out: paths are those from the robot file's folder"
+        document.findings.append(Finding(*document.place(("folder",)), message))
+    if isinstance(value, dict) and _is_beside(value):
         value["folder"] = str(path.resolve().parent)
     if not isinstance(value, dict) or "base" not in value:
         return document
@@ -81,15 +85,14 @@ def _is_beside(value: dict[str, Any]) -> bool:
 
 
 def _check(document: Document, robot: Robot) -> None:
-    """Whether the URDF has what the file names. Raises `Findings` with the first thing that it lacks."""
+    """Whether the file agrees with itself and the URDF. Raises `Findings`."""
     try:
-        count = len(robot.chain)
-        if robot.mount is not None:
-            _ = robot.mounted
-        _ = robot.body
+        found = [Finding(*document.place(path), message) for path, message in inconsistencies(robot)]
     except RobotError as error:
         raise Findings([Finding(*document.place(error.path), str(error))]) from None
-    found = [*_missing_meshes(document, robot)]
+    if found:
+        raise Findings(found)
+    found, count = [*_missing_meshes(document, robot)], len(robot.chain)
     poses = enumerate(robot.calibration.poses)
     rows = [(("sleep",), robot.sleep), *((("calibration", "poses", i), pose) for i, pose in poses)]
     for path, row in rows:

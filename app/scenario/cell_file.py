@@ -58,9 +58,9 @@ def load_cell(
     cell, wrong = catch_findings(validated, document, model)
     found += wrong if not found else [finding for finding in wrong if not _is_missing_section(finding, task)]
     if cell:
-        misnamed = [*_misnamed(document, cell)]
-        found += misnamed
-        if not misnamed:
+        unusable = [*_misnamed(document, cell), *_without_spheres(document, cell)]
+        found += unusable
+        if not unusable:
             found += _task_findings(document, cell, task, laid_out)
     if found or not cell:
         raise Findings(found)
@@ -207,6 +207,14 @@ def _cells_with(task: str) -> list[str]:
         if isinstance(value, dict) and "base" not in value and task in value.get("known", {}):
             found.append(name)
     return found
+
+
+def _without_spheres(document: Document, cell: Cell) -> Iterator[Finding]:
+    """Arms that nothing would keep from what is around them."""
+    for i, arm in enumerate(cell.known.arms):
+        if not arm.robot.spheres:
+            message = f"known.arms.{i}.robot: {arm.robot.title} has no spheres; `regrasp robots spheres` fits them"
+            yield Finding(*document.place(("known", "arms", i, "robot")), message)
 
 
 def _misnamed(document: Document, cell: Cell) -> Iterator[Finding]:

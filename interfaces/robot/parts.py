@@ -16,6 +16,7 @@ from regrasp.interfaces.fields import (
     Vector,
 )
 
+JointName = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$", max_length=40, examples=["wrist_1"])]
 LinkName = Annotated[str, Field(min_length=1, max_length=80)]
 Sphere = tuple[Number, Number, Number, Annotated[float, Field(gt=0, le=2)]]  # centre and radius, m
 
@@ -46,7 +47,7 @@ class Joint(Model):
     Units are rad, rad/s, rad/s2 and N m; of a sliding joint m, m/s, m/s2 and N.
     """
 
-    name: Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$", max_length=40)]
+    name: JointName
     urdf: str | None = None  # its name there, if that is another
     sign: Literal[1, -1] = 1  # -1: we count the other way round
     lower: Number | None = None
@@ -75,7 +76,7 @@ class Rail(Model):
     long as the way of the carriage and stays where it is.
     """
 
-    name: Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$", max_length=40)] = "rail"
+    name: JointName = "rail"
     axis: Literal["x", "y", "z"] = "y"  # of the base's frame
     lower: Number
     upper: Number
@@ -94,7 +95,7 @@ class Rail(Model):
 
 
 class Pads(Model):
-    """Rubber pads that are added to two fingers, as boxes; the URDF has none."""
+    """Rubber pads that are added to two fingers, as boxes; the URDF has none. "Along the finger" is the tool's x."""
 
     links: tuple[LinkName, LinkName]  # of the left and the right finger, whose faces look at each other
     face: Number  # m from a finger link's origin to its inner face, against the way it opens
@@ -113,9 +114,15 @@ class _Gripper(Model):
     speed: Annotated[float, Field(ge=1e-3, le=10)]  # m/s of each finger
     friction: Friction  # of the pads
 
+    @model_validator(mode="after")
+    def _closes(self) -> Self:
+        if self.closed >= self.opening:
+            raise ValueError(f"closed {self.closed:g} is not below opening {self.opening:g}; exchange them")
+        return self
+
 
 class ParallelGripper(_Gripper):
-    """Two sliding fingers that one drive moves: the URDF's joints have opposite signs, the left one opens upwards."""
+    """Two sliding fingers that one drive moves. Which way each of their joints opens follows from the URDF."""
 
     type: Literal["parallel"]
     joints: tuple[str, str]  # of the left and the right finger

@@ -4,12 +4,14 @@ import xml.etree.ElementTree as ET
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import zip_longest
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
+from pydantic.json_schema import SkipJsonSchema
 
 from regrasp.interfaces.arrays import FloatArray, Mask
 from regrasp.interfaces.fields import Color, JointAngle, Model
@@ -17,6 +19,7 @@ from regrasp.interfaces.quote import nearest, quoted
 from regrasp.interfaces.robot import urdf
 from regrasp.interfaces.robot.chain import Chain
 from regrasp.interfaces.robot.linkage import Linkage
+from regrasp.interfaces.robot.parallel_jaw import ParallelJaw
 from regrasp.interfaces.robot.parts import (
     Attached,
     Calibration,
@@ -26,12 +29,14 @@ from regrasp.interfaces.robot.parts import (
     Joint,
     LinkageGripper,
     LinkName,
+    ParallelGripper,
     Placed,
     Rail,
     Source,
     Sphere,
 )
 from regrasp.interfaces.robot.urdf import DECIMALS, RobotError, UrdfJoint, UrdfTree, snapped
+from regrasp.interfaces.robot.urdf_validation import DRIVEN
 
 BEAM, CARRIAGE = "rail_beam", "rail_carriage"  # links of a rail
 _CARRIAGE_MASS, _CARRIAGE_INERTIA = 10.0, 0.1  # kg, kg m2; choice: a drive as strong as a rail's moves it anyhow
@@ -54,26 +59,26 @@ class Robot(Model):
     sleep: tuple[JointAngle, ...]
     calibration: Calibration
     footprint: Footprint
-    spheres: dict[LinkName, tuple[Sphere, ...]]  # by link, in its frame
+    # By link, in its frame. Only a file to which spheres are yet to be fitted has none; no cell takes it.
+    spheres: dict[LinkName, tuple[Sphere, ...]] = Field(default_factory=dict)
     # Pairs of links that can meet; links not named together are kept apart by the joints' limits.
-    self_collision: tuple[tuple[LinkName, LinkName], ...]
+    self_collision: tuple[tuple[LinkName, LinkName], ...] = ()
     cover: Cover = Cover()
     still: tuple[LinkName, ...] = ()  # links that turn on the spot, which nothing around can meet
     # Links that touch nothing in the world: PyBullet takes their hulls, which fill what is open between the fingers.
     untouchable: tuple[LinkName, ...] = ()
     paint: Color | None = None  # in place of the URDF's colours and textures
-    draw: Annotated[str, Field(pattern="^(visual|collision)$")] = "visual"  # which of the URDF's meshes are drawn
-    folder: str = ""
+    draw: Literal["visual", "collision"] = "visual"  # which of the URDF's meshes are drawn
+    folder: SkipJsonSchema[str] = ""  # no key for a person to write
 
     def element(self) -> ET.Element:
         """The whole URDF: arm, gripper and rail; mesh files are absolute paths. A new tree each time.
 
-        Raises RobotError: a source cannot be read.
+        Raises RobotError: a source cannot be read, or the parts do not fit together.
         """
         root = _at("urdf", self.urdf, self.folder)
         if self.attached is not None:
-            part = _at("attached", self.attached.urdf, self.folder)
-            urdf.attach(root, urdf.prefixed(part, self.attached.prefix), self.attached.at, "gripper_mount")
+            _attach(root, self.attached, self.folder)
         if self.rail is not None:
             _add_rail(root, self.rail, self.base_link)
         for link in root.findall("link"):
@@ -123,7 +128,7 @@ class Robot(Model):
         origins: FloatArray = np.asarray(np.round(steps, DECIMALS) + 0.0, float)
         axes = np.array([pose[:3, :3] @ joint.axis for pose, joint in zip(zero, joints, strict=True)])
         slides = np.array([joint.kind == "prismatic" for joint in joints])
-        last_from_tool = self._in_body(self.tool)[1]
+        last_from_tool = self._in_body(self.tool, "tool")[1]
         lower, upper, speeds, accelerations, torques = self._limits(joints)
         return Chain(
             names=self.joint_names,
@@ -142,7 +147,7 @@ class Robot(Model):
     @cached_property
     def mounted(self) -> tuple[int, FloatArray]:
         """The chain's link that carries a camera, and link_from_mount (4, 4). Raises RobotError without a mount."""
-        return self._in_body(self.camera_mount)
+        return self._in_body(self.camera_mount, "mount")
 
     @property
     def camera_mount(self) -> Placed:
@@ -182,8 +187,21 @@ class Robot(Model):
         gripper = self.gripper
         if isinstance(gripper, LinkageGripper):
             return self.linkage.positions(opening)
-        finger = finger_position(opening, gripper.pads.face, gripper.pads.thickness)
-        return dict(zip(gripper.joints, (finger, -finger), strict=True))
+        return self.parallel_jaw.positions(opening)
+
+    def pad_places(self, opening: float) -> FloatArray:
+        """The pads' middles (2, 3), m, in the URDF's root with the arm's joints at zero and this opening, m."""
+        gripper, positions = self.gripper, self.gripper_positions(opening)
+        if isinstance(gripper, LinkageGripper):
+            return np.array([self.tree.frame(link, positions)[:3, 3] for link in gripper.pads])
+        pads = zip(gripper.pads.links, self.parallel_jaw.pads, strict=True)
+        return np.array([(self.tree.frame(link, positions) @ pose)[:3, 3] for link, pose in pads])
+
+    @cached_property
+    def parallel_jaw(self) -> ParallelJaw:
+        """How the jaw of a parallel gripper opens."""
+        assert isinstance(self.gripper, ParallelGripper)
+        return ParallelJaw.of(self.tree, self.gripper, self.tool)
 
     @cached_property
     def linkage(self) -> Linkage:
@@ -191,8 +209,11 @@ class Robot(Model):
         assert isinstance(self.gripper, LinkageGripper)
         return Linkage.of(self.tree, self.gripper)
 
-    def _in_body(self, frame: Placed) -> tuple[int, FloatArray]:
-        return self._placed(frame.link, urdf.pose_of(frame.xyz, frame.rpy), {})
+    def _in_body(self, frame: Placed, key: str) -> tuple[int, FloatArray]:
+        try:
+            return self._placed(frame.link, urdf.pose_of(frame.xyz, frame.rpy), {})
+        except RobotError as error:
+            raise RobotError((key, "link"), str(error)) from None
 
     def _placed(self, link: str, link_from_frame: FloatArray, jaw: Mapping[str, float]) -> tuple[int, FloatArray]:
         try:
@@ -220,15 +241,34 @@ class Robot(Model):
                 right = nearest(joint.in_urdf, [name for name, known in tree.joints.items() if known.kind != "fixed"])
                 path = ("joints", i, "urdf" if joint.urdf else "name")
                 raise RobotError(path, f"the URDF has no joint {quoted(joint.in_urdf)}; {right}")
+            if (kind := tree.joints[joint.in_urdf].kind) not in DRIVEN:
+                message = f"the URDF's joint {quoted(joint.in_urdf)} is {kind}; driven ones are {', '.join(DRIVEN)}"
+                raise RobotError(("joints", i), message)
         for key, link in (("tool", self.tool.link), ("base_link", self.base_link)):
             if link not in tree.links:
                 here: tuple[str, ...] = (key, "link") if key == "tool" else (key,)
                 raise RobotError(here, f"the URDF has no link {quoted(link)}; {nearest(link, tree.links)}")
         way = [joint for joint in tree.way_to(self.tool.link) if joint.kind != "fixed"]
-        if [joint.name for joint in way] != [*self.urdf_joints]:
-            there, given = ", ".join(joint.name for joint in way) or "none", ", ".join(self.urdf_joints)
-            raise RobotError(("joints",), f"the joints that move the tool are {there}, in this order, not {given}")
+        self._compare_joints([joint.name for joint in way])
         return way
+
+    def _compare_joints(self, there: list[str]) -> None:
+        """Raise RobotError for the first joint that is another than on the URDF's way to the tool."""
+        given, on_rail = [*self.urdf_joints], int(self.rail is not None)
+        if there == given:
+            return
+        n = next(i for i, (a, b) in enumerate(zip_longest(there, given)) if a != b)
+        path: tuple[str | int, ...] = ("joints", n - on_rail) if n < len(given) else ("joints",)
+        if n == len(given):
+            wrong = f"{there[n]} is missing at the end"
+        elif given[n] not in there:
+            wrong = f"{given[n]} does not move the tool"
+        elif n == len(there):
+            wrong = f"{given[n]} stands twice"
+        else:
+            wrong = f"{there[n]} {'comes' if there[n] in given else 'is missing'} before {given[n]}"
+        in_order = ", ".join(there[on_rail:]) or "none"
+        raise RobotError(path, f"{wrong}; the URDF's joints from the base to the tool are {in_order}")
 
     def _limits(self, joints: list[UrdfJoint]) -> FloatArray:
         """Lower and upper limits, speeds, accelerations and torques (5, n)."""
@@ -284,7 +324,7 @@ class Body:
             np.array(spheres, float).reshape(-1, 4),
             np.array(fingers, float).reshape(-1, 3),
             np.array(pairs, np.int64).reshape(-1, 2),
-            max(still, default=-1) + 1,
+            max(still | {0}) + 1,  # the first link stands still whatever the file says
             robot,
         )
 
@@ -319,18 +359,13 @@ def _finger_ways(robot: Robot) -> dict[str, FloatArray]:
     """In which direction (3,) of the last chain link each finger's link moves as a parallel jaw opens."""
     if isinstance(robot.gripper, LinkageGripper):
         return {}
-    ways = {}
+    ways, jaw = {}, robot.parallel_jaw
     for link in (link for link in robot.spheres if link in robot.tree.links):
-        for name, side in zip(robot.gripper.joints, (1.0, -1.0), strict=True):
-            joint = next((joint for joint in robot.tree.way_to(link) if joint.name == name), None)
-            if joint is not None:
-                ways[link] = side * (robot.link_place(joint.child)[1][:3, :3] @ joint.axis)
+        above = [joint.name for joint in robot.tree.way_to(link)]
+        for joint, sign in zip(jaw.joints, jaw.signs, strict=True):
+            if joint.name in above:
+                ways[link] = sign * (robot.link_place(joint.child)[1][:3, :3] @ joint.axis)
     return ways
-
-
-def finger_position(gap: float, face: float, thickness: float) -> float:
-    """Position, m, of a parallel gripper's left finger joint at which the pads are `gap` m apart; see `Pads`."""
-    return gap / 2 + face + thickness
 
 
 def _at(key: str, source: Source, folder: str) -> ET.Element:
@@ -341,8 +376,27 @@ def _at(key: str, source: Source, folder: str) -> ET.Element:
         raise RobotError((*inside, *error.path), str(error)) from None
 
 
+def _attach(root: ET.Element, attached: Attached, folder: str) -> None:
+    tree, part = UrdfTree(root), urdf.prefixed(_at("attached", attached.urdf, folder), attached.prefix)
+    if attached.at.link not in tree.links:
+        message = f"the URDF has no link {quoted(attached.at.link)}; {nearest(attached.at.link, tree.links)}"
+        raise RobotError(("attached", "at", "link"), message)
+    added = UrdfTree(part)
+    if both := {*tree.links, *tree.joints} & {*added.links, *added.joints}:
+        message = f"{quoted(min(both))} is a name in both URDFs; give the gripper's names another prefix"
+        raise RobotError(("attached", "prefix"), message)
+    urdf.attach(root, part, attached.at, "gripper_mount")
+
+
 def _add_rail(root: ET.Element, rail: Rail, base: str) -> None:
     """The beam as the new root, and a carriage on it that carries the base."""
+    tree = UrdfTree(root)
+    if base not in tree.roots:
+        message = f"a rail carries the whole robot; the URDF's first link is {tree.roots[0]}, name that"
+        raise RobotError(("base_link",), message)
+    if rail.name in tree.joints:
+        message = f"the URDF has a joint {quoted(rail.name)}, too; give the rail another name"
+        raise RobotError(("rail", "name"), message)
     beam, carriage = (ET.SubElement(root, "link", name=name) for name in (BEAM, CARRIAGE))
     along = "xyz".index(rail.axis)
     size, middle = [rail.beam[0], rail.beam[0], rail.beam[1]], [0.0, 0.0, 0.0]
@@ -373,6 +427,9 @@ def _limits(i: int, joint: Joint, known: UrdfJoint) -> tuple[float, float, float
     for key, value in values.items():
         if value is None:
             message = f"neither the file nor the URDF says {words[key]} of {joint.name}; write {words[key]}: a number"
+            raise RobotError(("joints", i), message)
+        if key in ("velocity", "effort") and value <= 0:
+            message = f"{key} of {joint.in_urdf} is {value:g} in the URDF; write {words[key]}: a number above 0"
             raise RobotError(("joints", i), message)
     lower, upper = float(values["lower"] or 0.0), float(values["upper"] or 0.0)
     if lower >= upper:

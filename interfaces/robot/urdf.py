@@ -8,14 +8,16 @@ import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from regrasp.interfaces.arrays import FloatArray
+from regrasp.interfaces.quote import quoted
 from regrasp.interfaces.robot.parts import Placed, Source
+from regrasp.interfaces.robot.urdf_validation import problem_of
 
 _DIRECTION = 1e-9  # an entry of a rotation that is nearer to -1, 0 or 1 is that: URDFs write 1.5707963 for pi / 2
 DECIMALS = 12  # of lengths in m: far below what any arm can do, so that sums of decimals come out as decimals
@@ -86,7 +88,7 @@ class UrdfTree:
 def read_urdf(source: Source, folder: Path) -> ET.Element:
     """The root element of a source, whose mesh files are absolute paths. `folder` holds the robot file.
 
-    Raises RobotError: there is no such package or file, or it is no XML.
+    Raises RobotError: there is no such package or file, or it is no URDF.
     """
     return ET.fromstring(_text(source.model_dump_json(), folder))
 
@@ -98,26 +100,42 @@ def _text(source_json: str, folder: Path) -> str:
     path = base / source.path
     if not path.is_file():
         where = f"the package {source.package}" if source.package else "the robot file's folder"
-        raise RobotError(("path",), f"{where} has no file {source.path}; write its path from there")
+        raise RobotError(("path",), f"{where} has no file {quoted(source.path)}; write its path from there")
     try:
         root = ET.fromstring(_bound(_expanded(path, source.arguments)))
     except ET.ParseError as error:
-        raise RobotError(("path",), f"{path} is no URDF: {error}") from None
+        message = f"{path}:{error.position[0]}: no XML: {error}; mend it there, or name a URDF file"
+        raise RobotError(("path",), message) from None
+    if problem := problem_of(root):
+        raise RobotError(("path",), f"{path}: {problem}")
     for mesh in root.iter("mesh"):
         mesh.set("filename", str(_mesh_file(mesh.get("filename", ""), path, base, source.ros_packages)))
     return ET.tostring(root, encoding="unicode")
 
 
 def _package(name: str) -> Path:
+    """The folder of an installed package, found without running it: any module may be named."""
+    first, *inside = name.split(".")
     try:
-        return Path(str(files(name)))
-    except (ModuleNotFoundError, TypeError, ValueError):
-        raise RobotError(("package",), f"no package {name} is installed; pip install it, or name another") from None
+        spec = find_spec(first) if name.isascii() and all(map(str.isidentifier, (first, *inside))) else None
+    except ValueError:  # such as __main__, which has none
+        spec = None
+    if spec is None:
+        message = f"no package {quoted(name)} is installed; pip install it, or name another"
+        raise RobotError(("package",), message)
+    folders = [Path(place, *inside) for place in spec.submodule_search_locations or ()]
+    found = next((folder for folder in folders if folder.is_dir()), None)
+    if found is None:
+        raise RobotError(("package",), f"{quoted(name)} is no package with files; name one that has the URDF")
+    return found
 
 
 def _expanded(path: Path, arguments: Mapping[str, str]) -> str:
     if path.suffix != ".xacro":
-        return path.read_text(encoding="utf-8")
+        try:
+            return path.read_text(encoding="utf-8-sig")
+        except UnicodeDecodeError:
+            raise RobotError(("path",), f"{path} is no text; name a URDF file") from None
     import xacro
 
     try:
@@ -234,8 +252,18 @@ def pose_of(xyz: tuple[float, ...], rpy: tuple[float, ...]) -> FloatArray:
     return pose
 
 
+def rpy_of(rotation: FloatArray) -> tuple[float, float, float]:
+    """The roll, pitch and yaw of a rotation (3, 3), as `pose_of` takes them; yaw is 0 where roll can stand for it."""
+    across = float(np.hypot(rotation[0, 0], rotation[1, 0]))
+    pitch = np.arctan2(-rotation[2, 0], across)
+    if across < _DIRECTION:
+        return float(np.arctan2(-rotation[1, 2], rotation[1, 1])) + 0.0, float(pitch), 0.0
+    roll, yaw = np.arctan2(rotation[2, 1], rotation[2, 2]), np.arctan2(rotation[1, 0], rotation[0, 0])
+    return float(roll) + 0.0, float(pitch) + 0.0, float(yaw) + 0.0
+
+
 def snapped(rotation: FloatArray) -> FloatArray:
-    """The rotation (3, 3) with entries that are nearly -1, 0 or 1 exactly so."""
+    """The rotation (3, 3), or rows of one, with entries that are nearly -1, 0 or 1 exactly so."""
     whole = np.rint(rotation)
     return np.asarray(np.where(np.abs(rotation - whole) < _DIRECTION, whole + 0.0, rotation))
 

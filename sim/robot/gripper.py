@@ -10,8 +10,9 @@ import pybullet as p
 from regrasp.interfaces.hidden_world import Errors, GripperSpec
 from regrasp.interfaces.reading import GripperReading
 from regrasp.interfaces.robot.linkage import Linkage
+from regrasp.interfaces.robot.parallel_jaw import ParallelJaw
 from regrasp.interfaces.robot.parts import LinkageGripper, ParallelGripper
-from regrasp.interfaces.robot.robot import Robot, finger_position
+from regrasp.interfaces.robot.robot import Robot
 from regrasp.sim.robot.model import pad_links
 
 
@@ -174,31 +175,29 @@ class SimParallelGripper(SimGripper):
 
     def true_gap(self) -> float:
         """See `SimGripper`."""
-        states = p.getJointStates(self._body, self._fingers, physicsClientId=self._client)
-        pads = self._gripper.pads
-        return float(states[0][0] - states[1][0] - 2 * (pads.face + pads.thickness))
+        left, right = p.getJointStates(self._body, self._fingers, physicsClientId=self._client)
+        return float(self._jaw.gap(left[0], right[0]))
 
     def place_at(self, gap: float) -> None:
         """See `SimGripper`."""
-        position = self._position(gap)
-        left, right = self._fingers
-        p.resetJointState(self._body, left, position, physicsClientId=self._client)
-        p.resetJointState(self._body, right, -position, physicsClientId=self._client)
+        position = self._jaw.position(gap)
+        for finger, sign in zip(self._fingers, self._jaw.signs, strict=True):
+            p.resetJointState(self._body, finger, sign * position, physicsClientId=self._client)
 
     @property
     def _gripper(self) -> ParallelGripper:
         assert isinstance(self._robot.gripper, ParallelGripper)
         return self._robot.gripper
 
-    def _position(self, gap: float) -> float:
-        """The left finger joint's, m; the right one's is its negative."""
-        return finger_position(gap, self._gripper.pads.face, self._gripper.pads.thickness)
+    @property
+    def _jaw(self) -> ParallelJaw:
+        return self._robot.parallel_jaw
 
     def _build(self) -> None:
         self._fingers = tuple(self._place.joints[name] for name in self._gripper.joints)
         left, right = self._fingers
-        # One servo moves both; the URDF's right finger has the opposite sign.
-        self._couple(left, right, 1.0, (0, 1, 0), self._parameters.gear_error_reduction)
+        ratio, axis = -self._jaw.signs[0] * self._jaw.signs[1], tuple(self._jaw.joints[0].axis.tolist())
+        self._couple(left, right, ratio, axis, self._parameters.gear_error_reduction)  # one servo moves both
         for name in self._gripper.spin:
             joint, client = self._place.joints[name], self._client
             p.setJointMotorControl2(
@@ -207,24 +206,24 @@ class SimParallelGripper(SimGripper):
         self.place_at(self._gripper.closed)
 
     def _drive_at(self, speed: float, force: float) -> None:
-        for finger, side in zip(self._fingers, (1, -1), strict=True):
+        for finger, sign in zip(self._fingers, self._jaw.signs, strict=True):
             p.setJointMotorControl2(
                 self._body,
                 finger,
                 p.VELOCITY_CONTROL,
-                targetVelocity=side * speed,
+                targetVelocity=sign * speed,
                 force=force,
                 physicsClientId=self._client,
             )
 
     def _drive_to(self, gap: float) -> None:
-        position = self._position(gap)
-        for finger, side in zip(self._fingers, (1, -1), strict=True):
+        position = self._jaw.position(gap)
+        for finger, sign in zip(self._fingers, self._jaw.signs, strict=True):
             p.setJointMotorControl2(
                 self._body,
                 finger,
                 p.POSITION_CONTROL,
-                targetPosition=side * position,
+                targetPosition=sign * position,
                 positionGain=self._parameters.position_gain,
                 velocityGain=self._parameters.velocity_gain,
                 force=self._parameters.open_force,

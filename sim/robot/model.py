@@ -8,6 +8,7 @@ import numpy as np
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.fields import Color
 from regrasp.interfaces.robot import urdf
+from regrasp.interfaces.robot.parallel_jaw import ParallelJaw
 from regrasp.interfaces.robot.parts import Gripper, Pads, ParallelGripper
 from regrasp.interfaces.robot.robot import Robot
 
@@ -32,7 +33,7 @@ def robot_urdf(robot: Robot, camera_offset: tuple[float, float, float] | None) -
     if robot.paint is not None:
         _paint(root, robot.paint)
     if isinstance(robot.gripper, ParallelGripper):
-        _add_pads(root, robot.gripper.pads)
+        _add_pads(root, robot.gripper.pads, robot.parallel_jaw)
     if camera_offset is not None:
         _add_camera(root, robot, camera_offset)
     ET.indent(root)
@@ -44,11 +45,11 @@ def pad_links(gripper: Gripper) -> tuple[str, str]:
     return ("left_pad", "right_pad") if isinstance(gripper, ParallelGripper) else gripper.pads
 
 
-def _add_pads(root: ET.Element, pads: Pads) -> None:
-    for name, link, side in zip(("left_pad", "right_pad"), pads.links, (1.0, -1.0), strict=True):
-        # The finger link's origin is at its joint's position: the face is `pads.face` nearer to the middle.
-        y = -side * (pads.face + pads.thickness / 2)
-        _add_box(root, name, link, (pads.ahead, y, 0.0), (pads.length, pads.thickness, pads.height), PAD_COLOR)
+def _add_pads(root: ET.Element, pads: Pads, jaw: ParallelJaw) -> None:
+    size = (pads.length, pads.thickness, pads.height)
+    for name, link, pose in zip(("left_pad", "right_pad"), pads.links, jaw.pads, strict=True):
+        place, rpy = tuple(pose[:3, 3].tolist()), urdf.rpy_of(pose[:3, :3])
+        _add_box(root, name, link, place, size, PAD_COLOR, rpy)
 
 
 def _add_camera(root: ET.Element, robot: Robot, offset: tuple[float, float, float]) -> None:

@@ -26,6 +26,7 @@ class PortraitParameters:
     seen_from: Vector = (1.0, -0.8, 0.6)  # direction from the robot to the camera, of any length
     light_from: Vector = (0.6, -0.9, 1.0)  # direction from the robot to the light, of any length
     largest: float = 0.25  # m; a larger sphere, of which only a cap stands for something, is left out
+    around: float = 0.1  # m around the links' origins that are in the picture if there are no spheres
     still: Color = (0.55, 0.55, 0.58)  # of spheres that nothing around can meet
     colors: tuple[Color, ...] = ((0.85, 0.45, 0.2), (0.2, 0.5, 0.8))  # of the other links' spheres, in turn
 
@@ -33,8 +34,9 @@ class PortraitParameters:
 def portrait(robot: Robot, parameters: PortraitParameters = PortraitParameters()) -> NDArray[np.uint8]:
     """The picture (size, 2 size, 3) RGB: the robot at the left, its spheres at the right."""
     links, spheres = _placed_spheres(robot, parameters.largest)
-    middle = 0.5 * (spheres[:, :3].min(axis=0) + spheres[:, :3].max(axis=0))
-    radius = float(np.max(np.linalg.norm(spheres[:, :3] - middle, axis=1) + spheres[:, 3]))
+    framed = spheres if len(spheres) else _around_links(robot, parameters.around)
+    middle = 0.5 * (framed[:, :3].min(axis=0) + framed[:, :3].max(axis=0))
+    radius = float(np.max(np.linalg.norm(framed[:, :3] - middle, axis=1) + framed[:, 3]))
     camera = _camera(middle, radius, parameters)
     return np.hstack(
         [
@@ -57,9 +59,15 @@ def _placed_spheres(robot: Robot, largest: float) -> tuple[NDArray[np.int64], Fl
         pose = robot.tree.frame(link, positions)
         for x, y, z, radius in group:
             rows.append([*(pose[:3, :3] @ (x, y, z) + pose[:3, 3]), radius])
-    spheres = np.array(rows)
+    spheres = np.array(rows, float).reshape(-1, 4)
     shown = spheres[:, 3] <= largest
     return robot.body.links[shown], spheres[shown]
+
+
+def _around_links(robot: Robot, radius: float) -> FloatArray:
+    """Balls (n, 4), m, around the origins of all links in the URDF's root frame."""
+    positions = _positions(robot)
+    return np.array([[*robot.tree.frame(link, positions)[:3, 3], radius] for link in robot.tree.links])
 
 
 def _place_robot(client: int, robot: Robot) -> None:

@@ -30,7 +30,7 @@ base_link: base
 joints:
   - {name: turn, acceleration: 5.0}
   - {name: bend, acceleration: 5.0, lower: -1.5}
-tool: {link: lower, xyz: [0.0, 0.0, 0.24]}
+tool: {link: lower, xyz: [0.0, 0.0, 0.24], rpy: [0.0, -1.5707963267948966, 0.0]}
 gripper:
   type: parallel
   joints: [left, right]
@@ -38,7 +38,7 @@ gripper:
   force: 20.0
   speed: 0.1
   friction: 0.8
-  pads: {links: [left, right], face: 0.005, ahead: 0.0, length: 0.02, height: 0.02, thickness: 0.004}
+  pads: {links: [left, right], face: 0.005, ahead: 0.02, length: 0.02, height: 0.02, thickness: 0.004}
 sleep: [0.0, 1.0]
 calibration: {poses: [[0.0, 0.0]]}
 footprint: {center: [0.0, 0.0, 0.0], size: [0.2, 0.2, 0.1]}

@@ -126,3 +126,47 @@ def test_a_picture_shows_the_robot_and_its_spheres(tmp_path: Path) -> None:
     drawn = [np.abs(half - half[0, 0]).sum(axis=2) > 30 for half in (robot, spheres)]  # what is no background
     assert drawn[0].mean() > 0.05
     assert drawn[1][drawn[0]].mean() > 0.98  # the spheres cover it
+
+
+def test_a_picture_of_a_robot_without_spheres_shows_the_robot_alone(tmp_path: Path, robot: Path) -> None:
+    robot.write_text(ROBOT[: ROBOT.index("spheres:")])
+    ran = invoke("show", "toy.yaml", "--picture", "toy.png")
+    assert ran.exit_code == 0, ran.output
+    picture = cv2.imread(str(tmp_path / "toy.png"))
+    assert picture is not None
+    drawn = [np.abs(half - half[0, 0]).max() > 30 for half in np.split(picture.astype(int), 2, axis=1)]
+    assert drawn == [True, False]
+
+
+@pytest.mark.parametrize("name", ["toy.jpg", "toy", "toy.yaml"])
+def test_a_picture_that_is_no_png_is_refused(tmp_path: Path, name: str) -> None:
+    before = {file: file.read_bytes() for file in tmp_path.iterdir()}
+    ran = invoke("show", "toy.yaml", "--picture", name)
+    assert (ran.exit_code, ran.stdout) == (2, "")
+    assert ran.stderr == f"--picture: '{name}' is no PNG file; write a name with .png\n"
+    assert {file: file.read_bytes() for file in tmp_path.iterdir()} == before
+
+
+@pytest.mark.parametrize("place", ["toy.urdf/a.yaml", "/proc/a/b.yaml", "folder"])
+def test_where_nothing_can_be_written_is_told_before_the_fit(tmp_path: Path, place: str) -> None:
+    (tmp_path / "folder").mkdir()
+    ran = invoke("spheres", "toy.yaml", "-o", place)
+    assert (ran.exit_code, ran.stderr.count("\n")) == (2, 1), ran.stderr
+    assert ran.stderr.startswith(f"{place}: ")
+
+
+def test_folders_on_the_way_to_the_spheres_are_made(tmp_path: Path) -> None:
+    ran = invoke("spheres", "toy.yaml", "--links", "left", "-o", "some/where/made.yaml")
+    assert ran.exit_code == 0, ran.output
+    assert "left" in yaml.safe_load((tmp_path / "some/where/made.yaml").read_text())["spheres"]
+
+
+def test_spheres_are_fitted_to_a_file_that_has_none(robot: Path) -> None:
+    first = "".join(line for line in ROBOT.splitlines(True) if not line.startswith(("still", "self_coll", "cover")))
+    robot.write_text(first[: first.index("spheres:")])
+    ran = invoke("check", "toy.yaml")
+    assert (ran.exit_code, ran.stderr) == (2, "toy.yaml:1: no spheres; `regrasp robots spheres toy.yaml` fits them\n")
+    ran = invoke("spheres", "toy.yaml", "--margin", "0.03", "-o", "made.yaml")
+    assert ran.exit_code == 0, ran.output
+    robot.write_text(robot.read_text() + Path("made.yaml").read_text())
+    assert invoke("check", "toy.yaml").exit_code == 0

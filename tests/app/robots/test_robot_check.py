@@ -32,8 +32,25 @@ WRONG = {
         "tool:",
         ["no link 'flange'", "base, left, lower"],
     ),
-    "no such package": (("{path: toy.urdf}", "{package: toy_models, path: a}"), "urdf:", ["no package toy_models"]),
-    "no such URDF": (("path: toy.urdf", "path: tory.urdf"), "urdf:", ["no file tory.urdf"]),
+    "no such package": (
+        ("{path: toy.urdf}", "{package: toy_models, path: a}"),
+        "urdf:",
+        ["no package 'toy_models' is installed"],
+    ),
+    "a package of no name": (("{path: toy.urdf}", '{package: "", path: a}'), "urdf:", ["no package '' is installed"]),
+    "a module that is no package": (
+        ("{path: toy.urdf}", "{package: math, path: a}"),
+        "urdf:",
+        ["'math' is no package with files"],
+    ),
+    "a package inside that is not there": (
+        ("{path: toy.urdf}", "{package: pybullet_data.gone, path: a}"),
+        "urdf:",
+        ["'pybullet_data.gone' is no package with files"],
+    ),
+    "a path upwards": (("{path: toy.urdf}", "{package: .., path: a}"), "urdf:", ["no package '..' is installed"]),
+    "no path": (("path: toy.urdf", 'path: ""'), "urdf:", ["has no file ''"]),
+    "no such URDF": (("path: toy.urdf", "path: tory.urdf"), "urdf:", ["no file 'tory.urdf'"]),
     "a limit beyond the URDF's": (("lower: -1.5", "lower: -2.5"), "- {name: be", ["lower -2.5 of bend", "URDF's -2;"]),
     "limits in the wrong order": (
         ("lower: -1.5", "lower: 2.5, upper: 1"),
@@ -63,6 +80,34 @@ WRONG = {
         "  upper:",
         ["upper stand out by up to 59.9"],
     ),
+    "a joint of the fingers": (
+        ("  - {name: bend", "  - {name: left, acceleration: 5.0}\n  - {name: bend"),
+        "- {name: left",
+        ["left does not move the tool; the URDF's joints from the base to the tool are turn, bend"],
+    ),
+    "a joint too few": (("  - {name: turn, acceleration: 5.0}\n", ""), "- {name: be", ["turn is missing before bend"]),
+    "a joint too few at the end": (
+        ("  - {name: bend, acceleration: 5.0, lower: -1.5}\n", ""),
+        "joints:",
+        ["bend is missing at the end"],
+    ),
+    "joints in another order": (
+        (
+            "{name: turn, acceleration: 5.0}",
+            "{name: one, urdf: bend, acceleration: 5.0}\n  - {name: turn, acceleration: 1}",
+        ),
+        "- {name: one",
+        ["turn comes before bend"],
+    ),
+    "no sign": (("{name: bend", "{sign: 2, name: bend"), "- {sign", ["joints.1.sign is 2; expected one of 1, -1"]),
+    "a name that is none": (("name: bend", 'name: "j 2;é"'), '- {name: "j', ["expected text such as 'wrist_1'"]),
+    "a tool that is turned": (
+        ("rpy: [0.0,", "rpy: [0.2,"),
+        "tool:",
+        ["the tool's y is turned by 11 degrees from the way in which the fingers close"],
+    ),
+    "a tool off the pads": (("0.0, 0.24]", "0.0, 0.30]"), "tool:", ["the tool lies 60 mm from the pads' middle"]),
+    "no spheres": ((ROBOT[ROBOT.index("spheres:") :], "spheres: {}\n"), "spheres:", ["no spheres; `regrasp robots sp"]),
     "a promise for no link": (("excess: 0.06}", "links: {uper: {}}}"), "cover:", ["no link 'uper'"]),
 }
 
@@ -107,3 +152,46 @@ def test_a_pose_in_which_the_robot_meets_itself_is_told(tmp_path: Path) -> None:
     with pytest.raises(Findings) as error:
         check_robot(path)
     assert "the spheres of upper and left overlap by" in error.value.items[0].message
+
+
+def test_the_same_meeting_in_several_poses_is_told_once(tmp_path: Path) -> None:
+    text = ROBOT.replace("self_collision: []", "self_collision: [[upper, left]]").replace("0.0, 1.0]", "0.0, 3.0]")
+    path = write_robot(tmp_path, text.replace("[[0.0, 0.0]]", "[[0.0, 3.05], [0.1, 3.1]]"))
+    (tmp_path / "toy.urdf").write_text(URDF.replace('lower="-2" upper="2"', 'lower="-3.2" upper="3.2"'))
+    with pytest.raises(Findings) as error:
+        check_robot(path)
+    (found,) = error.value.items
+    assert found.line == ROBOT[: ROBOT.index("sleep:")].count("\n") + 1
+    assert found.message.startswith("here, and in 2 more poses the spheres of upper and left overlap by ")
+
+
+def test_what_fits_spheres_names_the_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    path = write_robot(tmp_path, ROBOT.replace("  left: [[0, 0, 0, 0.03]]\n", ""))
+    with pytest.raises(Findings) as error:
+        check_robot(path)
+    assert "`regrasp robots spheres toy.yaml --links left` fits them" in error.value.items[0].message
+
+
+def test_a_wrong_item_does_not_make_its_list_too_short(tmp_path: Path) -> None:
+    joints = ROBOT[ROBOT.index("  - {name: turn") : ROBOT.index("tool:")]
+    path = write_robot(tmp_path, ROBOT.replace(joints, '  - {name: "j 2", acceleration: 5.0}\n'))
+    with pytest.raises(Findings) as error:
+        check_robot(path)
+    (found,) = error.value.items
+    assert found.message.startswith("joints.0.name is 'j 2'; expected text such as 'wrist_1'")
+
+
+def test_a_package_is_found_without_running_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("ran_alone.py", "ran_whole/__init__.py"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(f"open({str(tmp_path / 'ran')!r}, 'w')")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    path = write_robot(tmp_path, ROBOT.replace("{path: toy.urdf}", "{package: ran_alone, path: toy.urdf}"))
+    with pytest.raises(Findings, match="'ran_alone' is no package with files"):
+        check_robot(path)
+    for file in (tmp_path / "toy.urdf", tmp_path / "upper.stl"):
+        (tmp_path / "ran_whole" / file.name).write_bytes(file.read_bytes())
+    path.write_text(ROBOT.replace("{path: toy.urdf}", "{package: ran_whole, path: toy.urdf}"))
+    check_robot(path)
+    assert not (tmp_path / "ran").exists()

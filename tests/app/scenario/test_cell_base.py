@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+from robots import OWN
 
 from regrasp.app.files.findings import Findings
 from regrasp.app.files.resources import shipped
@@ -45,6 +46,18 @@ def test_a_base_may_be_a_file_beside_the_cell(tmp_path: Path, monkeypatch: pytes
     path = cell(tmp_path, "base: below.yaml\nknown: {cable: {length: 0.5}}\n")
     monkeypatch.chdir("/")
     assert cable_cell(path).known.cable.length == 0.5
+
+
+def test_a_robot_without_spheres_is_no_cell_s(tmp_path: Path) -> None:
+    panda = (OWN / "panda.yaml").read_text()
+    (tmp_path / "bare.yaml").write_text(panda[: panda.index("spheres:")])
+    arms = "".join(
+        f"    - {{name: {name}, robot: bare.yaml, base: [0, {y}, 0]}}\n" for name, y in (("left", 1), ("right", 0))
+    )
+    assert findings(cell(tmp_path, f"base: thesis\nknown:\n  arms:\n{arms}")) == [
+        f"mine.yaml:{line}: known.arms.{i}.robot: Franka Emika Panda has no spheres; `regrasp robots spheres` fits them"
+        for i, line in enumerate((4, 5))
+    ]
 
 
 def test_what_is_wrong_is_told_where_it_stands(tmp_path: Path) -> None:
