@@ -127,7 +127,7 @@ def do_all(
     had = store.keys(version)
     left = [number for number, job in enumerate(jobs) if job.key not in had]
     _clear_away_leftovers(store)
-    progress.begin(len(jobs), len(jobs) - len(left))
+    progress.begin(len(jobs), len(jobs) - len(left), sum(had.get(job.key, False) for job in jobs))
     try:
         for attempt in range(effort.tries):
             killed: list[int] = []

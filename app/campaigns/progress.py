@@ -9,18 +9,22 @@ from regrasp.interfaces.quote import printable
 
 
 class Progress:
-    """On a terminal a bar under the lines; else a summary once a minute. `quiet` shows nothing but `note`."""
+    """On a terminal a bar under the lines; else a summary once a minute.
 
-    def __init__(self, quiet: bool = False, seconds_of_summary: float = 60.0, noun: str = "as expected") -> None:
-        self.done = self.succeeded = 0
-        self._quiet, self._noun, self._every = quiet, noun, seconds_of_summary
+    `quiet` shows nothing but `note`; without `counted` no successes are told, as of runs that have no expectations.
+    """
+
+    def __init__(self, quiet: bool = False, seconds_of_summary: float = 60.0, counted: bool = True) -> None:
+        self.done = self.succeeded = 0  # in all, and as expected
+        self._quiet, self._counted, self._every = quiet, counted, seconds_of_summary
         self._total = self._before = 0
         self._began = self._told = time.monotonic()
         self._bar: Any = None
 
-    def begin(self, total: int, done_before: int) -> None:
+    def begin(self, total: int, done_before: int, succeeded_before: int) -> None:
         """There are `total` runs, of which the store holds some."""
         self._total, self.done, self._before = total, done_before, done_before
+        self.succeeded = succeeded_before
         self._began = self._told = time.monotonic()
         if done_before:
             self.note(f"{done_before} of {total} are done already")
@@ -59,11 +63,12 @@ class Progress:
         """How many are done, came out as expected, a minute, and how long the rest takes."""
         here = self.done - self._before
         minutes = (time.monotonic() - self._began) / 60
-        low, high = wilson_interval(self.succeeded, here)
+        low, high = wilson_interval(self.succeeded, self.done)
         left = (self._total - self.done) * minutes / here if here else 0.0
+        share = f"{self.succeeded} as expected (95 % interval {100 * low:.0f} to {100 * high:.0f} %); "
         return (
-            f"{self.done} of {self._total} done; {self.succeeded} of {here} {self._noun}"
-            f" (95 % interval {100 * low:.0f} to {100 * high:.0f} %); {here / minutes:.1f} a minute, {_span(left)} left"
+            f"{self.done} of {self._total} done; {share if self._counted else ''}"
+            f"{here / minutes:.1f} a minute, {_span(left)} left"
         )
 
     def _line(self, text: str) -> None:

@@ -139,10 +139,14 @@ class Store:
             found = self._connection.execute(query).fetchall()
             return [Version(number, began, json.loads(program), runs) for number, began, program, runs in found]
 
-    def keys(self, version: int) -> set[str]:
-        """The keys of the runs that this version has done."""
+    def keys(self, version: int) -> dict[str, bool]:
+        """The keys of the runs that this version has done, and whether each came out as expected.
+
+        A row without the value `succeeded` did.
+        """
+        query = "select key, ifnull(json_extract(value, '$.succeeded'), 1) from row where version = ?"
         with _told(self.folder):
-            return {key for (key,) in self._connection.execute("select key from row where version = ?", (version,))}
+            return {key: bool(succeeded) for key, succeeded in self._connection.execute(query, (version,))}
 
     def add(self, version: int, key: str, title: str, record: str, value: Mapping[str, Any]) -> int:
         """Add a row; it is on the disk when this returns. Returns its number."""

@@ -15,20 +15,22 @@ def made(folder: Path, count: int = 3) -> None:
     with Store.create(folder, KIND) as store:
         version = store.version_id("d1", {"python": "3"})
         for n in range(count):
-            store.add(version, f"k{n}", f"thing {n}", "", {"n": n, "x": 0.1})
+            store.add(version, f"k{n}", f"thing {n}", "", {"n": n, **({"succeeded": False} if n == 1 else {})})
 
 
 def test_what_was_added_is_there_again(tmp_path: Path) -> None:
     made(tmp_path / "c")
     with Store.create(tmp_path / "c", KIND) as store:
         version = store.version_id("d1", {"python": "3"})
-        assert store.keys(version) == {"k0", "k1", "k2"}
+        assert store.keys(version) == {"k0": True, "k1": False, "k2": True}
         other = store.version_id("d2", {"python": "4"})
-        assert store.keys(other) == set()
+        assert store.keys(other) == {}
         store.add(other, "k0", "thing 0", "runs/a", {"n": 5})
     with Store.read(tmp_path / "c") as store:
         assert [(row.number, row.title, row.value) for row in store.rows(version)] == [
-            (n + 1, f"thing {n}", {"n": n, "x": 0.1}) for n in range(3)
+            (1, "thing 0", {"n": 0}),
+            (2, "thing 1", {"n": 1, "succeeded": False}),
+            (3, "thing 2", {"n": 2}),
         ]
         assert [(v.id, v.program, v.runs) for v in store.versions()] == [
             (1, {"python": "3"}, 3),

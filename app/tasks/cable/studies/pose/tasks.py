@@ -45,7 +45,7 @@ def run_tasks(
 
     with Store.create(out, kind) as store:
         scenes = [Job(title, task.key, partial(_alone, task.run)) for title, task in tasks.items()]
-        interrupted = do_all(scenes, store, Local(jobs), ended, Progress(noun="scenes done"))
+        interrupted = do_all(scenes, store, Local(jobs), ended, Progress(counted=False))
         stored = {row.key: row.value["values"] for row in store.rows(this_version(store))}
     found = [value for job in scenes if job.key in stored for value in values.validate_python(stored[job.key])]
     return found, 130 if interrupted else int(bool(broken))
