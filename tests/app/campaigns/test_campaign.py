@@ -176,11 +176,12 @@ def test_a_task_of_other_sources_is_refused() -> None:
 
 
 def test_killed_at_random_moments_every_run_is_there_once(tmp_path: Path) -> None:
-    """Twenty kills, of the campaign or of one of its processes; then one that may end."""
-    draw, count, pids = random.Random(5), 150, tmp_path / "pids"
+    """Kills of the campaign or of one of its processes, as many as KILLS says; then one that may end."""
+    kills = int(os.environ.get("KILLS", "20"))
+    draw, count, pids = random.Random(5), 7 * kills + 10, tmp_path / "pids"
     command = [sys.executable, str(PROGRAM), str(tmp_path / "c"), str(count), str(pids)]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
-    for kill in range(20):
+    for kill in range(kills):
         for path in pids.glob("*"):
             path.unlink()
         with subprocess.Popen(command, env=environment, start_new_session=True) as process:

@@ -4,8 +4,11 @@ import math
 import random
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.stats import binomtest
 
-from regrasp.app.campaigns.statistics import detectable_share, mcnemar_p, median_interval
+from regrasp.app.campaigns.statistics import detectable_share, mcnemar_p, median_interval, wilson_interval
 
 
 @pytest.mark.parametrize(
@@ -40,3 +43,10 @@ def test_the_interval_holds_the_median_as_often_as_it_says() -> None:
     assert 0.95 <= inside / 1000 < 0.98
     assert median_interval([3.0]) == (3.0, 3.0, 3.0)
     assert math.isnan(median_interval([])[0])
+
+
+@given(st.integers(0, 2000).flatmap(lambda n: st.tuples(st.integers(0, n), st.just(n))), st.floats(0.5, 0.999))
+def test_wilson_s_interval_is_scipy_s(counts: tuple[int, int], level: float) -> None:
+    successes, trials = counts
+    right = binomtest(successes, trials).proportion_ci(level, method="wilson") if trials else (0.0, 1.0)
+    assert wilson_interval(successes, trials, level) == pytest.approx((right[0], right[1]), abs=1e-12)
