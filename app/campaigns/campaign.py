@@ -1,5 +1,6 @@
 """Does jobs that the store does not hold yet, on some engine, and stores each as it ends."""
 
+import errno
 import shutil
 from collections.abc import Callable, Generator, Iterable, Sequence
 from contextlib import closing
@@ -147,6 +148,12 @@ def do_all(
             left = killed
             if not left:
                 break
+    except OSError as error:
+        if error.errno not in (errno.ENOSPC, errno.EDQUOT):
+            raise
+        where = shown(store.folder) if store.folder else "the temporary folder"
+        message = "the disk is full: make room, then give the same command again; what is done is kept"
+        raise Findings([Finding(where, 0, message)]) from None
     except KeyboardInterrupt:
         progress.note(f"interrupted; {progress.done} of {len(jobs)} are done; the same command goes on there")
         return True
@@ -195,7 +202,7 @@ def _clear_away_leftovers(store: Store) -> None:
 
 
 def _check_program(done: Done[Any]) -> None:
-    """Raise `Findings` when a run says nothing about the robot: the sources have changed, or the disk is full."""
+    """Raise `Findings` when a run says nothing about the robot, for the sources have changed."""
     if done.error.startswith(OtherProgram.__name__):
         message = "sources or packages changed while it went on; give the same command again: it begins anew beside"
         raise Findings([Finding("campaign", 0, message)])

@@ -1,5 +1,7 @@
 """Episodes as jobs of a campaign, and what their rows hold."""
 
+import errno
+import os
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
@@ -9,7 +11,6 @@ from typing import TYPE_CHECKING, Any, Literal, cast
 from regrasp.app.campaigns.campaign import Ended, Job, known_version
 from regrasp.app.campaigns.digest import digest_of, scenario_digest
 from regrasp.app.campaigns.store import Store, StoredRow
-from regrasp.app.files.findings import Finding, Findings
 from regrasp.app.records.folders import folder_name
 from regrasp.app.records.result import Result, plain
 from regrasp.app.run.batch import Row, Run, RunEpisode, Settings, row_of, run_task, summary
@@ -49,13 +50,12 @@ class Stored:
     keep: Keep
 
     def __call__(self, number: int, done: Done[Result], folder: Path | None) -> Ended:
-        """The row's values. Raises `Findings` when the disk is full: that says nothing about the robot."""
+        """The row's values. Raises `OSError` when the disk is full: that says nothing about the robot."""
         run = replace(self.runs[number], folder=folder if folder and folder.is_dir() else None)
         row = row_of(run, done)
         cause = row.cause or {}
         if _DISK_FULL in done.error or _DISK_FULL in str(cause.get("message", "")):
-            message = "the disk is full: make room, then give the same command again; what is done is kept"
-            raise Findings([Finding(run.scenario.name, 0, message)])
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         keep = self.keep == "all" or (self.keep == "failed" and not row.succeeded)
         value = {**plain(asdict(row)), "source": _source(run)}
         return Ended(value, summary(row), row.succeeded, keep)

@@ -189,8 +189,8 @@ def _stop(processes: Sequence[Any], grace: float) -> None:
 
 def _child(pipe: "Connection[Any, Any]", task: Callable[[], Any]) -> None:
     """Do the task, and each that comes through the pipe, until the parent closes it or a task raises."""
-    listen_to_parent()
     with contextlib.suppress(KeyboardInterrupt, BrokenPipeError, EOFError):  # the parent waits no more
+        listen_to_parent()
         while True:
             _forget_peak_memory()
             try:

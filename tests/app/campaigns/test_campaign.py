@@ -1,6 +1,7 @@
 """Campaigns: every run once, whatever dies meanwhile."""
 
 import contextlib
+import errno
 import os
 import random
 import signal
@@ -119,6 +120,19 @@ def test_what_a_killed_campaign_left_is_cleared_away(tmp_path: Path) -> None:
     assert found["b"][2] == "runs/record-b"
     assert (tmp_path / "c/runs/record-b/told").read_text() == "4"
     assert not (tmp_path / "c/.unfinished").exists()
+
+
+def test_a_full_disk_ends_it_and_what_is_done_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    campaign(tmp_path / "c", {"a": partial(give, 1)})
+
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with monkeypatch.context() as patched:
+        patched.setattr("pathlib.Path.replace", full)
+        with pytest.raises(Findings, match=r"c: the disk is full: make room, then give the same command again"):
+            campaign(tmp_path / "c", {"a": never, "b": partial(give, 4)})
+    assert campaign(tmp_path / "c", {"a": never, "b": partial(give, 4)})["b"][0] == 4
 
 
 def test_sources_that_change_meanwhile_end_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
