@@ -28,7 +28,10 @@ class PortraitParameters:
     light_from: Vector = (0.6, -0.9, 1.0)  # direction from the robot to the light, of any length
     largest: float = 0.25  # m; of a larger sphere only a cap stands for something: it need not fit into the picture
     around: float = 0.1  # m around the links' origins that are in the picture if there are no such spheres
-    axes: tuple[float, float] = (0.1, 0.006)  # m, length and thickness of the bars along x, y and z of the tool's frame
+    axes: tuple[float, float] = (
+        0.08,
+        0.006,
+    )  # m, length and thickness of the bars along x, y and z of the tool's frame
     axis_colors: tuple[Color, Color, Color] = ((0.9, 0.1, 0.1), (0.1, 0.7, 0.1), (0.1, 0.2, 0.9))
     still: Color = (0.55, 0.55, 0.58)  # of spheres that nothing around can meet
     colors: tuple[Color, ...] = ((0.85, 0.45, 0.2), (0.2, 0.5, 0.8))  # of the other links' spheres, in turn
