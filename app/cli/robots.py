@@ -55,7 +55,8 @@ def show_robot(
     robot: Name,
     as_json: AsJson = False,
     picture: Annotated[
-        Path | None, typer.Option(help="Also write a PNG file: the robot asleep, and its spheres beside it.")
+        Path | None,
+        typer.Option(help="Also write a PNG file: the robot asleep with its tool's frame, and its spheres beside it."),
     ] = None,
 ) -> None:
     """Show a robot's joints, tool, gripper and reach.
@@ -175,6 +176,7 @@ def fit_robot_spheres(
         typer.echo(text, nl=False)
     else:
         write_named(out, text)
+        typer.echo(f"{shown(out)}: put its sections into {shown(resolve('robot', robot, Path()))}", err=True)
 
 
 def _can_write(out: Path) -> None:

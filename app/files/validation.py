@@ -135,6 +135,7 @@ def _finding(document: Document, root: Schema, path: Path, error: ErrorDetails) 
         message = f"unknown key {quoted(path[-1])}; {nearest(str(path[-1]), keys)}"
     elif kind == "value_error":
         message = f"{dotted}: {error['msg'].removeprefix('Value error, ')}"
+        return Finding(*document.place_of_whole(path), message)
     elif kind in ("literal_error", "enum") and isinstance(error["input"], str):
         nodes = nodes_at(root, path, document.value)
         names = [name for schema in nodes for name in schema.get("enum", [schema.get("const")])]
@@ -173,7 +174,7 @@ def _words(node: Schema, key: str) -> str:
     if kind == "array":
         items = node.get("prefixItems", [])
         what = _words(items[0], key) if items and "$ref" not in items[0] else ""
-        many = f"{len(items)} values, each {what}" if what else "a list"
+        many = f"{len(items)} values, each {what}" if what else _list_of(node.get("items", {}), key)
         return f"{many} of at least {node['minItems']} value" if not items and "minItems" in node else many
     if kind == "object":
         keys = ", ".join(node.get("properties", {}))
@@ -184,6 +185,10 @@ def _words(node: Schema, key: str) -> str:
         unit = f" in {_UNITS[key]}" if key in _UNITS else ""
         return ("a whole number" if kind == "integer" else "a number") + unit + range_words(node)
     return {"boolean": "true or false", "string": "text"}.get(str(kind), "another value")
+
+
+def _list_of(item: Schema, key: str) -> str:
+    return f"a list, each item {_words(item, key)}" if item.get("type") == "number" else "a list"
 
 
 def range_words(node: Schema) -> str:

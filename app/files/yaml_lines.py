@@ -52,6 +52,12 @@ class Document:
             path = path[:-1]
         return self.places[path]
 
+    def place_of_whole(self, path: Path) -> Place:
+        """Of a mapping whose values contradict each other: the first that another file put into it, else its own."""
+        own = self.place(path)
+        inside = [place for p, place in self.places.items() if p[: len(path)] == path and place[0] != own[0]]
+        return min(inside, key=lambda place: place[1], default=own)
+
     def rename(self, path: Path, name: str) -> None:
         """Rename the key at `path`, which must exist."""
         self.move(path, (*path[:-1], name))

@@ -94,11 +94,14 @@ def _tool(robot: Robot) -> Iterator[Found]:
     if cosine < np.cos(np.deg2rad(MOST_TURNED_DEG)):
         turned = np.rad2deg(np.arccos(min(cosine, 1.0)))
         message = f"the tool's y is turned by {turned:.0f} degrees from the way in which the fingers close"
-        yield ("tool",), f"{message}; correct rpy: y goes that way, x along the fingers"
+        yield ("tool", "rpy"), f"{message}; correct rpy: y goes that way, x along the fingers"
     off = min(float(np.linalg.norm(tool[:3, 3] - places.mean(axis=0))) for places in [opened, *others])
     if off > MOST_OFF:
-        message = f"the tool lies {1000 * off:.0f} mm from the pads' middle"
-        yield ("tool",), f"{message}, however far the jaw is open; correct xyz, or the pads"
+        middle = np.linalg.inv(robot.tree.frame(robot.tool.link)) @ np.append(opened.mean(axis=0), 1.0)
+        place = ", ".join(f"{value:.4g}" for value in np.round(middle[:3], 4) + 0.0)
+        message = f"the tool lies {1000 * off:.0f} mm from the pads' middle, however far the jaw is open"
+        right = f"by pads and rpy that is at [{place}] in {robot.tool.link}"
+        yield ("tool", "xyz"), f"{message}; {right}: correct xyz, rpy (x along the fingers), or the pads"
 
 
 def _bare(robot: Robot, path: Path) -> Iterator[Found]:

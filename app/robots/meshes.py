@@ -113,7 +113,7 @@ def _read(link: str, path: Path) -> FloatArray:
 
 
 def _is_missing(link: str, path: Path) -> str:
-    return f"the mesh {path} of the link {link} is missing; put it there, or correct the URDF"
+    return f"the mesh {path} of the link {link} is missing; put it there, or correct the URDF or ros_packages"
 
 
 def _floats(text: str) -> FloatArray:

@@ -74,6 +74,7 @@ def _read(path: Path, where: Place | None, above: tuple[Path, ...] = ()) -> Docu
         raise Findings([Finding(*place, f"base is {quoted(name)}, which stands on this robot itself; name another")])
     below = _read(base, place, (path.resolve(), *above))
     merge_into(below, document)
+    below.places[()] = document.place(())  # what neither file has is missing in this one
     return below
 
 

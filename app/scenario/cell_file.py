@@ -79,6 +79,7 @@ def tasks_of(path: Path, assignments: Sequence[Assignment] = (), where: Place | 
 def _put_robots(document: Document, folder: Path, asleep: dict[int, Any]) -> list[Finding]:
     """Put the content of robot files in the place of their names; findings of files that cannot be read.
 
+    A path is relative to `folder`; one from the command line, to where that runs.
     An arm without a sleep pose gets its robot's, which is noted in `asleep`, and another when the robot is changed.
     """
     found: list[Finding] = []
@@ -88,7 +89,7 @@ def _put_robots(document: Document, folder: Path, asleep: dict[int, Any]) -> lis
             continue
         key = ("known", "arms", i, "robot")
         place = document.place(key if "robot" in arm else key[:-1])
-        content, wrong = catch_findings(robot_named, name, folder, place)
+        content, wrong = catch_findings(robot_named, name, Path() if was_typed(place) else folder, place)
         found += wrong
         robot = arm["robot"] = deepcopy(content or robot_named(DEFAULT_ROBOT, folder, place))
         if arm.get("sleep") == asleep.get(i):

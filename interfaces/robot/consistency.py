@@ -73,16 +73,21 @@ def _finger_limits(robot: Robot) -> Iterator[Found]:
     """Positions of sliding fingers that their joints do not reach."""
     if not isinstance(robot.gripper, ParallelGripper):
         return
+    jaw = robot.parallel_jaw
     for key, gap in (("opening", robot.gripper.opening), ("closed", robot.gripper.closed)):
-        positions = robot.parallel_jaw.positions(gap)
-        for joint in robot.parallel_jaw.joints:
-            lower, upper = joint.limits.get("lower", 0.0), joint.limits.get("upper", 0.0)
-            if not lower - _CLOSE <= positions[joint.name] <= upper + _CLOSE:
-                stands = f"{joint.name} would stand at {positions[joint.name]:g} m with the pads {gap:g} m apart"
-                yield (
-                    ("gripper", key),
-                    f"{stands}, beyond the URDF's {lower:g} to {upper:g}; correct {key} or pads",
+        for side, joint in enumerate(jaw.joints):
+            nearest_gap, farthest = jaw.reach(side)
+            if not nearest_gap - _CLOSE <= gap <= farthest + _CLOSE:
+                lower, upper = joint.limits.get("lower", 0.0), joint.limits.get("upper", 0.0)
+                stands = (
+                    f"{joint.name} would stand at {jaw.positions(gap)[joint.name]:g} m with the pads {gap:g} m apart"
                 )
+                right = (
+                    f"these pads can be {max(nearest_gap, 0.0):.4g} to {farthest:.4g} m apart: correct {key} or pads"
+                )
+                if farthest <= 0:
+                    right = "these pads always touch: correct their face and thickness"
+                yield ("gripper", key), f"{stands}, beyond the URDF's {lower:g} to {upper:g}; {right}"
                 break
 
 

@@ -62,6 +62,13 @@ class ParallelJaw:
         position = self.position(gap)
         return {joint.name: sign * position for joint, sign in zip(self.joints, self.signs, strict=True)}
 
+    def reach(self, side: int) -> tuple[float, float]:
+        """The pads' distances, m, between which the URDF's limits keep the left (0) or the right (1) finger."""
+        sign, limits = self.signs[side], self.joints[side].limits
+        ends = sorted(sign * limits.get(key, 0.0) for key in ("lower", "upper"))
+        gaps = [2 * (end - self.face - self.thickness + self.offset) for end in ends]
+        return gaps[0], gaps[1]
+
     def gap(self, left: float, right: float) -> float:
         """The pads' distance, m, with the joints at these positions."""
         return self.signs[0] * left + self.signs[1] * right - 2 * (self.face + self.thickness - self.offset)
@@ -108,7 +115,7 @@ def _pad_turn(along: FloatArray, y: FloatArray) -> FloatArray:
     x = along - (along @ y) * y
     if np.linalg.norm(x) < _ASIDE:
         message = "the tool's x lies along the way in which the fingers close; x goes along the fingers, y that way"
-        raise RobotError(("tool",), message)
+        raise RobotError(("tool", "rpy"), message)
     x = x / np.linalg.norm(x)
     return np.column_stack([x, y, np.cross(x, y)])
 

@@ -5,20 +5,22 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from regrasp.interfaces.fields import (
+    Coordinate,
     Force,
     Friction,
     JointAngle,
     Length,
     Model,
-    NotNegative,
-    Number,
     Size,
     Vector,
 )
 
 JointName = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$", max_length=40, examples=["wrist_1"])]
 LinkName = Annotated[str, Field(min_length=1, max_length=80)]
-Sphere = tuple[Number, Number, Number, Annotated[float, Field(gt=0, le=2)]]  # centre and radius, m
+Sphere = tuple[Coordinate, Coordinate, Coordinate, Annotated[float, Field(gt=0, le=2)]]  # centre and radius, m
+JointLimit = Annotated[float, Field(ge=-100, le=100)]  # rad, or m of a sliding joint
+Margin = Annotated[float, Field(ge=0, le=1)]  # m
+PadOffset = Annotated[float, Field(ge=-1, le=1)]  # m
 
 
 class Source(Model):
@@ -50,8 +52,8 @@ class Joint(Model):
     name: JointName
     urdf: str | None = None  # its name there, if that is another
     sign: Literal[1, -1] = 1  # -1: we count the other way round
-    lower: Number | None = None
-    upper: Number | None = None
+    lower: JointLimit | None = None
+    upper: JointLimit | None = None
     speed: Annotated[float, Field(gt=0, le=100)] | None = None
     acceleration: Annotated[float, Field(gt=0, le=1000)]  # a URDF has none
     torque: Annotated[float, Field(gt=0, le=1e5)] | None = None
@@ -78,8 +80,8 @@ class Rail(Model):
 
     name: JointName = "rail"
     axis: Literal["x", "y", "z"] = "y"  # of the base's frame
-    lower: Number
-    upper: Number
+    lower: JointLimit
+    upper: JointLimit
     speed: Annotated[float, Field(gt=0, le=10)]
     acceleration: Annotated[float, Field(gt=0, le=100)]
     force: Force
@@ -98,8 +100,8 @@ class Pads(Model):
     """Rubber pads that are added to two fingers, as boxes; the URDF has none. "Along the finger" is the tool's x."""
 
     links: tuple[LinkName, LinkName]  # of the left and the right finger, whose faces look at each other
-    face: Number  # m from a finger link's origin to its inner face, against the way it opens
-    ahead: Number  # m from a finger link's origin to the pad's middle, along the finger
+    face: PadOffset  # m from a finger link's origin to its inner face, against the way it opens
+    ahead: PadOffset  # m from a finger link's origin to the pad's middle, along the finger
     length: Length  # along the finger
     height: Length
     thickness: Annotated[float, Field(ge=1e-4, le=0.02)]
@@ -170,8 +172,8 @@ class Footprint(Model):
 class LinkCover(Model):
     """What the spheres of one link promise, where that differs from the others."""
 
-    outside: NotNegative | None = None
-    excess: NotNegative | None = None
+    outside: Margin | None = None
+    excess: Margin | None = None
 
 
 class Cover(Model):
@@ -182,8 +184,8 @@ class Cover(Model):
     still, or only turn on the spot, nothing around is checked: they promise no excess, and without spheres nothing.
     """
 
-    outside: NotNegative = 0.001
-    excess: NotNegative = 0.03
+    outside: Margin = 0.001
+    excess: Margin = 0.03
     links: dict[LinkName, LinkCover] = Field(default_factory=dict)  # those that differ
 
     def of(self, link: str) -> tuple[float, float]:

@@ -434,7 +434,7 @@ def _limits(i: int, joint: Joint, known: UrdfJoint) -> tuple[float, float, float
     lower, upper = float(values["lower"] or 0.0), float(values["upper"] or 0.0)
     if lower >= upper:
         message = f"{joint.name} turns from {lower:g} to {upper:g} by file and URDF; give lower and upper in order"
-        raise RobotError(("joints", i), message)
+        raise RobotError(("joints", i, "upper" if joint.lower is None else "lower"), message)
     return lower, upper, float(values["velocity"] or 0.0), joint.acceleration, float(values["effort"] or 0.0)
 
 

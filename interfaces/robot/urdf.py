@@ -109,7 +109,7 @@ def _text(source_json: str, folder: Path) -> str:
     if problem := problem_of(root):
         raise RobotError(("path",), f"{path}: {problem}")
     for mesh in root.iter("mesh"):
-        mesh.set("filename", str(_mesh_file(mesh.get("filename", ""), path, base, source.ros_packages)))
+        mesh.set("filename", str(_mesh_file(mesh.get("filename", ""), path, base, source)))
     return ET.tostring(root, encoding="unicode")
 
 
@@ -153,15 +153,28 @@ def _bound(text: str) -> str:
     return text
 
 
-def _mesh_file(name: str, urdf: Path, base: Path, packages: Mapping[str, str]) -> Path:
+def _mesh_file(name: str, urdf: Path, base: Path, source: Source) -> Path:
     if not name.startswith("package://"):
         return urdf.parent / name.removeprefix("file://")
     package, _, rest = name.removeprefix("package://").partition("/")
-    if package not in packages:
-        known = f"; it knows {', '.join(packages)}" if packages else ""
-        message = f"the URDF's meshes are in the ROS package {package}, which ros_packages does not place{known}"
-        raise RobotError(("ros_packages",), message)
-    return base / packages[package] / rest
+    if package not in source.ros_packages:
+        message = f"the URDF's meshes are in the ROS package {package}, which ros_packages does not place"
+        folder = _ros_folder(package, rest, urdf, base)
+        inside = f"the package {source.package}" if source.package else "the robot file's folder"
+        right = f"{{{package}: {folder}}}" if folder else f"{{{package}: FOLDER}}, with its path in {inside}"
+        raise RobotError(("ros_packages",), f"{message}; write ros_packages: {right}")
+    return base / source.ros_packages[package] / rest
+
+
+def _ros_folder(package: str, rest: str, urdf: Path, base: Path) -> str | None:
+    """The path from `base` of the folder of this name beside or above the URDF that has the file `rest`, if any has."""
+    for above in urdf.parents:
+        if not above.is_relative_to(base):
+            break
+        for folder in (above / package, *([above] if above.name == package else [])):
+            if (folder / rest).is_file():
+                return folder.relative_to(base).as_posix()
+    return None
 
 
 def prefixed(root: ET.Element, prefix: str) -> ET.Element:

@@ -10,12 +10,21 @@ import typer.main
 from readme_commands import README, commands
 
 from regrasp.app.cli.commands import app
+from regrasp.app.files.findings import Findings
+from regrasp.app.robots.check import check_robot
 from regrasp.app.scenario.load import cases
 
 TEXT = README.read_text(encoding="utf-8")
 OURS = [command for command in commands(TEXT) if command.startswith("regrasp ")]
 TUTORIAL = README.parent / "docs" / "tutorial.md"
-TAUGHT = [command for command in commands(TUTORIAL.read_text(encoding="utf-8")) if command.startswith("regrasp ")]
+ROBOTS = README.parent / "docs" / "robots.md"
+TAUGHT = [
+    command
+    for page in (TUTORIAL, ROBOTS)
+    for command in commands(page.read_text(encoding="utf-8"))
+    if command.startswith("regrasp ")
+]
+FIRST_ROBOT = re.findall(r"```yaml\n(title: .*?)```", ROBOTS.read_text(encoding="utf-8"), re.DOTALL)[0]
 PAGES = [README, *sorted(TUTORIAL.parent.glob("*.md"))]
 
 
@@ -58,6 +67,26 @@ def test_the_tutorial_s_test_passes(pytester: pytest.Pytester) -> None:
     [example] = re.findall(r"```python\n(.*?)```", TUTORIAL.read_text(encoding="utf-8"), re.DOTALL)
     pytester.makepyfile(example)
     pytester.runpytest_inprocess("-p", "regrasp.app.pytest_plugin", "-p", "no:cacheprovider").assert_outcomes(passed=1)
+
+
+def first_robot(folder: Path, text: str | None = None) -> list[str]:
+    """What is wrong with the first robot of docs/robots.md, or with this text in its place."""
+    path = folder / "mine.yaml"
+    path.write_text(text or FIRST_ROBOT)
+    with pytest.raises(Findings) as raised:
+        check_robot(path)
+    return [item.message for item in raised.value.items]
+
+
+def test_the_first_robot_lacks_nothing_but_spheres(tmp_path: Path) -> None:
+    [told] = first_robot(tmp_path)
+    assert told.startswith("no spheres; ")
+
+
+@pytest.mark.parametrize("key", re.findall(r"^(\w+):", FIRST_ROBOT, re.MULTILINE))
+def test_the_first_robot_has_no_key_that_may_be_left_out(key: str, tmp_path: Path) -> None:
+    [told] = first_robot(tmp_path, re.sub(rf"^{key}:.*\n( .*\n)*", "", FIRST_ROBOT, flags=re.MULTILINE))
+    assert told.startswith(f"key {key!r} is missing; ")
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)

@@ -128,6 +128,28 @@ def test_a_picture_shows_the_robot_and_its_spheres(tmp_path: Path) -> None:
     assert drawn[1][drawn[0]].mean() > 0.98  # the spheres cover it
 
 
+def test_a_picture_shows_the_tool_s_frame(tmp_path: Path) -> None:
+    assert invoke("show", "toy.yaml", "--picture", "toy.png").exit_code == 0
+    picture = cv2.imread(str(tmp_path / "toy.png"))
+    assert picture is not None
+    half = picture[:, : picture.shape[1] // 2].astype(int)
+    blue, green, red = (half[..., i] - np.delete(half, i, axis=2).max(axis=2) > 60 for i in range(3))
+    assert min(blue.sum(), green.sum(), red.sum()) > 20
+
+
+def test_a_large_sphere_is_drawn_and_leaves_the_picture_s_frame(tmp_path: Path, robot: Path) -> None:
+    drawn = []
+    for rows in ("", "  base: [[0, 0, -0.5, 0.5]]\n"):
+        robot.write_text(ROBOT + rows)
+        assert invoke("show", "toy.yaml", "--picture", "toy.png").exit_code == 0
+        picture = cv2.imread(str(tmp_path / "toy.png"))
+        assert picture is not None
+        drawn.append(picture)
+    left, right = (np.abs(half).max(axis=2) > 3 for half in np.split(drawn[1].astype(int) - drawn[0], 2, axis=1))
+    assert not left.any()
+    assert right.mean() > 0.1
+
+
 def test_a_picture_of_a_robot_without_spheres_shows_the_robot_alone(tmp_path: Path, robot: Path) -> None:
     robot.write_text(ROBOT[: ROBOT.index("spheres:")])
     ran = invoke("show", "toy.yaml", "--picture", "toy.png")
@@ -168,5 +190,6 @@ def test_spheres_are_fitted_to_a_file_that_has_none(robot: Path) -> None:
     assert (ran.exit_code, ran.stderr) == (2, "toy.yaml:1: no spheres; `regrasp robots spheres toy.yaml` fits them\n")
     ran = invoke("spheres", "toy.yaml", "--margin", "0.03", "-o", "made.yaml")
     assert ran.exit_code == 0, ran.output
+    assert ran.stderr.endswith("\nmade.yaml: put its sections into toy.yaml\n")
     robot.write_text(robot.read_text() + Path("made.yaml").read_text())
     assert invoke("check", "toy.yaml").exit_code == 0

@@ -106,7 +106,27 @@ WRONG = {
         "tool:",
         ["the tool's y is turned by 11 degrees from the way in which the fingers close"],
     ),
-    "a tool off the pads": (("0.0, 0.24]", "0.0, 0.30]"), "tool:", ["the tool lies 60 mm from the pads' middle"]),
+    "a tool off the pads": (
+        ("0.0, 0.24]", "0.0, 0.30]"),
+        "tool:",
+        ["the tool lies 60 mm from the pads' middle", "at [0, 0, 0.24] in lower: correct xyz, rpy (x along the"],
+    ),
+    "a jaw that opens too far": (
+        ("opening: 0.04", "opening: 0.09"),
+        "  opening:",
+        ["left would stand at 0.054 m", "these pads can be 0 to 0.082 m apart: correct opening or pads"],
+    ),
+    "pads that always touch": (("face: 0.005", "face: 0.1"), "gripper:", ["correct their face and thickness"]),
+    "a finger's face far away": (("face: 0.005", "face: 1.0e+30"), "  pads:", ["gripper.pads.face is 1e+30", "at mo"]),
+    "a pad far away": (("ahead: 0.02", "ahead: 1.0e+30"), "  pads:", ["gripper.pads.ahead is 1e+30", "at most 1)"]),
+    "a limit far away": (("lower: -1.5", "lower: -1.0e+30"), "- {name: be", ["joints.1.lower is -1e+30", "-100, at"]),
+    "a sphere far away": (("[[0, 0, 0.0, 0.05]", "[[0, 0, 1.0e+30, 0.05]"), "  lower: [[", ["spheres.lower.0.2 is 1e"]),
+    "a promise of nothing": (("excess: 0.06}", "excess: 1.0e+30}"), "cover:", ["cover.excess is 1e+30", "at most 1)"]),
+    "no sleep": (
+        ("sleep: [0.0, 1.0]\n", ""),
+        "title:",
+        ["key 'sleep' is missing; expected a list, each item a number"],
+    ),
     "no spheres": ((ROBOT[ROBOT.index("spheres:") :], "spheres: {}\n"), "spheres:", ["no spheres; `regrasp robots sp"]),
     "a promise for no link": (("excess: 0.06}", "links: {uper: {}}}"), "cover:", ["no link 'uper'"]),
 }
@@ -195,3 +215,69 @@ def test_a_package_is_found_without_running_it(tmp_path: Path, monkeypatch: pyte
     path.write_text(ROBOT.replace("{path: toy.urdf}", "{package: ran_whole, path: toy.urdf}"))
     check_robot(path)
     assert not (tmp_path / "ran").exists()
+
+
+MESH_OF_A_PACKAGE = URDF.replace("upper.stl", "package://toy_parts/meshes/upper.stl")
+
+
+@pytest.mark.parametrize(
+    ("where", "words"),
+    [
+        ("toy_parts/meshes", "write ros_packages: {toy_parts: toy_parts}"),
+        ("elsewhere", "write ros_packages: {toy_parts: FOLDER}, with its path in the robot file's folder"),
+    ],
+)
+def test_where_a_ros_package_lies_is_said(where: str, words: str, tmp_path: Path) -> None:
+    path = write_robot(tmp_path)
+    (tmp_path / where).mkdir(parents=True)
+    (tmp_path / "upper.stl").rename(tmp_path / where / "upper.stl")
+    (tmp_path / "toy.urdf").write_text(MESH_OF_A_PACKAGE)
+    with pytest.raises(Findings) as error:
+        check_robot(path)
+    (finding,) = error.value.items
+    assert (finding.line, finding.message.endswith(words)) == (2, True), finding
+
+
+def test_a_ros_package_above_the_urdf_is_said(tmp_path: Path) -> None:
+    folder = tmp_path / "toy_parts"
+    (folder / "meshes").mkdir(parents=True)
+    write_robot(folder / "meshes")
+    (folder / "toy.urdf").write_text(MESH_OF_A_PACKAGE)
+    path = tmp_path / "toy.yaml"
+    path.write_text(ROBOT.replace("path: toy.urdf", "path: toy_parts/toy.urdf"))
+    with pytest.raises(Findings, match=r"write ros_packages: \{toy_parts: toy_parts\}$"):
+        check_robot(path)
+
+
+ON_TOP = {  # what a file on top of the toy's says, and the line there, or in the toy's file, of what is wrong
+    "its own value": ("tool:\n  rpy: [1.5708, 0.0, 1.5708]\n", ("top.yaml", 3), "the tool's x lies along"),
+    "its own place of the tool": ("tool:\n  xyz: [0.0, 0.0, 0.3]\n", ("top.yaml", 3), "the tool lies 60 mm"),
+    "a limit against one below": ("joints:\n  1:\n    upper: -1.7\n", ("top.yaml", 4), "lower -1.5 is not below"),
+    "a limit against the URDF's": ("joints:\n  0:\n    upper: -4.0\n", ("top.yaml", 4), "turn turns from -3 to -4"),
+    "a jaw against one below": ("gripper:\n  closed: 0.05\n", ("top.yaml", 3), "closed 0.05 is not below"),
+    "a value below": ("title: Top\n", ("toy.yaml", 16), "bend is beyond its limits"),
+}
+
+
+@pytest.mark.parametrize("case", ON_TOP)
+def test_a_finding_stands_where_its_value_does(case: str, tmp_path: Path) -> None:
+    text, place, words = ON_TOP[case]
+    below = ROBOT.replace("sleep: [0.0, 1.0]", "sleep: [0.0, 2.1]") if place[0] == "toy.yaml" else ROBOT
+    write_robot(tmp_path, below)
+    path = tmp_path / "top.yaml"
+    path.write_text(f"base: toy.yaml\n{text}")
+    with pytest.raises(Findings) as error:
+        check_robot(path)
+    first = error.value.items[0]
+    assert (Path(first.source).name, first.line) == place, first
+    assert words in first.message
+
+
+def test_what_is_missing_is_missing_in_the_file_on_top(tmp_path: Path) -> None:
+    write_robot(tmp_path, ROBOT[: ROBOT.index("spheres:")])
+    path = tmp_path / "top.yaml"
+    path.write_text("# a\n# b\nbase: toy.yaml\ntitle: Top\n")
+    with pytest.raises(Findings) as error:
+        check_robot(path)
+    (finding,) = error.value.items
+    assert (Path(finding.source).name, finding.message.startswith("no spheres")) == ("top.yaml", True)

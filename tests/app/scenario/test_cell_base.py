@@ -3,10 +3,11 @@
 from pathlib import Path
 
 import pytest
-from robots import OWN
+from robots import OWN, VX300S
 
 from regrasp.app.files.findings import Findings
 from regrasp.app.files.resources import shipped
+from regrasp.app.scenario.load import load_scenario
 from regrasp.app.tasks.cable.cells import cable_cell
 
 
@@ -94,3 +95,12 @@ def test_what_is_wrong_is_told_where_it_stands(tmp_path: Path) -> None:
 def test_a_wrong_base_is_a_finding(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, base: str, told: str) -> None:
     monkeypatch.chdir(tmp_path)
     assert findings(cell(tmp_path, f"base: {base}\n"))[0].endswith(told)
+
+
+def test_a_robot_s_path_from_the_command_line_is_one_from_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "mine.yaml").write_text("base: vx300s\ntitle: Mine\n")
+    monkeypatch.chdir(tmp_path)
+    scenario = load_scenario("no_obstacle", ["cell.known.arms.0.robot=mine.yaml"])
+    assert [arm.robot.title for arm in scenario.cell.known.arms] == ["Mine", VX300S.title]
