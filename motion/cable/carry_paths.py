@@ -22,6 +22,9 @@ class CarryPathParameters:
 
     lifts: tuple[float, ...] = (0.0, 0.04, 0.08)  # m that a straight path's middle is raised: obstacles stand on floors
     step: float = 0.02  # m between waypoints; choice: the collision check interpolates between them
+    # Paths by search where no other is free, the shortest of which is taken: a long way round winds the cable about the
+    # arm. Of eight the shortest took half the way of the first, where the first jammed the arm.
+    searched: int = 8
     cable: CablePathParameters = field(default_factory=CablePathParameters)
 
 

@@ -161,7 +161,7 @@ class CableMotion(SearchMotion):
             if path is None:
                 solutions = [end for goal in goals for end in kin.ik(goal, q)]
                 ends = [end for end in solutions if can_continue(kin, end, onward, carry.step)]
-                path = self._plan(model, q, np.array(ends).reshape(-1, len(kin)))
+                path = yield from self._shortest_plan(model, q, np.array(ends).reshape(-1, len(kin)), carry.searched)
             yield from self.execution.follow(arm, path, speed)
 
         return self.execution.request(arm, steps())
@@ -233,6 +233,23 @@ class CableMotion(SearchMotion):
         """Spheres (n, 4) m in the tool frame that stand for a held connector (tool_from_connector); see `model`."""
         return connector_spheres(held, self.known.cable.connector, self.parameters.connector_padding)
 
+    def _shortest_plan(
+        self, model: CollisionModel, start: FloatArray, goals: FloatArray, count: int
+    ) -> Generator[None, None, FloatArray]:
+        """Steps that plan `count` times, one a tick, and return the path (k, n) on which the links move least.
+
+        Raises PlanningError: the first plan fails.
+        """
+        shortest = self._plan(model, start, goals)
+        levers = model.kinematics.chain.levers
+        for _ in range(count - 1):
+            if len(shortest) == 2:  # straight from start to goal
+                break
+            yield
+            with suppress(PlanningError):
+                shortest = min(shortest, self._plan(model, start, goals), key=lambda path: _length(path, levers))
+        return shortest
+
     def _model_without_clip(self) -> CollisionModel:
         return self.model(self.hand, without=self.known.cable.clip.bracket)
 
@@ -262,3 +279,8 @@ class CableMotion(SearchMotion):
         while not request.poll():
             yield
         return request.answer
+
+
+def _length(path: FloatArray, levers: FloatArray) -> float:
+    """How far (m) the links move along a joint path (k, n), by the joints' `levers` (n,) m."""
+    return float(np.linalg.norm(np.diff(path, axis=0) * levers, axis=1).sum())

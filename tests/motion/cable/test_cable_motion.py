@@ -95,6 +95,27 @@ def test_a_carry_leaves_out_a_goal_in_the_panel(rig: Rig) -> None:
     assert rig.motion.tool("right").translation == pytest.approx(free.translation, abs=1e-3)
 
 
+def test_where_no_direct_way_is_free_a_carry_takes_the_shortest_of_the_searched_ones(
+    rig: Rig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("regrasp.motion.cable.service.first_free", lambda *_: None)
+    rig.arms["right"].at = ASIDE
+    goal = moved(rig, 0.0, 0.10, 0.0)
+    bends = iter([0.8, 0.5, 0.2, 0.6])
+
+    def search(_model: object, start: Points, goals: Points, *_: object) -> Points:
+        bend = next(bends, None)
+        if bend is None:
+            raise PlanningError(CauseCode.PLANNING_FAILED, "no path")
+        return np.array([start, start + bend, goals[0]])
+
+    rig.motion.planner = search
+    rig.run(rig.motion.carry("right", [goal], HELD, speed=0.5))
+    missed = [min(float(np.abs(q - ASIDE - bend).max()) for q in flown(rig, "right")) for bend in (0.2, 0.5)]
+    assert missed[0] < 0.05 < missed[1]
+    assert rig.motion.tool("right").translation == pytest.approx(goal.translation, abs=1e-3)
+
+
 def test_the_carried_connector_counts_as_body(rig: Rig) -> None:
     q = READY
     tip = (rig.motion.kinematics["right"].tool(q) * HELD).apply([0.035, 0.0, 0.0])
