@@ -11,7 +11,7 @@ from typing import Any, Protocol
 
 from regrasp.app.campaigns.digest import digest_of, program
 from regrasp.app.campaigns.progress import Progress
-from regrasp.app.campaigns.store import Store
+from regrasp.app.campaigns.store import NewRow, Store, Version
 from regrasp.app.files.findings import Finding, Findings, shown
 from regrasp.app.run.processes import Done, Renewal, run_each
 
@@ -29,6 +29,7 @@ class Job:
     key: str
     task: Callable[[Path | None], Any]
     record: str = ""  # name of its record's folder; '' if it leaves none
+    family: tuple[str, str] = ("", "")  # see `Store.version_id`
 
 
 @dataclass(frozen=True)
@@ -89,15 +90,14 @@ def program_digest() -> str:
     return digest_of(program())
 
 
-def known_version(store: Store) -> int | None:
-    """The number of the program that runs here; None if it has done nothing in this store."""
-    digest = program_digest()
-    return next((version.id for version in store.versions() if digest_of(version.program) == digest), None)
+def is_of_this_program(version: Version) -> bool:
+    """Whether the program that runs here did the runs of a version."""
+    return digest_of(version.program) == program_digest()
 
 
-def this_version(store: Store) -> int:
-    """The number of the program that runs here, in the store."""
-    return store.version_id(program_digest(), program())
+def version_of(store: Store, jobs: Iterable[Job] = ()) -> int:
+    """The number in the store of the program that runs here, with these jobs' families as they are now."""
+    return store.version_id(program_digest(), program(), dict(job.family for job in jobs))
 
 
 @dataclass(frozen=True)
@@ -124,8 +124,8 @@ def do_all(
     Raises:
         Findings: the store cannot be written, the disk is full, or the sources changed meanwhile.
     """
-    digest, version = program_digest(), this_version(store)
-    had = store.keys(version)
+    digest, version = program_digest(), version_of(store, jobs)
+    had = store.keys(version, effort.wall_limit)
     left = [number for number, job in enumerate(jobs) if job.key not in had]
     _clear_away_leftovers(store)
     progress.begin(len(jobs), len(jobs) - len(left), sum(had.get(job.key, False) for job in jobs))
@@ -183,7 +183,7 @@ def _put_away(store: Store, version: int, job: Job, outcome: Ended, folder: Path
             shutil.rmtree(folder, ignore_errors=True)
     if outcome.value is None:
         return ""
-    row = store.add(version, job.key, job.title, record, outcome.value)
+    row = store.add(NewRow(version, job.key, job.title, outcome.value, record, job.family))
     if store.folder is None:
         return ""
     where = shown(store.folder)

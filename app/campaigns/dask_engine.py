@@ -1,5 +1,6 @@
 """An engine: the workers of a Dask scheduler, on this machine or a cluster. Needs the extra `cluster`."""
 
+import gc
 import logging
 import pickle
 import subprocess
@@ -38,12 +39,17 @@ class Dask:
         """To the scheduler at an address such as tcp://10.0.0.5:8786. Raises `Findings` if it is not there."""
         for name in [name for name in logging.root.manager.loggerDict if name.startswith("distributed")]:
             logging.getLogger(name).setLevel(logging.CRITICAL + 1)  # a lost connection would be told by a traceback
+        # Without it a client that does not connect ends with a traceback.
+        unraisable, sys.unraisablehook = sys.unraisablehook, lambda _: None
         try:
             client = Client(address, timeout=CONNECT_SECONDS, set_as_default=False)
         except (OSError, ValueError, TypeError) as error:
             why = str(error).splitlines()[0] if str(error) else type(error).__name__
             message = f"no scheduler answers at {address} ({why}); start one with `dask scheduler`, or name another"
             raise Findings([Finding("--scheduler", 0, message)]) from None
+        finally:
+            gc.collect()
+            sys.unraisablehook = unraisable
         if not client.scheduler_info()["workers"]:
             client.close()
             message = f"the scheduler at {address} has no workers; start some with `dask worker {address}`"

@@ -1,6 +1,7 @@
 """Episodes as jobs of a campaign, and what their rows hold."""
 
 import errno
+import math
 import os
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -8,9 +9,9 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, cast
 
-from regrasp.app.campaigns.campaign import Ended, Job, known_version
+from regrasp.app.campaigns.campaign import Ended, Job, is_of_this_program
 from regrasp.app.campaigns.digest import digest_of, scenario_digest
-from regrasp.app.campaigns.store import Store, StoredRow
+from regrasp.app.campaigns.store import Store, StoredRow, damaged_row
 from regrasp.app.records.folders import folder_name
 from regrasp.app.records.result import Result, plain
 from regrasp.app.run.batch import Row, Run, RunEpisode, Settings, row_of, run_task, summary
@@ -33,8 +34,10 @@ def jobs_of(runs: Iterable[Run], settings: Settings, episode: RunEpisode | None 
         if id(run.scenario) not in digests:
             digests[id(run.scenario)] = scenario_digest(run.scenario)
         name = f"{run.scenario.name}-{folder_name(run.scenario.case)}-{run.seed}"
-        key = digest_of(digests[id(run.scenario)], run.seed, settings.renderer)
-        jobs.append(Job(str(run), key, partial(_run, episode, run, settings), name))
+        content = digests[id(run.scenario)]
+        key = digest_of(content, run.seed, settings.renderer)
+        family = f"{run.scenario.name} {run.scenario.case}", content
+        jobs.append(Job(str(run), key, partial(_run, episode, run, settings), name, family))
     return jobs
 
 
@@ -48,6 +51,7 @@ class Stored:
 
     runs: Sequence[Run]
     keep: Keep
+    wall_limit: float = math.inf  # s
 
     def __call__(self, number: int, done: Done[Result], folder: Path | None) -> Ended:
         """The row's values. Raises `OSError` when the disk is full: that says nothing about the robot."""
@@ -58,6 +62,8 @@ class Stored:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         keep = self.keep == "all" or (self.keep == "failed" and not row.succeeded)
         value = {**plain(asdict(row)), "source": _source(run)}
+        if done.timed_out:
+            value["stopped_after"] = self.wall_limit
         return Ended(value, summary(row), row.succeeded, keep)
 
 
@@ -67,8 +73,11 @@ def _source(run: Run) -> dict[str, Any]:
 
 
 def row_in(stored: StoredRow) -> Row:
-    """The figures of a stored run."""
-    return Row(**{key: value for key, value in stored.value.items() if key != "source"})
+    """The figures of a stored run. Raises `Findings` for a damaged row."""
+    try:
+        return Row(**{key: value for key, value in stored.value.items() if key not in ("source", "stopped_after")})
+    except TypeError:
+        raise damaged_row(stored.number) from None
 
 
 def again(stored: StoredRow, store: Store) -> tuple[Run, list[str]]:
@@ -81,6 +90,6 @@ def again(stored: StoredRow, store: Store) -> tuple[Run, list[str]]:
     remarks = []
     if jobs_of([run], Settings(renderer=cast("RendererName", row.renderer)))[0].key != stored.key:
         remarks.append("the scenario, its cell, a robot or its tree has changed since; it may come out otherwise")
-    if stored.version != known_version(store):
+    if not any(is_of_this_program(version) for version in store.versions() if version.id == stored.version):
         remarks.append("other sources or packages did it; it may come out otherwise")
     return run, remarks

@@ -48,14 +48,15 @@ def by_case(rows: Iterable[StoredRow]) -> list[CaseFigures]:
 
 def _figures(name: str, rows: Sequence[Row]) -> CaseFigures:
     succeeded = sum(row.succeeded for row in rows)
+    timed = [row for row in rows if row.wall_seconds]  # a process that died has told no times
     return CaseFigures(
         case=name,
         runs=len(rows),
         succeeded=succeeded,
         interval=wilson_interval(succeeded, len(rows)),
         causes=dict(Counter(reason(row) for row in rows if not row.succeeded).most_common()),
-        sim_seconds=_percentiles([row.sim_seconds for row in rows]),
-        wall_seconds=_percentiles([row.wall_seconds for row in rows]),
+        sim_seconds=_percentiles([row.sim_seconds for row in timed]),
+        wall_seconds=_percentiles([row.wall_seconds for row in timed]),
         longest_tick=max((row.longest_tick for row in rows), default=0.0),
         peak_memory_mb=max((row.peak_memory_mb for row in rows), default=0.0),
     )

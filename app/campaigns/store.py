@@ -18,18 +18,32 @@ SCHEMA = 1  # SQLite's user_version
 _APPLICATION = 0x52475250  # SQLite's application_id: "RGRP"
 _TABLES = """
 create table campaign (kind text not null);
-create table version (id integer primary key, digest text not null unique, began text not null, program text not null);
+create table version (id integer primary key, digest text not null, began text not null, program text not null);
 create table row (
   number integer primary key autoincrement,
   version integer not null references version,
   key text not null,
   title text not null,
+  family text not null,
+  content text not null,
   ended text not null,
   record text not null,
   value text not null,
   unique (version, key)
 );
 """
+
+
+@dataclass(frozen=True)
+class NewRow:
+    """A run that has ended, for the store. `family`: its name and content, see `Store.version_id`."""
+
+    version: int
+    key: str
+    title: str
+    value: Mapping[str, Any]
+    record: str = ""
+    family: tuple[str, str] = ("", "")
 
 
 @dataclass(frozen=True)
@@ -47,7 +61,7 @@ class StoredRow:
 
 @dataclass(frozen=True)
 class Version:
-    """A program whose runs the store holds: its packages' versions and digests."""
+    """Runs of one program and of scenarios that did not change. `program`: its packages' versions and digests."""
 
     id: int
     began: str  # UTC
@@ -120,18 +134,27 @@ class Store:
         with _told(self.folder):
             return str(self._connection.execute("select kind from campaign").fetchone()[0])
 
-    def version_id(self, digest: str, program: Mapping[str, str]) -> int:
-        """The number of this program, which is noted if it is new here."""
+    def version_id(self, digest: str, program: Mapping[str, str], families: Mapping[str, str] | None = None) -> int:
+        """The number of the newest version of this program in which no family has other content; a new one if none.
+
+        A family is what has one content for all its runs: a scenario's case, whose content is a digest of its files.
+        """
         with _told(self.folder), self._connection:
-            self._connection.execute(
-                "insert or ignore into version (digest, began, program) values (?, ?, ?)",
+            query = "select id from version where digest = ? order by id desc"
+            for (number,) in self._connection.execute(query, (digest,)).fetchall():
+                query = "select distinct family, content from row where version = ?"
+                held = self._connection.execute(query, (number,))
+                if all((families or {}).get(family, content) == content for family, content in held):
+                    return int(number)
+            cursor = self._connection.execute(
+                "insert into version (digest, began, program) values (?, ?, ?)",
                 (digest, _now(), json.dumps(dict(program))),
             )
-            [found] = self._connection.execute("select id from version where digest = ?", (digest,)).fetchone()
-        return int(found)
+        assert cursor.lastrowid is not None
+        return cursor.lastrowid
 
     def versions(self) -> list[Version]:
-        """The programs, those with the latest beginning last."""
+        """The versions, those with the latest beginning last."""
         query = (
             "select id, began, program, (select count(*) from row where version = version.id) from version order by id"
         )
@@ -139,21 +162,36 @@ class Store:
             found = self._connection.execute(query).fetchall()
             return [Version(number, began, json.loads(program), runs) for number, began, program, runs in found]
 
-    def keys(self, version: int) -> dict[str, bool]:
+    def keys(self, version: int, wall_limit: float = 0.0) -> dict[str, bool]:
         """The keys of the runs that this version has done, and whether each came out as expected.
 
-        A row without the value `succeeded` did.
+        A row without the value `succeeded` did. Left out are those that were `stopped_after` fewer s than `wall_limit`.
         """
-        query = "select key, ifnull(json_extract(value, '$.succeeded'), 1) from row where version = ?"
+        query = (
+            "select key, ifnull(json_extract(value, '$.succeeded'), 1) from row where version = ?"
+            " and ifnull(json_extract(value, '$.stopped_after') >= ?, 1)"
+        )
         with _told(self.folder):
-            return {key: bool(succeeded) for key, succeeded in self._connection.execute(query, (version,))}
+            found = self._connection.execute(query, (version, wall_limit))
+            return {key: bool(succeeded) for key, succeeded in found}
 
-    def add(self, version: int, key: str, title: str, record: str, value: Mapping[str, Any]) -> int:
-        """Add a row; it is on the disk when this returns. Returns its number."""
+    def add(self, row: NewRow) -> int:
+        """Add a row, in place of one that was stopped; it is on the disk when this returns. Returns its number."""
+        stopped = "delete from row where version = ? and key = ? and json_extract(value, '$.stopped_after') is not null"
         with _told(self.folder), self._connection:
+            self._connection.execute(stopped, (row.version, row.key))
             cursor = self._connection.execute(
-                "insert into row (version, key, title, ended, record, value) values (?, ?, ?, ?, ?, ?)",
-                (version, key, title, _now(), record, json.dumps(value, allow_nan=False)),
+                "insert into row (version, key, title, family, content, ended, record, value)"
+                " values (?, ?, ?, ?, ?, ?, ?, ?)",
+                (
+                    row.version,
+                    row.key,
+                    row.title,
+                    *row.family,
+                    _now(),
+                    row.record,
+                    json.dumps(row.value, allow_nan=False),
+                ),
             )
         assert cursor.lastrowid is not None
         return cursor.lastrowid
@@ -163,14 +201,14 @@ class Store:
         query = "select number, version, key, title, ended, record, value from row where version = ? order by number"
         with _told(self.folder):
             for found in self._connection.execute(query, (version,)):
-                yield _stored(found)
+                yield _stored(found, self.folder)
 
     def row(self, number: int) -> StoredRow | None:
         """The row of that number; None if there is none."""
         query = "select number, version, key, title, ended, record, value from row where number = ?"
         with _told(self.folder):
             found = self._connection.execute(query, (number,)).fetchone()
-        return _stored(found) if found else None
+        return _stored(found, self.folder) if found else None
 
     def records(self) -> set[str]:
         """The folders of the rows that have one."""
@@ -208,9 +246,21 @@ class Store:
             raise Findings([Finding(where, 0, f"holds {self.kind}, and these are {kind}; name another folder")])
 
 
-def _stored(found: Sequence[Any]) -> StoredRow:
-    number, version, key, title, ended, record, value = found
-    return StoredRow(number, version, key, title, ended, record, json.loads(value))
+def _stored(found: Sequence[Any], folder: Path | None) -> StoredRow:
+    number, version, key, title, ended, record, text = found
+    try:
+        value = json.loads(text)
+    except ValueError:
+        value = None
+    if not isinstance(value, dict):
+        raise damaged_row(number, folder)
+    return StoredRow(number, version, key, title, ended, record, value)
+
+
+def damaged_row(number: int, folder: Path | None = None) -> Findings:
+    """What to raise for a row whose value is not what its campaign stores."""
+    where = shown(folder / FILE) if folder else FILE
+    return Findings([Finding(where, 0, _damaged(f"row {number} holds no run's figures"))])
 
 
 def _now() -> str:

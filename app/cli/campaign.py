@@ -121,7 +121,7 @@ def run_campaign(
         raise Findings(wrong)
     chosen = parse_seeds(seeds) if seeds is not None else None
     with late_imports():
-        from regrasp.app.campaigns.campaign import Effort, do_all, this_version
+        from regrasp.app.campaigns.campaign import Effort, do_all, version_of
         from regrasp.app.campaigns.episodes import KIND, Stored, jobs_of
         from regrasp.app.campaigns.plan import planned
         from regrasp.app.campaigns.progress import Progress
@@ -138,10 +138,10 @@ def run_campaign(
     effort = Effort(wall_limit=math.inf if wall_limit is None else wall_limit)
     where = _engine(scheduler, jobs)
     with Store.create(folder, KIND) as store:
-        version = this_version(store)
-        _tell_of_other_versions(store, version)
         asked = jobs_of(runs, settings)
-        interrupted = do_all(asked, store, where, Stored(runs, keep), Progress(quiet), effort)
+        version = version_of(store, asked)
+        _tell_of_other_versions(store, version)
+        interrupted = do_all(asked, store, where, Stored(runs, keep, effort.wall_limit), Progress(quiet), effort)
         low = _print_cases(store, version, {job.key for job in asked})
     if interrupted:
         raise typer.Exit(EXIT_INTERRUPTED)
@@ -168,8 +168,8 @@ def _tell_of_other_versions(store: "Store", version: int) -> None:
     others = [other for other in store.versions() if other.id != version and other.runs]
     for other in others:
         typer.echo(
-            f"note: {other.runs} runs here were done by other sources or packages, from {other.began}; these are done "
-            f"beside them (`regrasp campaign show {shown(store.folder or Path())}@{other.id}` shows those)",
+            f"note: {other.runs} runs here are of other sources, packages or scenarios, from {other.began}; these are "
+            f"done beside them (`regrasp campaign show {shown(store.folder or Path())}@{other.id}` shows those)",
             err=True,
         )
 
@@ -335,6 +335,8 @@ def rerun(
     for remark in remarks:
         typer.echo(f"note: {remark}", err=True)
     into = out or folders.new_folder(f"{run.scenario.name}-{run.seed}")
+    if "process died" in row_in(stored).why:
+        typer.echo(f"note: it killed its process; if it does so again, the record so far is in {shown(into)}", err=True)
     from regrasp.app.run.episode import run_episode
 
     renderer: Any = row_in(stored).renderer

@@ -121,8 +121,10 @@ def _run_episode(*args: Any, **kwargs: Any) -> Result:
 
 def summary(row: Row) -> str:
     """How a run came out, in a line of the progress."""
-    figures = f"{row.sim_seconds:.1f} s simulated, {row.real_time_factor:.2f} x real time"
-    return f"{row.outcome}, {figures}" if row.succeeded else f"{row.outcome}, not as expected, {figures}"
+    how = row.outcome if row.succeeded else f"{row.outcome}, not as expected"
+    if not row.wall_seconds:  # its process died
+        return how
+    return f"{how}, {row.sim_seconds:.1f} s simulated, {row.real_time_factor:.2f} x real time"
 
 
 def result_of(run: Run, done: Done[Result]) -> Result:

@@ -87,7 +87,7 @@ def run_episode(
                 tree=scenario.file.tree,
                 inputs=scenario.file.inputs,
                 limits=scenario.file.limits.model_dump(),
-                overrides=list(scenario.overrides),
+                overrides=[o for o in scenario.overrides if not o.startswith("seed=")],
                 renderer=world.renderer.name,
                 renderer_device=world.renderer.device,
             )

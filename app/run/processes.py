@@ -162,6 +162,9 @@ def _enforce_deadlines(workers: Iterable[_Worker], grace: float) -> None:
             worker.signalled, worker.deadline = True, math.inf if worker.signalled else now + grace
 
 
+_ASK_AGAIN = 4.0  # s; choice: a run that was asked writes its record within two
+
+
 @contextlib.contextmanager
 def _signals_blocked() -> Iterator[None]:
     """Children started in this context do not get SIGINT and SIGHUP; this process gets them when it ends.
@@ -178,13 +181,21 @@ def _signals_blocked() -> Iterator[None]:
 
 
 def _stop(processes: Sequence[Any], grace: float) -> None:
+    """End processes: ask them, some seconds later once more, and kill those that still live after `grace` s.
+
+    What the first request raises is lost when it comes in a callback from a C++ library, such as at an import.
+    """
+    until = time.monotonic() + grace
+    while (alive := [process for process in processes if process.is_alive()]) and time.monotonic() < until:
+        for process in alive:
+            process.terminate()
+        again = min(until, time.monotonic() + _ASK_AGAIN)
+        for process in alive:
+            process.join(max(0.0, again - time.monotonic()))
     for process in processes:
-        process.terminate()
-    for process in processes:
-        process.join(grace)
         if process.is_alive():
             process.kill()
-            process.join()
+        process.join()
 
 
 def _child(pipe: "Connection[Any, Any]", task: Callable[[], Any]) -> None:

@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 from short_campaign import KIND
 
-from regrasp.app.campaigns.campaign import Effort, Ended, Job, Local, checked, do_all, this_version
+from regrasp.app.campaigns.campaign import Effort, Ended, Job, Local, checked, do_all, version_of
 from regrasp.app.campaigns.progress import Progress
 from regrasp.app.campaigns.store import Store
 from regrasp.app.files.findings import Findings
@@ -35,9 +35,7 @@ def campaign(folder: Path | None, tasks: dict[str, Callable[[Path | None], Any]]
     jobs = [Job(f"task {key}", key, task, f"record-{key}") for key, task in tasks.items()]
     with Store.create(folder, KIND) as store:
         do_all(jobs, store, Local(2), told, Progress(quiet=True), effort)
-        return {
-            row.key: (row.value["value"], row.value["error"], row.record) for row in store.rows(this_version(store))
-        }
+        return {row.key: (row.value["value"], row.value["error"], row.record) for row in store.rows(version_of(store))}
 
 
 def give(value: int, folder: Path | None) -> int:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from regrasp.app.campaigns.store import FILE, Store
+from regrasp.app.campaigns.store import FILE, NewRow, Store
 from regrasp.app.files.findings import Findings
 
 KIND = "things"
@@ -15,7 +15,7 @@ def made(folder: Path, count: int = 3) -> None:
     with Store.create(folder, KIND) as store:
         version = store.version_id("d1", {"python": "3"})
         for n in range(count):
-            store.add(version, f"k{n}", f"thing {n}", "", {"n": n, **({"succeeded": False} if n == 1 else {})})
+            store.add(NewRow(version, f"k{n}", f"thing {n}", {"n": n, **({"succeeded": False} if n == 1 else {})}))
 
 
 def test_what_was_added_is_there_again(tmp_path: Path) -> None:
@@ -25,7 +25,7 @@ def test_what_was_added_is_there_again(tmp_path: Path) -> None:
         assert store.keys(version) == {"k0": True, "k1": False, "k2": True}
         other = store.version_id("d2", {"python": "4"})
         assert store.keys(other) == {}
-        store.add(other, "k0", "thing 0", "runs/a", {"n": 5})
+        store.add(NewRow(other, "k0", "thing 0", {"n": 5}, "runs/a"))
     with Store.read(tmp_path / "c") as store:
         assert [(row.number, row.title, row.value) for row in store.rows(version)] == [
             (1, "thing 0", {"n": 0}),
@@ -46,7 +46,7 @@ def test_what_was_added_is_there_again(tmp_path: Path) -> None:
 def test_a_run_is_there_only_once(tmp_path: Path) -> None:
     made(tmp_path / "c")
     with Store.create(tmp_path / "c", KIND) as store, pytest.raises(Findings, match="UNIQUE"):
-        store.add(1, "k0", "thing 0", "", {})
+        store.add(NewRow(1, "k0", "thing 0", {}))
 
 
 def test_two_campaigns_in_one_folder(tmp_path: Path) -> None:
@@ -61,10 +61,10 @@ def test_two_campaigns_in_one_folder(tmp_path: Path) -> None:
 def test_it_can_be_read_while_it_is_written(tmp_path: Path) -> None:
     with Store.create(tmp_path / "c", KIND) as store:
         version = store.version_id("d", {})
-        store.add(version, "k", "one", "", {})
+        store.add(NewRow(version, "k", "one", {}))
         with Store.read(tmp_path / "c") as reader:
             assert [row.title for row in reader.rows(version)] == ["one"]
-            store.add(version, "l", "two", "", {})
+            store.add(NewRow(version, "l", "two", {}))
             assert [row.title for row in reader.rows(version)] == ["one", "two"]
 
 
@@ -128,6 +128,38 @@ def test_a_full_disk_is_told(tmp_path: Path) -> None:
         version = store.version_id("d", {})
         store._connection.execute("pragma max_page_count = 12")
         with pytest.raises(Findings, match="make room on the disk"):
-            _ = [store.add(version, str(n), "thing", "", {"text": "x" * 500}) for n in range(1000)]
+            _ = [store.add(NewRow(version, str(n), "thing", {"text": "x" * 500})) for n in range(1000)]
     with Store.read(tmp_path) as store:
         assert len([*store.rows(version)]) > 5
+
+
+def test_a_family_of_other_content_begins_a_version(tmp_path: Path) -> None:
+    with Store.create(tmp_path / "c", KIND) as store:
+        first = store.version_id("d", {}, {"tall": "1"})
+        store.add(NewRow(first, "k0", "tall seed 0", {}, family=("tall", "1")))
+        assert store.version_id("d", {}, {"tall": "1", "short": "1"}) == first
+        second = store.version_id("d", {}, {"tall": "2"})
+        assert second != first
+        store.add(NewRow(second, "k1", "tall seed 0", {}, family=("tall", "2")))
+        assert store.version_id("d", {}, {"tall": "1"}) == first
+        assert store.version_id("d", {}, {"short": "1"}) == second
+
+
+def test_a_run_that_was_stopped_counts_as_done_only_for_no_more_time(tmp_path: Path) -> None:
+    with Store.create(tmp_path / "c", KIND) as store:
+        version = store.version_id("d", {})
+        store.add(NewRow(version, "k", "slow", {"succeeded": False, "stopped_after": 2.0}))
+        assert store.keys(version, 2.0) == {"k": False}
+        assert store.keys(version, 3.0) == store.keys(version, float("inf")) == {}
+        store.add(NewRow(version, "k", "slow", {"succeeded": True}))
+        assert store.keys(version, 3.0) == {"k": True}
+        assert len([*store.rows(version)]) == 1
+
+
+@pytest.mark.parametrize("value", ["{not json", "[]", "null"])
+def test_a_damaged_row_is_told(tmp_path: Path, value: str) -> None:
+    made(tmp_path / "c")
+    with sqlite3.connect(tmp_path / "c" / FILE) as connection:
+        connection.execute("update row set value = ? where number = 2", (value,))
+    with Store.read(tmp_path / "c") as store, pytest.raises(Findings, match="row 2 holds no run's figures"):
+        _ = [*store.rows(1)]

@@ -109,7 +109,7 @@ def test_where_no_direct_way_is_free_a_carry_takes_the_shortest_of_the_searched_
             raise PlanningError(CauseCode.PLANNING_FAILED, "no path")
         return np.array([start, start + bend, goals[0]])
 
-    rig.motion.planner = search
+    monkeypatch.setattr(rig.motion, "planner", search)
     rig.run(rig.motion.carry("right", [goal], HELD, speed=0.5))
     missed = [min(float(np.abs(q - ASIDE - bend).max()) for q in flown(rig, "right")) for bend in (0.2, 0.5)]
     assert missed[0] < 0.05 < missed[1]

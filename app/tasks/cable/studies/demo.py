@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
-from regrasp.app.campaigns.campaign import Effort, Local, do_all, this_version
+from regrasp.app.campaigns.campaign import Effort, Local, do_all, version_of
 from regrasp.app.campaigns.episodes import KIND, Stored, jobs_of, row_in
 from regrasp.app.campaigns.progress import Progress
 from regrasp.app.campaigns.statistics import wilson_interval
@@ -45,8 +45,9 @@ def run_demo(
     asked = jobs_of(runs, settings, episode)
     with Store.create(out, KIND) as store:
         effort = Effort(wall_limit=settings.wall_limit)
-        interrupted = do_all(asked, store, Local(jobs), Stored(runs, "all"), Progress(settings.quiet), effort)
-        done = {stored.key: row_in(stored) for stored in store.rows(this_version(store))}
+        ended, progress = Stored(runs, "all", effort.wall_limit), Progress(settings.quiet)
+        interrupted = do_all(asked, store, Local(jobs), ended, progress, effort)
+        done = {stored.key: row_in(stored) for stored in store.rows(version_of(store, asked))}
     rows = [done[job.key] for job in asked if job.key in done]
     _write(out, rows, runs, overrides)
     print_table(_HEADER, table_lines(rows))

@@ -8,7 +8,7 @@ from typing import Any, Generic, TypeVar
 
 from pydantic import TypeAdapter
 
-from regrasp.app.campaigns.campaign import Ended, Job, Local, do_all, this_version
+from regrasp.app.campaigns.campaign import Ended, Job, Local, do_all, version_of
 from regrasp.app.campaigns.progress import Progress
 from regrasp.app.campaigns.store import Store
 from regrasp.app.records.result import plain
@@ -46,7 +46,7 @@ def run_tasks(
     with Store.create(out, kind) as store:
         scenes = [Job(title, task.key, partial(_alone, task.run)) for title, task in tasks.items()]
         interrupted = do_all(scenes, store, Local(jobs), ended, Progress(counted=False))
-        stored = {row.key: row.value["values"] for row in store.rows(this_version(store))}
+        stored = {row.key: row.value["values"] for row in store.rows(version_of(store, scenes))}
     found = [value for job in scenes if job.key in stored for value in values.validate_python(stored[job.key])]
     return found, 130 if interrupted else int(bool(broken))
 
