@@ -1,8 +1,8 @@
 """An engine: the workers of a Dask scheduler, on this machine or a cluster. Needs the extra `cluster`."""
 
-import gc
 import logging
 import pickle
+import re
 import subprocess
 import sys
 import threading
@@ -19,6 +19,7 @@ from regrasp.app.campaigns.campaign import Job
 from regrasp.app.campaigns.remote import Delivery, Order
 from regrasp.app.files.findings import Finding, Findings
 from regrasp.app.run.processes import Done
+from regrasp.interfaces.quote import quoted
 
 CONNECT_SECONDS = 10.0  # until a scheduler counts as not there
 
@@ -37,19 +38,17 @@ class Dask:
     @classmethod
     def connected(cls, address: str) -> Self:
         """To the scheduler at an address such as tcp://10.0.0.5:8786. Raises `Findings` if it is not there."""
+        if not re.fullmatch(r"(\w+://)?[^\s/]+:\d+/?", address):  # such a client would end with a traceback
+            message = f"{quoted(address)} is no address; write one such as tcp://127.0.0.1:8786"
+            raise Findings([Finding("--scheduler", 0, message)])
         for name in [name for name in logging.root.manager.loggerDict if name.startswith("distributed")]:
             logging.getLogger(name).setLevel(logging.CRITICAL + 1)  # a lost connection would be told by a traceback
-        # Without it a client that does not connect ends with a traceback.
-        unraisable, sys.unraisablehook = sys.unraisablehook, lambda _: None
         try:
             client = Client(address, timeout=CONNECT_SECONDS, set_as_default=False)
         except (OSError, ValueError, TypeError) as error:
             why = str(error).splitlines()[0] if str(error) else type(error).__name__
             message = f"no scheduler answers at {address} ({why}); start one with `dask scheduler`, or name another"
             raise Findings([Finding("--scheduler", 0, message)]) from None
-        finally:
-            gc.collect()
-            sys.unraisablehook = unraisable
         if not client.scheduler_info()["workers"]:
             client.close()
             message = f"the scheduler at {address} has no workers; start some with `dask worker {address}`"

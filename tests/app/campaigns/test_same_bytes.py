@@ -131,5 +131,8 @@ def _connected(address: str, workers: int = 2) -> Dask:
 def test_no_scheduler_and_no_workers() -> None:
     with pytest.raises(Findings, match=r"no scheduler answers at tcp://127\.0\.0\.1:1"):
         Dask.connected("tcp://127.0.0.1:1")
-    with pytest.raises(Findings, match="no scheduler answers at nonsense"):
-        Dask.connected("nonsense://")
+    for address in ("nonsense://", "foo", "tcp://foo", ""):
+        with pytest.raises(Findings, match=f"'{address}' is no address; write one such as tcp://127.0.0.1:8786"):
+            Dask.connected(address)
+    with pytest.raises(Findings, match="no scheduler answers at nonsense://a:1"):
+        Dask.connected("nonsense://a:1")
