@@ -299,6 +299,8 @@ def _told(folder: Path | None) -> Iterator[None]:
         yield
     except sqlite3.Error as error:
         where = shown(folder / FILE) if folder else "the store in memory"
+        if folder is not None and not (folder / FILE).exists():
+            raise Findings([Finding(where, 0, "was moved or removed meanwhile; put it back, or begin anew")]) from None
         raise Findings([Finding(where, 0, _in_words(str(error)))]) from None
 
 

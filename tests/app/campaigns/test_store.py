@@ -123,6 +123,14 @@ def test_a_store_whose_making_was_cut_off_is_made_anew(tmp_path: Path) -> None:
         assert len([*store.rows(1)]) == 3
 
 
+def test_a_folder_that_is_moved_meanwhile_is_told(tmp_path: Path) -> None:
+    with Store.create(tmp_path / "c", KIND) as store:
+        version = store.version_id("d", {})
+        (tmp_path / "c").rename(tmp_path / "moved")
+        with pytest.raises(Findings, match="was moved or removed meanwhile"):
+            store.add(NewRow(version, "k", "thing", {}))
+
+
 def test_a_full_disk_is_told(tmp_path: Path) -> None:
     with Store.create(tmp_path, KIND) as store:
         version = store.version_id("d", {})
