@@ -112,8 +112,12 @@ class Store:
         """Open the store in `folder` to read."""
         path = folder / FILE
         if not path.is_file():
+            if folder.exists() and not folder.is_dir():
+                raise Findings([Finding(shown(folder), 0, "is a file; name a campaign's folder")])
             wrong = "holds no campaign" if folder.is_dir() else "does not exist"
             raise Findings([Finding(shown(folder), 0, f"{wrong}; name a folder that regrasp campaign made")])
+        if path.stat().st_size == 0:  # it is being made, or the process that made it was killed
+            raise Findings([Finding(shown(folder), 0, "holds no run yet; wait for the first")])
         with _told(folder):
             store = cls(folder, sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True, timeout=10.0))
         store._check(None)

@@ -60,7 +60,8 @@ def run_campaign(
         str, typer.Argument(metavar="SCENARIO|FILE", help="A scenario's name or .yaml file, or a campaign file.")
     ],
     seeds: Annotated[
-        str | None, typer.Option(metavar="A:B", help="Seeds from A up to, not including, B; default those of the file.")
+        str | None,
+        typer.Option(metavar="A:B", help="Seeds from A up to, not including, B; default the file's, else one."),
     ] = None,
     sets: Sets = None,
     out: Annotated[
@@ -87,11 +88,14 @@ def run_campaign(
     renderer: RendererOption = "software",
     quiet: Annotated[bool, typer.Option("--quiet", help="No progress; only the summary.")] = False,
 ) -> None:
-    """Run every case of some scenarios with every seed, and keep what comes out.
+    """Run every case with every seed, and count.
 
     The same command again goes on where it stopped: a row is kept for each run as it ends. A run is known by all that
     decides it: the scenario with its cell, robots and tree, the seed, the renderer, and the sources and packages that
     run it. After a change the runs are done anew, beside the old ones.
+
+    Without --seeds, and without seeds in a campaign file, each case runs once, with the seed of its scenario (0 if it
+    names none).
 
     \b
     A campaign file:
@@ -123,7 +127,7 @@ def run_campaign(
     with late_imports():
         from regrasp.app.campaigns.campaign import Effort, do_all, version_of
         from regrasp.app.campaigns.episodes import KIND, Stored, jobs_of
-        from regrasp.app.campaigns.plan import planned
+        from regrasp.app.campaigns.plan import one_seed_each, planned
         from regrasp.app.campaigns.progress import Progress
         from regrasp.app.campaigns.store import Store
         from regrasp.app.run.batch import Settings
@@ -134,6 +138,8 @@ def run_campaign(
         raise Findings(found)
     if not quiet:
         tell_of_compilation()
+    if chosen is None and one_seed_each(runs):
+        typer.echo("note: one seed each: --seeds 0:100 asks for more", err=True)
     settings = Settings(pictures=pictures, renderer=renderer)
     effort = Effort(wall_limit=math.inf if wall_limit is None else wall_limit)
     where = _engine(scheduler, jobs)
@@ -141,6 +147,7 @@ def run_campaign(
         asked = jobs_of(runs, settings)
         version = version_of(store, asked)
         _tell_of_other_versions(store, version)
+        _tell_what_stays(store, version, {job.key for job in asked}, keep, pictures)
         interrupted = do_all(asked, store, where, Stored(runs, keep, effort.wall_limit), Progress(quiet), effort)
         low = _print_cases(store, version, {job.key for job in asked})
     if interrupted:
@@ -164,7 +171,7 @@ def _engine(scheduler: str | None, jobs: int | None) -> "Engine":
 
 
 def _tell_of_other_versions(store: "Store", version: int) -> None:
-    """Say on stderr that the store holds runs of other sources or packages."""
+    """Say on stderr that the store holds runs of other sources, packages or scenarios."""
     others = [other for other in store.versions() if other.id != version and other.runs]
     for other in others:
         typer.echo(
@@ -172,6 +179,32 @@ def _tell_of_other_versions(store: "Store", version: int) -> None:
             f"done beside them (`regrasp campaign show {shown(store.folder or Path())}@{other.id}` shows those)",
             err=True,
         )
+
+
+def _tell_what_stays(store: "Store", version: int, keys: set[str], keep: str, pictures: bool) -> None:
+    """Say on stderr that runs which are done already get no records, or no pictures, by being asked for again."""
+    done = [row for row in store.rows(version) if row.key in keys] if pictures or keep == "all" else []
+    missing = done if pictures else [row for row in done if not row.record]
+    if not missing:
+        return
+    wanted, word = ("--pictures", " --pictures") if pictures else ("--keep all", "")
+    typer.echo(
+        f"note: {wanted} changes nothing in the {len(missing)} that are done already; `regrasp campaign rerun "
+        f"{shown(store.folder or Path())} {missing[0].number}{word}` makes a record of one",
+        err=True,
+    )
+
+
+def _tell_of_versions_beside(store: "Store", version: int) -> None:
+    """Say on stderr that the store holds runs of other sources, packages or scenarios than those shown."""
+    for other in store.versions():
+        if other.id != version and other.runs:
+            typer.echo(
+                f"note: {other.runs} more here are of {'newer' if other.id > version else 'older'} sources, packages "
+                f"or scenarios, from {other.began}; `regrasp campaign show {shown(store.folder or Path())}@{other.id}` "
+                "shows those",
+                err=True,
+            )
 
 
 @app.command("show")
@@ -183,8 +216,8 @@ def show_campaign(
 ) -> None:
     """Show how a campaign's runs came out, by case.
 
-    Of the newest sources and packages that did any; DIR@1 shows those of the first. A campaign that goes on can be
-    shown, too.
+    Of the newest sources, packages and scenarios; DIR@1 shows the first ones'. A campaign that goes on can be shown,
+    too.
 
     \b
     Examples:
@@ -207,12 +240,14 @@ def show_campaign(
             typer.echo(_csv(store.rows(version.id)), nl=False)
         else:
             _print_cases(store, version.id)
-            _tell_of_other_versions(store, version.id)
+            _tell_of_versions_beside(store, version.id)
 
 
 @app.command("failures")
 def show_failures(folder: Folder) -> None:
-    """Show why runs failed, by cause and by the node of the tree; one of each in full.
+    """Show why runs failed, one of each in full.
+
+    By cause, and by the node of the tree.
 
     \b
     Example:
@@ -254,9 +289,10 @@ def compare_campaigns(
     second: Annotated[str, typer.Argument(metavar="B", help="The other, such as after a change.")],
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Compare two campaigns scene by scene: which got better or worse, and whether that can be chance.
+    """Compare two campaigns scene by scene.
 
-    A scene is a scenario, its case and a seed; those that only one of the two has do not count.
+    Which got better or worse, and whether that can be chance. A scene is a scenario, its case and a seed; those that
+    only one of the two has do not count.
 
     \b
     Examples:
@@ -304,7 +340,7 @@ def compare_campaigns(
 @app.command("rerun")
 def rerun(
     folder: Folder,
-    row: Annotated[int, typer.Argument(min=1, help="The run's row, as `failures` names it.")],
+    row: Annotated[int, typer.Argument(metavar="ROW", min=1, help="The run's row, as `failures` names it.")],
     out: Annotated[Path | None, typer.Option(help="The record's folder; default in runs/.")] = None,
     video: Annotated[bool, typer.Option("--video", help="Film the run into the record.")] = False,
     pictures: Annotated[
@@ -312,9 +348,9 @@ def rerun(
     ] = False,
     quiet: Annotated[bool, typer.Option("--quiet", help="No progress; only the summary.")] = False,
 ) -> None:
-    """Do a campaign's run again, with a record, and a film if you like.
+    """Do a run again, with a record of it.
 
-    With the same sources and packages the same comes out, byte for byte.
+    And with a film if you like. With the same sources and packages the same comes out, byte for byte.
 
     \b
     Example:
@@ -335,7 +371,7 @@ def rerun(
     for remark in remarks:
         typer.echo(f"note: {remark}", err=True)
     into = out or folders.new_folder(f"{run.scenario.name}-{run.seed}")
-    if "process died" in row_in(stored).why:
+    if "the process died" in row_in(stored).why or "the process was killed" in row_in(stored).why:
         typer.echo(f"note: it killed its process; if it does so again, the record so far is in {shown(into)}", err=True)
     from regrasp.app.run.episode import run_episode
 
@@ -360,7 +396,7 @@ def _opened(name: str) -> "Iterator[tuple[Store, Version]]":
         from regrasp.app.campaigns.store import Store
 
     text, at, number = name.rpartition("@")
-    if not at or not number.isdecimal():
+    if not at or not number.isdecimal() or Path(name).is_dir():
         text, number = name, ""
     with Store.read(Path(text)) as store:
         if store.kind != KIND:
@@ -381,6 +417,8 @@ def _print_cases(store: "Store", version: int, keys: set[str] | None = None) -> 
     from regrasp.app.campaigns.table import print_table
 
     cases = by_case(row for row in store.rows(version) if keys is None or row.key in keys)
+    if not cases[-1].runs:  # interrupted before the first had ended
+        return cases[-1].interval[0]
     lines = []
     for case in cases:
         low, high = case.interval
@@ -395,7 +433,7 @@ def _print_cases(store: "Store", version: int, keys: set[str] | None = None) -> 
     return cases[-1].interval[0]
 
 
-_HEADER = ("case", "as expected", "95 % interval", "simulated s, 5 %", "50 %", "95 %", "wall s")
+_HEADER = ("case", "as expected", "95 % interval", "simulated s, 5 %", "50 %", "95 %", "wall s, 50 %")
 
 
 def _csv(rows: "Iterable[StoredRow]") -> str:
@@ -412,12 +450,14 @@ def _csv(rows: "Iterable[StoredRow]") -> str:
         row = row_in(stored)
         cause = row.cause or {}
         values = [_cell(getattr(row, name)) for name in plain_fields]
-        writer.writerow([stored.number, stored.ended, stored.record, cause.get("code"), cause.get("node"), *values])
+        what = (_cell(cause.get(key)) for key in ("code", "node"))
+        writer.writerow([stored.number, stored.ended, stored.record, *what, *values])
     return text.getvalue()
 
 
 def _cell(value: Any) -> Any:
-    return " ".join(value) if isinstance(value, list) else value
+    value = " ".join(value) if isinstance(value, list) else value
+    return printable(value) if isinstance(value, str) else value
 
 
 def _write_junit(path: Path, store: "Store", version: "Version") -> None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from regrasp.app.records.result import DEFAULT_CASE
 from regrasp.app.task.find import words_of
+from regrasp.interfaces.quote import printable
 
 if TYPE_CHECKING:
     from regrasp.app.records.result import Result
@@ -27,7 +28,7 @@ def run_summary(result: "Result", folder: Path) -> str:
         f"real-time factor {result.real_time_factor:.2f}, renderer {result.renderer}"
     )
     lines += [f"  went to {line}" for line in wall_lines(result)]
-    return "\n".join(lines)
+    return "\n".join(map(printable, lines))  # a cause may quote an exception
 
 
 def wall_lines(result: "Result") -> Iterator[str]:

@@ -127,10 +127,18 @@ class _Pool:
         if timed_out:
             error = f"stopped after {self.wall_limit:g} s of wall time"
         elif value is None and not error:
-            error = f"the process died with exit code {worker.process.exitcode}"
+            error = _death(worker.process.exitcode)
         assert worker.number is not None
         killed = value is None and not worker.signalled and worker.process.exitcode == -signal.SIGKILL
         return Done(worker.number, value, error, peak, timed_out, killed)
+
+
+def _death(exit_code: int) -> str:
+    """How a process died, in words; a negative exit code is that of a signal."""
+    if exit_code == -signal.SIGKILL:
+        return "the process was killed from outside (SIGKILL), as when memory runs out"
+    name = next((f" ({one.name})" for one in signal.Signals if one == -exit_code), "")
+    return f"the process died with exit code {exit_code}{name}"
 
 
 def _started(task: Callable[[], Any]) -> _Worker:

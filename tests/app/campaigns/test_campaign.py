@@ -88,7 +88,7 @@ def test_without_a_folder_nothing_is_kept() -> None:
 
 def test_a_native_crash_is_one_failed_run(tmp_path: Path) -> None:
     found = campaign(tmp_path / "c", {"a": abort, "b": partial(give, 1), "c": partial(give, 3)})
-    assert found["a"][:2] == (None, f"the process died with exit code -{signal.SIGABRT.value}")
+    assert found["a"][:2] == (None, f"the process died with exit code -{signal.SIGABRT.value} (SIGABRT)")
     assert (found["b"][0], found["c"][0]) == (1, 3)
 
 
@@ -99,7 +99,7 @@ def test_a_run_whose_process_is_killed_is_done_again(tmp_path: Path, capfd: pyte
         Effort(tries=3),
     )
     assert found["a"][:2] == (7, "")
-    assert found["b"][:2] == (None, f"the process died with exit code -{signal.SIGKILL.value}")
+    assert found["b"][:2] == (None, "the process was killed from outside (SIGKILL), as when memory runs out")
     assert (tmp_path / "b").read_text() == "xxx"
     assert "task a: its process was killed; it is done again" in capfd.readouterr().err
 

@@ -4,6 +4,7 @@ import csv
 import io
 import json
 import os
+import shutil
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -14,10 +15,12 @@ from regrasp.app.campaigns.campaign import Local, do_all
 from regrasp.app.campaigns.episodes import KIND, Stored, jobs_of
 from regrasp.app.campaigns.plan import planned
 from regrasp.app.campaigns.progress import Progress
-from regrasp.app.campaigns.store import Store
+from regrasp.app.campaigns.store import NewRow, Store
+from regrasp.app.cli.campaign import _print_cases
 from regrasp.app.cli.commands import app
 from regrasp.app.records.record import Record
 from regrasp.app.records.result import Result
+from regrasp.app.records.summary import run_summary
 from regrasp.app.run.batch import Settings
 from regrasp.app.scenario.load import Scenario
 from regrasp.app.task.expectation import Expectation
@@ -92,6 +95,7 @@ def test_show(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         "no_obstacle gravity=earth: 2 x search_exhausted",
         "no_obstacle gravity=earth: 1 x internal_error",
     ]
+    assert out.splitlines()[0].endswith("wall s, 50 %")
     told = json.loads(typed(folder, monkeypatch, "show", "a", "--json")[1])
     assert (told["schema"], told["runs"], told["succeeded"]) == (1, 12, 7)
     assert told["cases"][1]["causes"] == {"search_exhausted": 2}
@@ -186,7 +190,71 @@ def test_less_than_required(folder: Path, monkeypatch: pytest.MonkeyPatch, tmp_p
     code, _, err = typed(tmp_path, monkeypatch, *words)
     assert code == 0
     assert "1 of 1 are done already" in err
+    assert "note" not in err
+    again = [word for word in words if word not in ("--seeds", "0:1", "none")]
+    code, _, err = typed(tmp_path, monkeypatch, *again, "all")
+    assert code == 0
+    assert err.splitlines()[-3:] == [
+        "note: one seed each: --seeds 0:100 asks for more",
+        "note: --keep all changes nothing in the 1 that are done already; "
+        "`regrasp campaign rerun results/no_obstacle 1` makes a record of one",
+        "1 of 1 are done already",
+    ]
+    _, _, err = typed(tmp_path, monkeypatch, *words, "--pictures")
+    assert "`regrasp campaign rerun results/no_obstacle 1 --pictures` makes a record of one" in err
     assert sorted(path.name for path in (tmp_path / "results/no_obstacle").iterdir()) == [
         "campaign.db",
         "campaign.lock",
     ]
+
+
+def test_what_is_no_campaign_to_show(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    (tmp_path / "tiny.yaml").touch()
+    (tmp_path / "new").mkdir()
+    (tmp_path / "new/campaign.db").touch()
+    assert typed(tmp_path, monkeypatch, "show", "tiny.yaml")[2] == "tiny.yaml: is a file; name a campaign's folder\n"
+    assert typed(tmp_path, monkeypatch, "show", "new")[2] == "new: holds no run yet; wait for the first\n"
+
+
+def test_a_folder_whose_name_ends_like_a_version(folder: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    shutil.copytree(folder / "a", tmp_path / "a@2")
+    for name in ("a@2", "a@2@1"):
+        code, out, _ = typed(tmp_path, monkeypatch, "show", name)
+        assert (code, "7/12" in out) == (0, True)
+
+
+def test_show_of_one_version_of_two(folder: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """The second has a row whose texts could steer a terminal."""
+    shutil.copytree(folder / "a", tmp_path / "a")
+    with Store.create(tmp_path / "a", KIND) as store:
+        value = next(store.rows(1)).value
+        odd = {"code": "internal_error", "message": "a\x1b[31m", "node": "b\x1b\n"}
+        value |= {"why": "a\x1b[31m\nb", "cause": odd}
+        store.add(NewRow(store.version_id("other", {"python": "4"}), "key", "odd", value))
+    _, _, err = typed(tmp_path, monkeypatch, "show", "a@1")
+    assert err.startswith("note: 1 more here are of newer sources, packages or scenarios, from 2")
+    assert err.endswith("; `regrasp campaign show a@2` shows those\n")
+    _, out, err = typed(tmp_path, monkeypatch, "show", "a", "--csv")
+    [row] = csv.DictReader(io.StringIO(out))
+    assert (row["why"], row["node"]) == (r"a\x1b[31m\nb", r"b\x1b\n")
+    _, _, err = typed(tmp_path, monkeypatch, "show", "a")
+    assert err.startswith("note: 12 more here are of older sources, packages or scenarios, from 2")
+
+
+def test_a_cause_steers_no_terminal() -> None:
+    cause = Cause(CableCause.SEARCH_EXHAUSTED, "a\x1b[31m\nb", "c")
+    result = Result("s", 0, "failure", succeeded=False, task="cable", case="", cause=cause)
+    assert r"cause   search_exhausted: a\x1b[31m\nb (c)" in run_summary(result, Path("r"))
+
+
+def test_no_table_without_runs(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """As after Ctrl-C before the first run has ended."""
+    with Store.create(tmp_path / "c", KIND) as store:
+        assert _print_cases(store, 1) == 0.0
+    assert capsys.readouterr().out == ""
+
+
+def test_help_fits(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    assert "..." not in typed(tmp_path, monkeypatch, "--help")[1].partition("Commands:")[2]
+    assert "{DIR} {ROW}" in typed(tmp_path, monkeypatch, "rerun", "--help")[1]
+    assert "(0 if it names none)" in " ".join(typed(tmp_path, monkeypatch, "run", "--help")[1].split())

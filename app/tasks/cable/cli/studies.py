@@ -14,6 +14,8 @@ from regrasp.app.interrupts import late_imports
 from regrasp.app.records import folders
 from regrasp.interfaces.quote import nearest, quoted
 
+_KEPT = "are kept there as they end: the same command again goes on there."
+
 
 def add_to(study: typer.Typer) -> None:
     """Add the studies to `regrasp study`."""
@@ -25,7 +27,8 @@ def demo(
     seeds: Annotated[str, typer.Option(metavar="A:B", help="Seeds from A up to, not including, B.")],
     jobs: Annotated[int, typer.Option(min=1, help="Episodes side by side.")] = os.cpu_count() or 1,
     out: Annotated[
-        Path | None, typer.Option(help="Folder of demo.json and the runs' records; the same again goes on there.")
+        Path | None,
+        typer.Option(help=f"Folder of demo.json and the runs' records. Runs {_KEPT}"),
     ] = None,
     sets: Sets = None,
     renderer: RendererOption = "software",
@@ -70,7 +73,9 @@ def pose(
     cell: CellName = None,
     renderer: RendererOption = "software",
     jobs: Annotated[int, typer.Option(min=1, help="Scenes side by side.")] = os.cpu_count() or 1,
-    out: Annotated[Path | None, typer.Option(help="Folder of pose.json, pose.csv and the plots.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help=f"Folder of pose.json, pose.csv and the plots. Scenes {_KEPT}")
+    ] = None,
 ) -> None:
     """Repeat the thesis's pose experiment.
 
@@ -108,7 +113,7 @@ def coverage(
     cell: CellName = None,
     renderer: RendererOption = "software",
     jobs: Annotated[int, typer.Option(min=1, help="Scenes side by side.")] = os.cpu_count() or 1,
-    out: Annotated[Path | None, typer.Option(help="Folder of coverage.json.")] = None,
+    out: Annotated[Path | None, typer.Option(help=f"Folder of coverage.json. Scenes {_KEPT}")] = None,
 ) -> None:
     """Check that estimates are as sure as they say.
 
