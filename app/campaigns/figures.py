@@ -10,7 +10,7 @@ from typing import Any
 from regrasp.app.campaigns.episodes import row_in
 from regrasp.app.campaigns.statistics import detectable_share, mcnemar_p, median_interval, wilson_interval
 from regrasp.app.campaigns.store import StoredRow
-from regrasp.app.run.batch import Row
+from regrasp.app.run.batch import Row, reason
 
 SUMMARY_SCHEMA = COMPARISON_SCHEMA = 1
 PERCENTILES = (5, 50, 95)
@@ -68,13 +68,6 @@ def _percentiles(values: Sequence[float]) -> tuple[float, ...]:
     return (
         tuple(round(ordered[max(0, math.ceil(p / 100 * len(ordered)) - 1)], 3) for p in PERCENTILES) if values else ()
     )
-
-
-def reason(row: Row) -> str:
-    """Why a run was not as expected, in a word or two: its cause, or what expectations were not met."""
-    if row.cause is not None:
-        return str(row.cause["code"])
-    return f"not met: {', '.join(row.unmet)}" if row.unmet else row.outcome
 
 
 @dataclass(frozen=True)

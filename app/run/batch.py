@@ -121,10 +121,17 @@ def _run_episode(*args: Any, **kwargs: Any) -> Result:
 
 def summary(row: Row) -> str:
     """How a run came out, in a line of the progress."""
-    how = row.outcome if row.succeeded else f"{row.outcome}, not as expected"
+    how = row.outcome if row.succeeded else f"{row.outcome}, not as expected ({reason(row)})"
     if not row.wall_seconds:  # its process died
         return how
     return f"{how}, {row.sim_seconds:.1f} s simulated, {row.real_time_factor:.2f} x real time"
+
+
+def reason(row: Row) -> str:
+    """Why a run was not as expected, in a word or two: its cause, or what expectations were not met."""
+    if row.cause is not None:
+        return str(row.cause["code"])
+    return f"not met: {', '.join(row.unmet)}" if row.unmet else row.outcome
 
 
 def result_of(run: Run, done: Done[Result]) -> Result:

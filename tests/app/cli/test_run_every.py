@@ -1,4 +1,5 @@
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
@@ -12,7 +13,7 @@ from regrasp.app.cli.run_every import run_every
 from regrasp.app.files.findings import Findings
 from regrasp.app.records.record import Record
 from regrasp.app.records.result import Result
-from regrasp.app.run.batch import Row, Run, Settings, row_of
+from regrasp.app.run.batch import Row, Run, Settings, row_of, summary
 from regrasp.app.run.junit import JunitCase, write_junit
 from regrasp.app.run.processes import Done
 from regrasp.app.scenario.load import Scenario, cases, load_scenario
@@ -133,3 +134,14 @@ def test_a_row_tells_the_run_by_its_seed_where_the_case_does_not() -> None:
     row = row_of(Run(load_scenario("mine.yaml"), 0), Done(0, None, "ValueError: no such joint", 1.0))
     assert isinstance(row, Row)
     assert (row.outcome, row.why) == ("internal_error", "internal_error: ValueError: no such joint")
+
+
+def test_a_line_of_the_progress_says_why() -> None:
+    run = Run(load_scenario("mine.yaml"), 0)
+    died = row_of(run, Done(0, None, "ValueError: no such joint", 1.0))
+    assert summary(died) == "internal_error, not as expected (internal_error)"
+    touched = replace(
+        died, outcome="success", cause=None, unmet=["unintended_force"], wall_seconds=2.0, sim_seconds=8.0
+    )
+    told = "success, not as expected (not met: unintended_force), 8.0 s simulated, 0.00 x real time"
+    assert summary(touched) == told
