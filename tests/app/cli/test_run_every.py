@@ -143,5 +143,5 @@ def test_a_line_of_the_progress_says_why() -> None:
     touched = replace(
         died, outcome="success", cause=None, unmet=["unintended_force"], wall_seconds=2.0, sim_seconds=8.0
     )
-    told = "success, not as expected (not met: unintended_force), 0.0 s simulated, 0.00 x real time"
+    told = "success, not as expected (not met: unintended_force), 8.0 s simulated, 0.00 x real time"
     assert summary(touched) == told
