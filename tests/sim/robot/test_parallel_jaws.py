@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pybullet as p
 import pytest
+from jaws import THICKNESS, check_gaps, check_hold, lone_arm, pads_apart
 from robots import PANDA, VX300S
 from scipy.spatial.transform import Rotation
 from toy_robot import ROBOT, URDF, write_robot
@@ -12,15 +13,9 @@ from toy_robot import ROBOT, URDF, write_robot
 from regrasp.app.files.findings import Findings
 from regrasp.app.robots.robot_file import load_robot
 from regrasp.interfaces.cable.cell import CableCell
-from regrasp.interfaces.cell import ArmSpec, Cell, KnownCell
-from regrasp.interfaces.hidden_world import GripperSpec
 from regrasp.interfaces.robot.robot import Robot
 from regrasp.interfaces.robot.urdf import pose_of, rpy_of
-from regrasp.interfaces.scene import EARTH_GRAVITY
-from regrasp.sim.robot.arm import SimArm
 
-GAP = 0.001  # m
-THICKNESS = 0.03  # m of the block
 MASS = 0.1  # kg
 LEFT = '<axis xyz="0 1 0"/><limit lower="0" upper="0.05"'
 RIGHT = '<axis xyz="0 1 0"/><limit lower="-0.05" upper="0"'
@@ -30,26 +25,6 @@ TOYS = {  # what stands in place of LEFT and RIGHT, and of the fingers' origins;
     "both open downwards": ('<axis xyz="0 -1 0"/><limit lower="-0.05" upper="0"', RIGHT, 0.0, (-1.0, -1.0)),
     "origins off the middle": (LEFT, RIGHT, 0.004, (1.0, -1.0)),
 }
-
-
-def arm_of(cell: CableCell, client: int, robot: Robot) -> SimArm:
-    spec = ArmSpec(name="one", robot=robot, base=(0.0, 0.0, 0.0), sleep=robot.sleep)
-    known = KnownCell(boxes=(), arms=(spec,), cameras=(), latencies=cell.known.latencies)
-    hidden = cell.hidden.model_copy(update={"gripper": GripperSpec()})
-    return SimArm(client, Cell(known=known, hidden=hidden), "one", np.random.default_rng(3))
-
-
-def run(arm: SimArm, seconds: float) -> None:
-    for _ in range(round(seconds * 480)):
-        arm.step()
-        p.stepSimulation(physicsClientId=arm.client)
-
-
-def pads_apart(arm: SimArm) -> float:
-    """Distance of the pads' collision shapes, m."""
-    left, right = arm.gripper.pads
-    points = p.getClosestPoints(arm.body, arm.body, 0.2, left, right, physicsClientId=arm.client)
-    return float(min(point[8] for point in points))
 
 
 def toy(folder: Path, kind: str) -> Robot:
@@ -65,7 +40,7 @@ def toy(folder: Path, kind: str) -> Robot:
 
 @pytest.mark.parametrize("gap", [0.0, 0.01, 0.04, 0.07])
 def test_the_pandas_pads_stand_as_far_apart_as_its_jaw_is_open(cell: CableCell, client: int, gap: float) -> None:
-    arm = arm_of(cell, client, PANDA)
+    arm = lone_arm(cell, client, PANDA, PANDA.sleep)
     arm.gripper.place_at(gap)
     assert arm.gripper.true_gap() == pytest.approx(gap, abs=1e-6)
     assert pads_apart(arm) == pytest.approx(gap, abs=1e-4)
@@ -76,41 +51,17 @@ def test_the_pandas_pads_stand_as_far_apart_as_its_jaw_is_open(cell: CableCell, 
 
 
 def test_the_panda_opens_to_a_gap_and_reads_what_it_is(cell: CableCell, client: int) -> None:
-    arm = arm_of(cell, client, PANDA)
-    for gap in (0.07, 0.04, 0.01):
-        arm.gripper.open(gap)
-        run(arm, 2.0)
-        assert pads_apart(arm) == pytest.approx(gap, abs=GAP)
-        assert arm.gripper.true_gap() == pytest.approx(gap, abs=GAP)
-        assert arm.gripper.reading().gap == pytest.approx(gap, abs=2 * GAP)
+    arm = lone_arm(cell, client, PANDA, PANDA.sleep)
+    check_gaps(arm, (0.07, 0.04, 0.01))
 
 
 @pytest.mark.parametrize("force", [10.0, 20.0])  # N of each finger
 def test_the_panda_presses_with_the_force_that_it_is_told_and_holds_a_block_by_friction(
     cell: CableCell, client: int, force: float
 ) -> None:
-    arm = arm_of(cell, client, PANDA)
-    arm.gripper.open(0.06)
-    run(arm, 2.0)
-    tool = arm.tool_pose()
+    arm = lone_arm(cell, client, PANDA, PANDA.sleep)
     solid = p.createCollisionShape(p.GEOM_BOX, halfExtents=[0.01, THICKNESS / 2, 0.02], physicsClientId=client)
-    turn = tool.rotation.as_quat().tolist()
-    block = p.createMultiBody(MASS, solid, -1, tool.translation.tolist(), turn, physicsClientId=client)
-    p.changeDynamics(block, -1, lateralFriction=0.8, physicsClientId=client)
-    arm.gripper.close(force)
-    run(arm, 1.5)
-    for pad in arm.gripper.pads:
-        contacts = p.getContactPoints(block, arm.body, -1, pad, physicsClientId=client)
-        assert sum(contact[9] for contact in contacts) == pytest.approx(force, rel=0.05)
-    assert arm.gripper.true_gap() == pytest.approx(THICKNESS, abs=GAP)
-    place = np.array(p.getBasePositionAndOrientation(block, physicsClientId=client)[0])
-    p.setGravity(0, 0, -EARTH_GRAVITY, physicsClientId=client)
-    run(arm, 2.0)
-    fallen = np.array(p.getBasePositionAndOrientation(block, physicsClientId=client)[0]) - place
-    assert np.linalg.norm(fallen) < 0.003
-    arm.gripper.open(0.06)
-    run(arm, 0.5)
-    assert p.getBasePositionAndOrientation(block, physicsClientId=client)[0][2] < place[2] - 0.2
+    check_hold(arm, solid, MASS, force, opening=0.06)
 
 
 @pytest.mark.parametrize("kind", TOYS)
@@ -119,7 +70,7 @@ def test_which_way_a_finger_opens_follows_from_the_urdf(
 ) -> None:
     robot = toy(tmp_path, kind)
     assert robot.parallel_jaw.signs == TOYS[kind][3]
-    arm = arm_of(cell, client, robot)
+    arm = lone_arm(cell, client, robot, robot.sleep)
     for gap in (0.01, 0.04):
         arm.gripper.place_at(gap)
         assert arm.gripper.true_gap() == pytest.approx(gap, abs=1e-6)
