@@ -1,11 +1,9 @@
 """`regrasp campaign`: many runs that are kept, counted and compared."""
 
-import csv
-import io
 import json
 import math
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -17,11 +15,10 @@ from regrasp.app.cli.options import EXIT_UNMET, RendererOption, Sets, WallLimitS
 from regrasp.app.files.findings import Finding, Findings, shown
 from regrasp.app.interrupts import EXIT_INTERRUPTED, late_imports
 from regrasp.app.records import folders
-from regrasp.interfaces.quote import printable
 
 if TYPE_CHECKING:
     from regrasp.app.campaigns.campaign import Engine
-    from regrasp.app.campaigns.store import Store, StoredRow, Version
+    from regrasp.app.campaigns.store import Store, Version
 
 RESULTS = Path("results")  # where campaigns go by default
 _RUN = "run"
@@ -130,6 +127,7 @@ def run_campaign(
         from regrasp.app.campaigns.plan import one_seed_each, planned
         from regrasp.app.campaigns.progress import Progress
         from regrasp.app.campaigns.store import Store
+        from regrasp.app.cli.campaign_output import print_cases
         from regrasp.app.run.batch import Settings
 
     runs = planned(scenario, sets or [], chosen)
@@ -149,7 +147,7 @@ def run_campaign(
         _tell_of_other_versions(store, version)
         _tell_what_stays(store, version, {job.key for job in asked}, keep, pictures)
         interrupted = do_all(asked, store, where, Stored(runs, keep, effort.wall_limit), Progress(quiet), effort)
-        low = _print_cases(store, version, {job.key for job in asked})
+        low = print_cases(store, version, {job.key for job in asked})
     if interrupted:
         raise typer.Exit(EXIT_INTERRUPTED)
     if require is not None and low < require:
@@ -226,20 +224,22 @@ def show_campaign(
     """
     if as_json and as_csv:
         raise Findings([Finding("--csv", 0, "is for CSV, and --json for JSON; leave one of them out")])
+    with late_imports():
+        from regrasp.app.cli.campaign_output import csv_text, print_cases, write_rows_junit
     if junit is not None and (found := folders.file_findings(junit)):
         raise Findings(found)
     with _opened(folder) as (store, version):
         if junit is not None:
-            _write_junit(junit, store, version)
+            write_rows_junit(junit, store, version)
         if as_json:
             from regrasp.app.campaigns.figures import summary_json
 
             found_figures = summary_json(lambda: store.rows(version.id), version.program)
             typer.echo(json.dumps(found_figures, indent=2, allow_nan=False))
         elif as_csv:
-            typer.echo(_csv(store.rows(version.id)), nl=False)
+            typer.echo(csv_text(store.rows(version.id)), nl=False)
         else:
-            _print_cases(store, version.id)
+            print_cases(store, version.id)
             _tell_of_versions_beside(store, version.id)
 
 
@@ -253,34 +253,10 @@ def show_failures(folder: Folder) -> None:
     Example:
       regrasp campaign failures results/tall_obstacle
     """
-    from regrasp.app.campaigns.episodes import row_in
-    from regrasp.app.campaigns.figures import failure_groups
-    from regrasp.app.records.explain import explanation
-    from regrasp.app.records.reader import read_record
+    from regrasp.app.cli.campaign_output import print_failures
 
     with _opened(folder) as (store, version):
-        groups = failure_groups(store.rows(version.id))
-        assert store.folder is not None
-        if not groups:
-            typer.echo(f"all {version.runs} runs came out as expected")
-        for group in groups:
-            where = f" at {printable(group.node)}" if group.node else ""
-            typer.echo(f"{len(group.rows)} x {group.reason}{where}")
-            for stored in group.rows[:_SHOWN]:
-                typer.echo(f"  row {stored.number}  {printable(stored.title)}: {printable(row_in(stored).why)}")
-            if more := len(group.rows) - _SHOWN:
-                typer.echo(f"  and {more} more" if more > 0 else "", nl=more > 0)
-            kept = next((stored for stored in group.rows if stored.record), None)
-            if kept is None:
-                first = group.rows[0].number
-                typer.echo(f"  no record was kept; regrasp campaign rerun {shown(store.folder)} {first}\n")
-                continue
-            typer.echo(f"\n  row {kept.number} in full, {shown(store.folder / kept.record)}:")
-            try:
-                told = explanation(read_record(store.folder / kept.record), _WIDTH)
-            except Findings as error:
-                told = str(error)
-            typer.echo("".join(f"    {line}\n" if line else "\n" for line in told.splitlines()))
+        print_failures(store, version)
 
 
 @app.command("compare")
@@ -302,6 +278,7 @@ def compare_campaigns(
     from dataclasses import asdict
 
     from regrasp.app.campaigns.figures import COMPARISON_SCHEMA, compare
+    from regrasp.app.cli.campaign_output import print_comparison
     from regrasp.app.records.result import plain
 
     with _opened(first) as (a, version_a), _opened(second) as (b, version_b):
@@ -313,28 +290,7 @@ def compare_campaigns(
         raise Findings(
             [Finding(second, 0, f"has no scene of {first}; compare campaigns of the same scenarios and seeds")]
         )
-    k, n = found.succeeded, found.scenes
-    left_out = f" ({found.only_first} are only in A, {found.only_second} only in B)"
-    typer.echo(f"{n} scenes in both{left_out if found.only_first or found.only_second else ''}")
-    typer.echo(f"as expected: {k[0]} in A, {k[1]} in B")
-    for name, scenes in (("better in B", found.better), ("worse in B", found.worse)):
-        typer.echo(f"{name}: {len(scenes)}")
-        for scene in scenes:
-            typer.echo(f"  {printable(scene)}")
-    verdict = "more than chance" if found.p < _LEVEL else "chance can explain it"
-    typer.echo(f"exact McNemar test: p = {found.p:.3g}: {verdict}")
-    if math.isnan(found.medians[0]):
-        typer.echo("no scene came out as expected in both, so times are not compared")
-    else:
-        middle, low, high = found.difference
-        typer.echo(
-            f"simulated seconds where both did: median {found.medians[0]:.1f} in A, {found.medians[1]:.1f} in B; "
-            f"B takes {middle:+.2f} (95 % interval {low:+.2f} to {high:+.2f})"
-        )
-    typer.echo(
-        f"so many scenes would show, with 80 % probability, that {100 * found.detectable:.1f} % of them got better and "
-        "none worse; smaller differences may be missed"
-    )
+    print_comparison(found)
 
 
 @app.command("rerun")
@@ -383,11 +339,6 @@ def rerun(
     raise typer.Exit(exit_code(result))
 
 
-_SHOWN = 5  # runs of a group of failures
-_WIDTH = 116  # characters of an explanation
-_LEVEL = 0.05  # of p
-
-
 @contextmanager
 def _opened(name: str) -> "Iterator[tuple[Store, Version]]":
     """The store in a folder, and the version that the name means: DIR@2, or the last one that did any run."""
@@ -409,70 +360,3 @@ def _opened(name: str) -> "Iterator[tuple[Store, Version]]":
             known = ", ".join(f"@{version.id}" for version in with_runs)
             raise Findings([Finding(name, 0, f"no version {number} with runs; there is {known}")])
         yield store, chosen[0]
-
-
-def _print_cases(store: "Store", version: int, keys: set[str] | None = None) -> float:
-    """Print the table by case of all rows, or of those with these keys. Returns where the interval of all begins."""
-    from regrasp.app.campaigns.figures import by_case
-    from regrasp.app.campaigns.table import print_table
-
-    cases = by_case(row for row in store.rows(version) if keys is None or row.key in keys)
-    if not cases[-1].runs:  # interrupted before the first had ended
-        return cases[-1].interval[0]
-    lines = []
-    for case in cases:
-        low, high = case.interval
-        sim = [f"{seconds:.1f}" for seconds in case.sim_seconds] or ["-"] * 3
-        wall = f"{case.wall_seconds[1]:.1f}" if case.wall_seconds else "-"
-        share = f"{100 * low:.1f} to {100 * high:.1f} %"
-        lines.append((printable(case.case), f"{case.succeeded}/{case.runs}", share, *sim, wall))
-    print_table(_HEADER, lines)
-    for case in cases[:-1]:
-        for cause, count in case.causes.items():
-            typer.echo(f"{printable(case.case)}: {count} x {printable(cause)}")
-    return cases[-1].interval[0]
-
-
-_HEADER = ("case", "as expected", "95 % interval", "simulated s, 5 %", "50 %", "95 %", "wall s, 50 %")
-
-
-def _csv(rows: "Iterable[StoredRow]") -> str:
-    from dataclasses import fields
-
-    from regrasp.app.campaigns.episodes import row_in
-    from regrasp.app.run.batch import Row
-
-    plain_fields = [field.name for field in fields(Row) if field.name not in ("measured", "wall_by_part", "cause")]
-    text = io.StringIO(newline="")
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["row", "ended", "record", "cause", "node", *plain_fields])
-    for stored in rows:
-        row = row_in(stored)
-        cause = row.cause or {}
-        values = [_cell(getattr(row, name)) for name in plain_fields]
-        what = (_cell(cause.get(key)) for key in ("code", "node"))
-        writer.writerow([stored.number, stored.ended, stored.record, *what, *values])
-    return text.getvalue()
-
-
-def _cell(value: Any) -> Any:
-    value = " ".join(value) if isinstance(value, list) else value
-    return printable(value) if isinstance(value, str) else value
-
-
-def _write_junit(path: Path, store: "Store", version: "Version") -> None:
-    from regrasp.app.campaigns.episodes import row_in
-    from regrasp.app.run.junit import JunitCase, write_junit
-
-    assert store.folder is not None
-    cases = [
-        JunitCase(
-            row_in(stored).scenario,
-            f"{row_in(stored).case} seed {row_in(stored).seed}",
-            row_in(stored),
-            store.folder / stored.record if stored.record else None,
-        )
-        for stored in store.rows(version.id)
-    ]
-    path.parent.mkdir(parents=True, exist_ok=True)
-    write_junit(path, store.folder.name, cases)

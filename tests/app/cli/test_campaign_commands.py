@@ -16,7 +16,7 @@ from regrasp.app.campaigns.episodes import KIND, Stored, jobs_of
 from regrasp.app.campaigns.plan import planned
 from regrasp.app.campaigns.progress import Progress
 from regrasp.app.campaigns.store import NewRow, Store
-from regrasp.app.cli.campaign import _print_cases
+from regrasp.app.cli.campaign_output import print_cases
 from regrasp.app.cli.commands import app
 from regrasp.app.records.record import Record
 from regrasp.app.records.result import Result
@@ -250,7 +250,7 @@ def test_a_cause_steers_no_terminal() -> None:
 def test_no_table_without_runs(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     """As after Ctrl-C before the first run has ended."""
     with Store.create(tmp_path / "c", KIND) as store:
-        assert _print_cases(store, 1) == 0.0
+        assert print_cases(store, 1) == 0.0
     assert capsys.readouterr().out == ""
 
 
