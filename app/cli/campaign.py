@@ -327,7 +327,7 @@ def rerun(
     for remark in remarks:
         typer.echo(f"note: {remark}", err=True)
     into = out or folders.new_folder(f"{run.scenario.name}-{run.seed}")
-    if "the process died" in row_in(stored).why or "the process was killed" in row_in(stored).why:
+    if row_in(stored).outcome == "internal_error" and not row_in(stored).wall_seconds:  # it told nothing any more
         typer.echo(f"note: it killed its process; if it does so again, the record so far is in {shown(into)}", err=True)
     from regrasp.app.run.episode import run_episode
 
