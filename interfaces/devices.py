@@ -2,6 +2,7 @@
 
 from typing import Protocol
 
+from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.frame import RgbdFrame
 from regrasp.interfaces.reading import GripperReading, JointReading
 from regrasp.interfaces.trajectory import Trajectory
@@ -17,6 +18,14 @@ class Clock(Protocol):
         ...
 
 
+class Guard(Protocol):
+    """What may stop an arm at once. A driver asks it in its servo loop, not only at ticks."""
+
+    def __call__(self, reading: JointReading) -> bool:
+        """Whether the arm must stop now."""
+        ...
+
+
 class Arm(Protocol):
     """An arm with position-controlled joints."""
 
@@ -26,8 +35,15 @@ class Arm(Protocol):
         """The newest encoder reading."""
         ...
 
-    def follow(self, trajectory: Trajectory) -> None:
-        """Start to follow `trajectory` now, in place of one under way. It must begin at the arm's present position."""
+    def gravity(self) -> FloatArray:
+        """Gravity (3,) m/s2 in the world, as an accelerometer in the arm's base tells it."""
+        ...
+
+    def follow(self, trajectory: Trajectory, guard: Guard | None = None) -> None:
+        """Start to follow `trajectory` now, in place of one under way. It must begin at the arm's present position.
+
+        When `guard` says so, the arm stops as fast as its drives can, and holds where it stands.
+        """
         ...
 
     def stop(self) -> None:

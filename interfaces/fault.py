@@ -8,18 +8,11 @@ from typing import Annotated, ClassVar, Literal, Self
 import numpy as np
 from pydantic import AfterValidator, Field, model_validator
 
-from regrasp.interfaces.fields import Direction, Fraction, Model, Vector
-
-
-def _in_order(span: tuple[float, float]) -> tuple[float, float]:
-    if span[0] > span[1]:
-        raise ValueError("runs backwards; put the smaller first, such as [0.3, 0.8]")
-    return span
-
+from regrasp.interfaces.fields import Direction, Fraction, Model, Vector, in_order
 
 SimTime = Annotated[float, Field(ge=0, le=3600)]  # seconds
-TimeRange = Annotated[tuple[SimTime, SimTime], AfterValidator(_in_order)]
-FractionRange = Annotated[tuple[Fraction, Fraction], AfterValidator(_in_order)]
+TimeRange = Annotated[tuple[SimTime, SimTime], AfterValidator(in_order)]
+FractionRange = Annotated[tuple[Fraction, Fraction], AfterValidator(in_order)]
 PositiveFraction = Annotated[float, Field(gt=0, le=1)]
 
 

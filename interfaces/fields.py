@@ -37,6 +37,13 @@ def _not_zero(v: Vector) -> Vector:
 Direction = Annotated[Vector, AfterValidator(_not_zero)]  # of any length
 
 
+def in_order(span: tuple[float, float]) -> tuple[float, float]:
+    """The range, if its ends are in order. Raises ValueError."""
+    if span[0] > span[1]:
+        raise ValueError("runs backwards; put the smaller first, such as [0.3, 0.8]")
+    return span
+
+
 class Model(BaseModel):
     """Base class of all file models. Unknown keys are errors; an object does not change once it is made."""
 

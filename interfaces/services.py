@@ -24,8 +24,13 @@ class MotionService(Protocol):
         """Bring an arm to its sleep pose."""
         ...
 
-    def straight(self, arm: str, goal: "RigidTransform", *, speed: float | None = None) -> Request[None]:
-        """Move the tool in a straight line to `goal` (world_from_tool), unchecked; `speed` in (0, 1]."""
+    def straight(
+        self, arm: str, goal: "RigidTransform", *, speed: float | None = None, pressing: bool = False
+    ) -> Request[None]:
+        """Move the tool in a straight line to `goal` (world_from_tool), unchecked; `speed` in (0, 1].
+
+        `pressing`: the arm shall touch something there, and only a great force stops it.
+        """
         ...
 
     def shift(

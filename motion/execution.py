@@ -10,11 +10,18 @@ from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.devices import Arm, Clock, Gripper
 from regrasp.interfaces.robot.chain import Chain
 from regrasp.interfaces.trajectory import Trajectory
-from regrasp.motion.failure import GraspEmptyError, PlanningError
+from regrasp.motion.failure import GraspEmptyError, PlanningError, TouchError
 from regrasp.motion.grasping.gap_test import GapParameters, GripWatch
 from regrasp.motion.planning.timing import JointLimits, TimingParameters, time_path
 from regrasp.motion.request import MotionRequest
 from regrasp.motion.robots.arm_watch import ArmWatch, ArmWatchParameters, remaining_waypoints
+from regrasp.motion.robots.contact_guard import (
+    ContactGuard,
+    ContactGuardParameters,
+    ContactLimits,
+    Touch,
+)
+from regrasp.motion.robots.dynamics import ArmDynamics
 
 
 @dataclass(frozen=True)
@@ -40,6 +47,15 @@ class JawParameters:
 
 
 @dataclass(frozen=True)
+class BackOffParameters:
+    """How an arm goes back the way that it came after a touch."""
+
+    distance: float = 0.10  # m that its far end moves, where the elbow moves by less than half; choice
+    step: float = 0.02  # s of the way that it came between two waypoints
+    speed: float = 0.3  # share of the joints' speed; choice
+
+
+@dataclass(frozen=True)
 class ExecutionParameters:
     """How a trajectory's execution is judged and repeated."""
 
@@ -50,7 +66,10 @@ class ExecutionParameters:
     slowdown: float = 0.5  # factor on the speed for every attempt after the first; choice
     retry_pause: float = 1.0  # s before the next attempt; what jams may come free
     jaw: JawParameters = field(default_factory=JawParameters)
+    back_off: BackOffParameters = field(default_factory=BackOffParameters)
+    same_place: float = 0.01  # rad or m; an arm that reads this near to its last command stands there
     watch: ArmWatchParameters = field(default_factory=ArmWatchParameters)
+    guard: ContactGuardParameters = field(default_factory=ContactGuardParameters)
     timing: TimingParameters = field(default_factory=TimingParameters)
 
 
@@ -66,6 +85,7 @@ class Execution:
         arms: Mapping[str, Arm],
         grippers: Mapping[str, Gripper],
         chains: Mapping[str, Chain],
+        dynamics: Mapping[str, ArmDynamics],
         clock: Clock,
         latency: float,
         parameters: ExecutionParameters = ExecutionParameters(),
@@ -73,8 +93,10 @@ class Execution:
     ) -> None:
         self.parameters, self._on_anomaly = parameters, on_anomaly
         self._arms, self._grippers, self._clock, self._latency = arms, grippers, clock, latency
+        self._chains, self._dynamics = chains, dynamics
         self._watches = {name: ArmWatch(name, chains[name], parameters.watch) for name in arms}
         self._limits = {name: JointLimits(chains[name].speeds, chains[name].accelerations) for name in arms}
+        self._commanded: dict[str, FloatArray] = {}  # where an arm was told to come to rest
         self._speed_share = dict.fromkeys(arms, 1.0)  # of the speed asked for; less for an arm that fell behind
         self._out_of_order: dict[str, PlanningError] = {}
 
@@ -91,6 +113,7 @@ class Execution:
     def halt(self, arm: str) -> None:
         """Stop an arm where it is."""
         self._arms[arm].stop()
+        self._commanded.pop(arm, None)
         self._watches[arm].leave(None)
 
     def give_up(self, arm: str, code: str, message: str) -> PlanningError:
@@ -99,19 +122,29 @@ class Execution:
         self._out_of_order[arm] = PlanningError(code, message)
         return self._out_of_order[arm]
 
-    def follow(self, arm: str, path: FloatArray, speed: float) -> Iterator[None]:
+    def follow(self, arm: str, path: FloatArray, speed: float, contact: ContactLimits | None = None) -> Iterator[None]:
         """Steps that bring an arm along a joint path (k, n), at `speed` in (0, 1] of the joints' limits.
 
-        An arm that falls behind is stopped and led on, slower each time. Raises PlanningError ARM_FAILED when it never
-        follows or its encoder readings are implausible, and MOTION_BLOCKED when it ends off its goal.
+        An arm that falls behind is stopped and led on, slower each time. One that touches something stops at once and
+        goes a little way back; `contact` says what counts as a touch (default: of an arm that moves freely). Raises
+        TouchError then, PlanningError ARM_FAILED when it never follows or its encoder readings are implausible, and
+        MOTION_BLOCKED when it ends off its goal.
         """
+        yield from self._follow(arm, self._from_command(arm, path), speed, contact or self.parameters.guard.free)
+
+    def _follow(self, arm: str, path: FloatArray, speed: float, contact: ContactLimits) -> Iterator[None]:
         moved = self._watches[arm].moved_alone(self._arms[arm].reading())
         if moved is not None:
             raise self.give_up(arm, CauseCode.ARM_FAILED, moved)
         for _ in range(self.parameters.attempts):
             trajectory = time_path(path, self._limits[arm], speed * self._speed_share[arm], self.parameters.timing)
             yield from self._pause(self._latency)
-            trouble, elapsed = yield from self._run(arm, trajectory)
+            guard = self._guard(arm, contact)
+            trouble, elapsed = yield from self._run(arm, trajectory, guard)
+            if guard.touch is not None:
+                self._on_anomaly(felt := self._felt(arm, guard.touch))
+                yield from self._back_off(arm, trajectory, elapsed)
+                raise TouchError(felt, guard.touch)
             if trouble is None:
                 break
             self.halt(arm)
@@ -122,6 +155,7 @@ class Execution:
             path = np.vstack([self._joints(arm), path])
         else:
             raise self.give_up(arm, CauseCode.ARM_FAILED, f"{trouble}, {self.parameters.attempts} times")
+        self._commanded[arm] = path[-1]
         yield from self._arrive(arm, path[-1])
         self._watches[arm].leave(self._joints(arm))
 
@@ -162,15 +196,44 @@ class Execution:
             raise GraspEmptyError(f"the jaw closed on nothing: {evidence.sentence}")
         return evidence.value
 
-    def _run(self, arm: str, trajectory: Trajectory) -> Generator[None, None, tuple[str | None, float]]:
+    def _from_command(self, arm: str, path: FloatArray) -> FloatArray:
+        """The path from where the servos stand: a start by the encoders' reading jerks what the hand holds."""
+        stands = self._commanded.pop(arm, None)
+        if stands is None or np.max(np.abs(path[0] - stands)) > self.parameters.same_place:
+            return path
+        return np.vstack([stands, path[1:]])
+
+    def _guard(self, arm: str, contact: ContactLimits) -> ContactGuard:
+        return ContactGuard(self._dynamics[arm], self._arms[arm].gravity(), self._chains[arm].torques, contact)
+
+    def _back_off(self, arm: str, trajectory: Trajectory, elapsed: float) -> Iterator[None]:
+        """Steps that bring an arm back the way that it came, as far as the parameters say."""
+        path, way, levers = [self._joints(arm)], 0.0, self._chains[arm].levers
+        while elapsed > 0.0 and way < self.parameters.back_off.distance:
+            elapsed -= self.parameters.back_off.step
+            path.append(trajectory.sample(elapsed)[0])
+            way += float(np.linalg.norm((path[-1] - path[-2]) * levers))
+        if way > 0.0:
+            yield from self._follow(arm, np.array(path), self.parameters.back_off.speed, ContactLimits(np.inf))
+
+    def _felt(self, arm: str, touch: Touch) -> str:
+        joint = int(np.argmax(np.abs(touch.efforts) / self._chains[arm].torques))
+        name, unit = self._chains[arm].names[joint].replace("_", " "), "N" if self._chains[arm].slides[joint] else "N m"
+        return f"the {arm} arm touched something: its {name} felt {abs(touch.efforts[joint]):.1f} {unit} from outside"
+
+    def _run(
+        self, arm: str, trajectory: Trajectory, guard: ContactGuard
+    ) -> Generator[None, None, tuple[str | None, float]]:
         """Let the arm follow; why it was found off the trajectory, if it was, and after how many seconds."""
         watch, start = self._watches[arm], self._clock.now()
         watch.begin()
         watch.leave(None)
-        self._arms[arm].follow(trajectory)
+        self._arms[arm].follow(trajectory, guard)
         while self._arms[arm].is_moving():
             yield
             reading, elapsed = self._arms[arm].reading(), self._clock.now() - start
+            if guard.touch is not None:
+                return None, guard.touch.stamp - start
             jumped = watch.jumped(reading)
             if jumped is not None:
                 self.halt(arm)

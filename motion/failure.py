@@ -1,6 +1,11 @@
 """The error of motion planning and execution: no motion was found, or an arm cannot carry it out."""
 
+from typing import TYPE_CHECKING
+
 from regrasp.interfaces.cause import CauseCode
+
+if TYPE_CHECKING:
+    from regrasp.motion.robots.contact_guard import Touch
 
 
 class PlanningError(Exception):
@@ -9,6 +14,14 @@ class PlanningError(Exception):
     def __init__(self, code: str, message: str) -> None:
         super().__init__(message)
         self.code = code
+
+
+class TouchError(PlanningError):
+    """An arm touched something on its way; `touch` is what it felt."""
+
+    def __init__(self, message: str, touch: "Touch") -> None:
+        super().__init__(CauseCode.MOTION_BLOCKED, message)
+        self.touch = touch
 
 
 class GraspEmptyError(PlanningError):

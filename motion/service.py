@@ -1,7 +1,8 @@
 """What the leaves of every task ask of the arms: plan, wait for the plan's latency, follow, stop.
 
 Each method returns a `MotionRequest` at once; `poll` it every tick. Nothing here reads a wall clock: a plan costs its
-stated latency on the simulated clock.
+stated latency on the simulated clock. Arguments with numbers that are not finite, or of another shape than is said, are
+refused with a ValueError at once; what an arm cannot do, with a PlanningError by `poll`.
 """
 
 from collections.abc import Callable, Collection, Generator, Iterator, Mapping, Sequence
@@ -15,14 +16,16 @@ from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.cell import Box, KnownCell
 from regrasp.interfaces.devices import Arm, Clock, Gripper
 from regrasp.interfaces.request import Request
+from regrasp.motion.arguments import finite_pose, not_negative, positive, rows, share, vector
 from regrasp.motion.execution import Execution, ExecutionParameters
-from regrasp.motion.failure import PlanningError
+from regrasp.motion.failure import PlanningError, TouchError
 from regrasp.motion.grasping.approach import Cylinder, PickParameters, find_approaches, pick_candidates, points_beyond
 from regrasp.motion.grasping.grasps import Grasp
 from regrasp.motion.planning.planner import PlannerParameters, plan
 from regrasp.motion.planning.straight import can_continue, straight_line
 from regrasp.motion.request import MotionRequest
 from regrasp.motion.robots.arm_offsets import JointOffsetParameters, joint_offsets
+from regrasp.motion.robots.dynamics import ArmDynamics
 from regrasp.motion.scene.collision import Clearances, CollisionModel
 from regrasp.motion.scene.planning_scene import NO_POINTS, PlanningScene, PlanningSceneParameters
 
@@ -35,6 +38,7 @@ class MotionParameters:
     """The parameters of all parts of the motion service."""
 
     approach_speed: float = 0.3  # share of the joints' speed on straight paths near things; choice
+    touches: int = 6  # that end a motion; after each before it the arm goes on by another way; choice
     camera_timeout: float = 1.0  # s that a camera has to show the arm; a sound one needs 0.2
     clearances: Clearances = field(default_factory=Clearances)
     execution: ExecutionParameters = field(default_factory=ExecutionParameters)
@@ -61,9 +65,11 @@ class Motion(PlanningScene):
         self.parameters = parameters
         self.planner = plan
         chains = {name: kin.chain for name, kin in self.kinematics.items()}
+        dynamics = {spec.name: ArmDynamics(spec.robot, spec.world_from_base) for spec in known.arms}
         self.execution = Execution(
-            arms, grippers, chains, clock, known.latencies.plan, parameters.execution, on_anomaly
+            arms, grippers, chains, dynamics, clock, known.latencies.plan, parameters.execution, on_anomaly
         )
+        self._on_anomaly, self._guard = on_anomaly, parameters.execution.guard
         self._clock, self._seed = clock, seed
 
     def warm_up(self) -> None:
@@ -76,12 +82,14 @@ class Motion(PlanningScene):
 
         `tight`: with a smaller margin where nothing else is found.
         """
+        goals = rows("the goals' joints", goals, len(self.kinematics[arm]))
+        _check_margin(margin)
 
         def steps() -> Iterator[None]:
             path = self._plan(self.start_model(arm), self.joints(arm), goals, margin, tight)
             yield from self.execution.follow(arm, path, 1.0)
 
-        return self.execution.request(arm, steps())
+        return self.execution.request(arm, self._past_touches(arm, steps))
 
     def move_tool(
         self,
@@ -95,6 +103,9 @@ class Motion(PlanningScene):
 
         From there the tool must also reach the poses `onward` (goal_from_tool) in straight lines.
         """
+        for pose in (world_from_tool, *onward):
+            finite_pose("the tool's pose", pose)
+        _check_margin(margin)
 
         def steps() -> Iterator[None]:
             kin, q = self.kinematics[arm], self.joints(arm)
@@ -102,7 +113,12 @@ class Motion(PlanningScene):
 
             def path_to(ends: FloatArray) -> FloatArray:
                 goals = [end for end in ends if can_continue(kin, end, onward)]
-                return self._plan(model, q, np.array(goals).reshape(-1, len(kin)), margin)
+                try:
+                    return self._plan(model, q, np.array(goals).reshape(-1, len(kin)), margin)
+                except PlanningError:
+                    if goals:
+                        raise
+                    raise self._unreachable(arm, world_from_tool.translation, len(ends)) from None
 
             try:
                 path = path_to(kin.ik(world_from_tool, q))
@@ -112,21 +128,25 @@ class Motion(PlanningScene):
                 path = path_to(kin.ik(world_from_tool))
             yield from self.execution.follow(arm, path, 1.0)
 
-        return self.execution.request(arm, steps())
+        return self.execution.request(arm, self._past_touches(arm, steps))
 
     def sleep(self, arm: str) -> MotionRequest:
         """Bring an arm to its sleep pose, out of the cameras' and the other arms' way."""
         return self.move(arm, np.array([self.known.arm(arm).sleep]))
 
-    def straight(self, arm: str, goal: RigidTransform, *, speed: float | None = None) -> MotionRequest:
+    def straight(
+        self, arm: str, goal: RigidTransform, *, speed: float | None = None, pressing: bool = False
+    ) -> MotionRequest:
         """Move the tool in a straight line to `goal` (world_from_tool). Whether the way is free is not checked.
 
-        `speed` in (0, 1] of the joints' limits; default: `approach_speed`.
+        `speed` in (0, 1] of the joints' limits; default: `approach_speed`. `pressing`: it shall touch something there.
         """
+        finite_pose("the tool's pose", goal)
+        of_limits = share("the speed", self.parameters.approach_speed if speed is None else speed)
 
         def steps() -> Iterator[None]:
             path = straight_line(self.kinematics[arm], self.joints(arm), goal)
-            yield from self.execution.follow(arm, path, self.parameters.approach_speed if speed is None else speed)
+            yield from self.execution.follow(arm, path, of_limits, self._guard.pressing if pressing else None)
 
         return self.execution.request(arm, steps())
 
@@ -141,18 +161,20 @@ class Motion(PlanningScene):
         """Move the tool straight by `displacement` (3,) m in the world, without turning it.
 
         `checked`: only if the arm meets nothing but the boxes `without`. A motion that begins in a box cannot be
-        checked.
+        checked; there the arm may press or pull.
         """
+        way = vector("the displacement", displacement)
 
         def steps() -> Iterator[None]:
             kin, q = self.kinematics[arm], self.joints(arm)
             tool = kin.tool(q)
-            goal = RigidTransform.from_components(tool.translation + displacement, tool.rotation)
+            goal = RigidTransform.from_components(tool.translation + way, tool.rotation)
             path = straight_line(kin, q, goal)
             model = self.start_model(arm, without=without)
             if checked:
-                self._check_shift(model, path, float(np.linalg.norm(displacement)))
-            yield from self.execution.follow(arm, path, self.parameters.approach_speed)
+                self._check_shift(model, path, float(np.linalg.norm(way)))
+            contact = None if checked else self._guard.pressing
+            yield from self.execution.follow(arm, path, self.parameters.approach_speed, contact)
 
         return self.execution.request(arm, steps())
 
@@ -174,14 +196,22 @@ class Motion(PlanningScene):
         straight way it may touch the boxes `without`. Before that it is corrected by the `point_cloud` that a camera
         sees of it.
         """
+        finite_pose("the cylinder's pose", world_from_cylinder)
+        near_points = None if clear_of is None else rows("the points to keep clear of", clear_of, 3)
 
         def steps() -> Iterator[None]:
             q, jaw = self.joints(arm), self.parameters.execution.jaw
-            self._keep_clear_but_near(clear_of, world_from_cylinder.translation)
+            self._keep_clear_but_near(near_points, world_from_cylinder.translation)
             model = self.start_model(arm, opening=jaw.open_gap)
             widest = self.known.arm(arm).robot.gripper.opening
             candidates = pick_candidates(world_from_cylinder, cylinder, shallow, widest, self.parameters.pick)
-            approaches = self._approaches(arm, model, candidates, without)
+            try:
+                approaches = self._approaches(arm, model, candidates, without)
+            except PlanningError as error:
+                if error.code is not CauseCode.OUT_OF_REACH:
+                    raise
+                where = self._how_far(arm, world_from_cylinder.translation)
+                raise PlanningError(error.code, f"{error} of the {arm} arm: {where}") from None
             self.grippers[arm].open(jaw.open_gap)
             path = self._plan(model, q, np.array([approach[0] for approach in approaches]))
             approach = min(approaches, key=lambda approach: float(np.abs(approach[0] - path[-1]).max()))
@@ -194,7 +224,7 @@ class Motion(PlanningScene):
             yield from self.execution.follow(arm, approach, self.parameters.approach_speed)
             self.keep_clear(NO_POINTS)
 
-        return self.execution.request(arm, steps())
+        return self.execution.request(arm, self._past_touches(arm, steps))
 
     def close(self, arm: str, thickness: float) -> Request[float]:
         """Close the jaw on a thing of `thickness` m; the answer is the gap (m) between the pads that hold it.
@@ -202,6 +232,7 @@ class Motion(PlanningScene):
         It fails with GraspEmptyError when it closes on nothing, with GRIPPER_FAILED when it does not move. When it is
         cancelled the jaw keeps its force.
         """
+        positive("the thickness", thickness)
         return Request(self.execution.close_jaw(arm, thickness))
 
     def open_jaw(self, arm: str) -> None:
@@ -210,6 +241,7 @@ class Motion(PlanningScene):
 
     def release(self, arm: str, gap: float) -> MotionRequest:
         """Open the jaw; done once it stands `gap` m open."""
+        not_negative("the gap", gap)
         return self.execution.request(arm, self.execution.open_jaw(arm, gap))
 
     def stop(self) -> None:
@@ -220,6 +252,33 @@ class Motion(PlanningScene):
     def give_up(self, arm: str, code: str, message: str) -> PlanningError:
         """Disable an arm or its jaw: every later request to it fails with this cause. Returns the error to raise."""
         return self.execution.give_up(arm, code, message)
+
+    def _past_touches(self, arm: str, steps: Callable[[], Iterator[None]]) -> Iterator[None]:
+        """The steps, from the beginning after each touch, with what was felt on the map. Raises the last TouchError."""
+        for left in range(self.parameters.touches - 1, -1, -1):
+            try:
+                yield from steps()
+            except TouchError as error:
+                place = self.feel(arm, error.touch)
+                if not left:
+                    raise
+                self._on_anomaly(f"felt at {place.round(3).tolist()}: the {arm} arm looks for another way")
+            else:
+                return
+
+    def _unreachable(self, arm: str, place: FloatArray, ends: int) -> PlanningError:
+        """The error for a pose of the tool at `place` (3,) m that `ends` joint angles reach, none with a way on."""
+        if ends:
+            why = f"{ends} joint angles bring the {arm} arm's tool there, but from none it can go straight on"
+        else:
+            why = f"no joint angles bring the {arm} arm's tool there: {self._how_far(arm, place)}"
+        return PlanningError(CauseCode.OUT_OF_REACH, why)
+
+    def _how_far(self, arm: str, place: FloatArray) -> str:
+        """How far a place (3,) m is from an arm's base, in words."""
+        kin = self.kinematics[arm]
+        distance = float(np.linalg.norm(place - kin.base[:3, 3]))
+        return f"{distance:.2f} m from its base, and its links measure {kin.reach:.2f} m"
 
     def _check_shift(self, model: CollisionModel, path: FloatArray, length: float) -> None:
         """Raises PlanningError MOTION_BLOCKED with the nearest thing unless a path of `length` m is free."""
@@ -273,3 +332,8 @@ class Motion(PlanningScene):
     def _next_seed(self) -> int:
         self._seed += 1
         return self._seed
+
+
+def _check_margin(margin: float | None) -> None:
+    if margin is not None:
+        not_negative("the margin", margin)

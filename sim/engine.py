@@ -47,6 +47,10 @@ class Engine:
         """Switch off collisions of a link (-1: the base) with the base of another body."""
         p.setCollisionFilterPair(body, other, link, -1, 0, physicsClientId=self.client)
 
+    def let_meet(self, body: int, link: int, other: int) -> None:
+        """Undo `let_pass`."""
+        p.setCollisionFilterPair(body, other, link, -1, 1, physicsClientId=self.client)
+
     def close(self) -> None:
         """Disconnect the client."""
         self._disconnect()

@@ -1,5 +1,7 @@
 """The scene of a world: what stands still in it, and its props."""
 
+from dataclasses import dataclass
+
 import pybullet as p
 from scipy.spatial.transform import RigidTransform, Rotation
 
@@ -9,6 +11,18 @@ from regrasp.interfaces.scene import Obstacle, SceneSetup
 from regrasp.sim.bodies import OUT_OF_SIGHT, build_box, build_prop
 from regrasp.sim.engine import Engine
 from regrasp.sim.objects import TaskObjects
+
+
+@dataclass(frozen=True)
+class FoamParameters:
+    """How the foam of the obstacles presses back: a spring and a damper at each point of contact.
+
+    A soft polyurethane foam (50 to 100 kPa) 8 cm thick has 1.5 to 6 kN/m under 25 to 50 cm2 of a hand, which touches it
+    at four points.
+    """
+
+    stiffness: float = 1000.0  # N/m
+    damping: float = 5.0  # N s/m; choice: 3 N at 0.6 m/s
 
 
 class Scene:
@@ -21,8 +35,15 @@ class Scene:
         ValueError: a body of the task has the name of a box.
     """
 
-    def __init__(self, engine: Engine, known: KnownCell, objects: TaskObjects, setup: SceneSetup) -> None:
-        self._client = engine.client
+    def __init__(
+        self,
+        engine: Engine,
+        known: KnownCell,
+        objects: TaskObjects,
+        setup: SceneSetup,
+        foam: FoamParameters = FoamParameters(),
+    ) -> None:
+        self._client, self._foam = engine.client, foam
         boxes = {box.name: build_box(self._client, box) for box in known.boxes}
         of_task = objects.build_fixed(engine)
         if twice := boxes.keys() & of_task.keys():
@@ -52,5 +73,12 @@ class Scene:
             turn = Rotation.from_euler("z", obstacle.yaw)
             for box in (obstacle.box, obstacle.stand):
                 if box is not None:
-                    bodies[f"obstacle {box.name}"] = build_box(self._client, box, turn)
+                    body = bodies[f"obstacle {box.name}"] = build_box(self._client, box, turn)
+                    p.changeDynamics(
+                        body,
+                        -1,
+                        contactStiffness=self._foam.stiffness,
+                        contactDamping=self._foam.damping,
+                        physicsClientId=self._client,
+                    )
         return bodies

@@ -131,7 +131,7 @@ def _json(record: "RunRecord") -> str:
     from regrasp.app.records.history import attempts
     from regrasp.app.records.result import plain
 
-    result = asdict(record.result) if record.result else None
+    result = record.result.values() if record.result else None
     value: dict[str, Any] = {"run": record.begin, "result": result, "remarks": record.remarks}
     if result is None:
         value["attempts"] = [asdict(attempt) for attempt in attempts(record)]

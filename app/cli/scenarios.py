@@ -1,14 +1,20 @@
 """`regrasp scenarios`: list, check and show scenarios."""
 
 import json
-from typing import Annotated
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from regrasp.app.cli.options import Sets
+from regrasp.app.cli.options import Sets, parse_seeds
 from regrasp.app.files.findings import Finding, Findings, shown
 from regrasp.app.files.resources import shipped
 from regrasp.interfaces.quote import printable
+
+if TYPE_CHECKING:
+    from regrasp.app.scenario.scene_draw import Drawn
 
 app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="List, check and show scenarios.")
 Name = Annotated[str, typer.Argument(help="A shipped scenario's name, or a path to a .yaml file.")]
@@ -91,6 +97,59 @@ def show_scenario(
     typer.echo(
         yaml.safe_dump(content, sort_keys=False, allow_unicode=True, default_flow_style=None, width=120).rstrip()
     )
+
+
+@app.command("draw")
+def draw_scenes(
+    scenario: Name,
+    seeds: Annotated[str, typer.Option(metavar="A:B", help="From A to B, B left out.")] = "0:10",
+    sets: Sets = None,
+    pictures: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Write what the first camera sees of each, too, as JPEG.")
+    ] = None,
+) -> None:
+    """Draw scenes of a scenario that has `draw`, without a run.
+
+    A line for each case and seed: how many blocks, and what was thrown away before; then how much that was of all.
+
+    \b
+    Examples:
+      regrasp scenarios draw random_scene --seeds 0:20
+      regrasp scenarios draw random_scene --seeds 0:5 --set gravity=earth --pictures runs/scenes
+
+    \b
+    Exit code: 0, or 2 when a scene cannot be drawn.
+    """
+    from regrasp.app.records.folders import folder_name
+    from regrasp.app.records.summary import thrown_words
+    from regrasp.app.scenario.load import cases
+    from regrasp.app.scenario.scene_draw import Drawn, drawn
+
+    numbers, loaded = parse_seeds(seeds), cases(scenario, sets or [])
+    if loaded[0].file.draw is None:
+        raise Findings([Finding(shown(loaded[0].path), 0, "it has no draw; write what the seed shall draw")])
+    found: list[Drawn] = []
+    for case in loaded:
+        for seed in numbers:
+            found.append(scene := drawn(case, seed))
+            blocks = len(scene.scenario.file.obstacles)
+            told = f"{case.title}, seed {seed}: {blocks} block{'s' if blocks != 1 else ''}"
+            typer.echo(printable(f"{told}; {thrown_words(scene.thrown_away or {})}"))
+            if pictures is not None:
+                from regrasp.app.frames.snapshot import write_picture
+
+                pictures.mkdir(parents=True, exist_ok=True)
+                camera = case.cell.known.cameras[0].name
+                write_picture(scene.scenario, seed, camera, pictures / f"{folder_name(case.case)}-{seed}.jpg")
+    typer.echo(f"{len(found)} scenes drawn; {thrown_words(_summed(found))}")
+
+
+def _summed(found: "Sequence[Drawn]") -> dict[str, Counter[str]]:
+    summed: dict[str, Counter[str]] = {}
+    for scene in found:
+        for kind, reasons in (scene.thrown_away or {}).items():
+            summed.setdefault(kind, Counter()).update(reasons)
+    return summed
 
 
 @app.command("schema")

@@ -29,6 +29,8 @@ _UNITS = dict.fromkeys(_LENGTHS.split(), _METRES) | {  # by the name of the key 
     "hold_force": "newtons, such as 15.0",
     "max_force": "newtons, such as 40.0",
     "yaw_deg": "degrees, such as 30.0",
+    "hue_deg": "degrees, such as 280.0",
+    "tilt_deg": "degrees, such as 30.0",
     "angle_deg": "degrees, such as 5.0",
     "detection_delay": "seconds, such as 0.5",
     "sleep": "radians, such as 0.8",

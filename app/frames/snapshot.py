@@ -31,6 +31,17 @@ def write_snapshot(scenario: Scenario, camera: str, count: int, out: Path) -> No
         write_camera_pose(out / "camera_pose.yaml", spec.mount.world_from_camera)
 
 
+def write_picture(scenario: Scenario, seed: int, camera: str, out: Path) -> None:
+    """Write the first colour picture of a camera to the file `out`, as JPEG. Raises OSError."""
+    world = build_world(scenario, seed)
+    try:
+        while (frame := world.cameras[camera].latest()) is None:
+            world.advance(world.step_seconds)
+    finally:
+        world.close()
+    write_whole(out, cv2.imencode(".jpg", cv2.cvtColor(frame.rgb, cv2.COLOR_RGB2BGR))[1].tobytes())
+
+
 def write_frame(out: Path, frame: RgbdFrame, suffix: str = "") -> None:
     """Write rgb.png, depth.png (16 bit, millimetres) and intrinsics.yaml to a folder. Raises OSError."""
     out.mkdir(parents=True, exist_ok=True)

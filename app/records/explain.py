@@ -30,8 +30,16 @@ def _finished(record: RunRecord, result: Result, width: int) -> Iterator[str]:
     yield from _section(words_of(result.task).measured_title, [*measured_lines(result)])
     if result.belief:
         yield from _section("What the robot knew at the end", [*_belief(result)])
+    yield from _section("What an arm touched", [*_touches(record)])
     yield from _section("What was expected", expectation_lines(result))
     yield from _section("Traceback", (result.traceback or "").splitlines())
+
+
+def _touches(record: RunRecord) -> Iterator[str]:
+    """When, in which leaf and how hard an arm touched what it must not; a pair again each time its force doubled."""
+    for event in record.events:
+        if event.event == "unintended touch":
+            yield f"{event.t:8.2f}  {event.node or '-'}  {event.values['what']}, {event.values['force']} N"
 
 
 def _unfinished(record: RunRecord, width: int, last_events: int) -> Iterator[str]:

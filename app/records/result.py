@@ -92,10 +92,19 @@ class Result:
     versions: dict[str, str] = dataclasses.field(default_factory=versions)
     belief: dict[str, Any] | None = None  # what the robot knew at the end, no ground truth; the task says what
     attempts: tuple[Attempt, ...] = ()
+    # Of a scene that the seed drew: how often what was thrown away before it, by reason.
+    thrown_away: dict[str, dict[str, int]] | None = None
+
+    def values(self) -> dict[str, Any]:
+        """What result.json holds, before it is written; `thrown_away` only of a scene that the seed drew."""
+        values = dataclasses.asdict(self)
+        if self.thrown_away is None:
+            del values["thrown_away"]
+        return values
 
     def to_json(self) -> str:
         """The text of result.json; inf and nan, which JSON cannot state, become null."""
-        return json.dumps(plain(dataclasses.asdict(self)), indent=2, allow_nan=False) + "\n"
+        return json.dumps(plain(self.values()), indent=2, allow_nan=False) + "\n"
 
 
 def plain(value: Any) -> Any:

@@ -22,6 +22,8 @@ def run_summary(result: "Result", folder: Path) -> str:
         lines.append(f"  cause   {result.cause.code}: {result.cause.message}{at}")
     lines += [f"  {line}" for line in expectation_lines(result)]
     lines += [f"  {words_of(result.task).measured:<7} {line}" for line in measured_lines(result)]
+    if result.thrown_away is not None:
+        lines.append(f"  scene   {thrown_words(result.thrown_away)}")
     lines.append(f"  record  {folder}")
     lines.append(
         f"  time    {result.sim_seconds:.1f} s simulated in {result.wall_seconds:.1f} s, "
@@ -29,6 +31,15 @@ def run_summary(result: "Result", folder: Path) -> str:
     )
     lines += [f"  went to {line}" for line in wall_lines(result)]
     return "\n".join(map(printable, lines))  # a cause may quote an exception
+
+
+def thrown_words(thrown_away: Mapping[str, Mapping[str, int]]) -> str:
+    """What was thrown away before a scene was kept: how many of each kind, and why, the most frequent reason first."""
+    told = []
+    for kind, reasons in thrown_away.items():
+        why = ", ".join(f"{count} {reason}" for reason, count in sorted(reasons.items(), key=lambda item: -item[1]))
+        told.append(f"{sum(reasons.values())} {kind} thrown away" + (f" ({why})" if why else ""))
+    return "; ".join(told)
 
 
 def wall_lines(result: "Result") -> Iterator[str]:

@@ -4,19 +4,18 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-import numpy as np
 import py_trees
 
 from regrasp.app.run.attempts import Attempts
 from regrasp.app.run.fault_injection import break_services
 from regrasp.app.scenario.load import Scenario
-from regrasp.app.scenario.sampling import draw_faults, draw_obstacles
+from regrasp.app.scenario.sampling import scene_setup
+from regrasp.app.scenario.scene_draw import drawn
 from regrasp.app.task.judge import Judge
 from regrasp.app.task.task import Task
 from regrasp.behaviors import registry
 from regrasp.behaviors.keys import causes
 from regrasp.behaviors.services import Services
-from regrasp.interfaces.scene import SceneSetup
 from regrasp.motion.service import Motion
 from regrasp.perception.service import Perception
 from regrasp.sim.render.renderer import RendererName
@@ -39,13 +38,14 @@ class Episode:
 
 
 def build_world(scenario: Scenario, seed: int, renderer: RendererName = "software", gui: bool = False) -> World[Any]:
-    """The scenario's world for this seed. The caller closes it."""
-    rng = np.random.default_rng([seed, 0])
-    obstacles = draw_obstacles(scenario.file, rng)
-    faults = draw_faults(scenario.file, rng)
-    cell = scenario.lit_cell
+    """The scenario's world for this seed. The caller closes it.
+
+    Raises `Findings` if the scenario leaves its scene to the seed, and none can be solved.
+    """
+    scenario = drawn(scenario, seed).scenario
+    cell, setup = scenario.lit_cell, scene_setup(scenario.file, seed)
     objects = scenario.task.objects()(cell)
-    return World(cell, scenario.file.gravity, seed, objects, SceneSetup(obstacles, faults), renderer, gui)
+    return World(cell, scenario.file.gravity, seed, objects, setup, renderer, gui)
 
 
 def build_services(world: World[Any], seed: int, log: Any) -> Services:
@@ -74,7 +74,7 @@ def connected(
         grippers,
         world,
         seed * 1000,
-        on_anomaly=lambda sentence: log.warning("does not follow", why=sentence),
+        on_anomaly=lambda sentence: log.warning("anomaly", why=sentence),
     )
     arms.warm_up()
     sight = perception(known, world.cameras, world, arms.camera_pose, arms.spheres)

@@ -4,7 +4,7 @@ import gc
 import traceback
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +24,7 @@ from regrasp.app.run.signals import engine_signals
 from regrasp.app.run.tick_log import TickLog, active_leaf, note_leaf_at_work, running_leaf
 from regrasp.app.scenario.copies import copies
 from regrasp.app.scenario.load import Scenario
+from regrasp.app.scenario.scene_draw import drawn
 from regrasp.app.task.expectation import Expectation
 from regrasp.app.task.signals import SignalGroup
 from regrasp.behaviors.keys import causes
@@ -62,11 +63,21 @@ def run_episode(
     `pictures`: the record has the cameras' frames at events, too. A KeyboardInterrupt, inside a leaf or from an
     observer, ends the run cleanly. An exception inside a leaf ends it with the cause `internal_error`, and its
     traceback goes into the record.
+
+    Raises `Findings` if the scenario leaves its scene to the seed, and none can be solved.
     """
     with (
         measured("start") as wall,
-        Record(out, scenario.name, seed, scenario.case, copies(scenario, seed), scenario.file.TASK) as record,
+        Record(
+            out,
+            scenario.name,
+            seed,
+            scenario.case,
+            copies((scene := drawn(scenario, seed)).scenario, seed),
+            scenario.file.TASK,
+        ) as record,
     ):
+        scenario = scene.scenario
         world = build_world(scenario, seed, renderer, gui)
         try:
             key_frames = Pictures(out if pictures else None, world)
@@ -90,6 +101,7 @@ def run_episode(
                 overrides=[o for o in scenario.overrides if not o.startswith("seed=")],
                 renderer=world.renderer.name,
                 renderer_device=world.renderer.device,
+                **({} if scene.thrown_away is None else {"thrown_away": scene.thrown_away}),
             )
             episode = assemble(scenario, world, seed, log)
             observers.assembled(episode)
@@ -110,6 +122,7 @@ def run_episode(
             ticks.finalise()
             episode.attempts.finalise()
             result = _result(episode, scenario, seed, ending, wall, log)
+            result = replace(result, thrown_away=scene.thrown_away)
             peaks = {pair: round(force, 2) for pair, force in world.contact_peaks.items()}  # N
             log.info("end", outcome=result.outcome, succeeded=result.succeeded, contact_peaks=peaks)
             record.finish(result)
@@ -173,6 +186,9 @@ def _loop(episode: Episode, scenario: Scenario, film: Film, on_tick: Progress, w
         episode.tree.tick()
         episode.judge.observe(world.now())
         leaf = active_leaf(root)
+        for pair, force in episode.judge.new_touches():
+            node = _path(running_leaf(root), root)
+            episode.services.log.warning("unintended touch", node=node, what=pair, force=round(force, 1))
         film.show(leaf)
         on_tick(world.now(), leaf)
         raise_if_swallowed()

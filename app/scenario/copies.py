@@ -14,6 +14,8 @@ def copies(scenario: Scenario, seed: int) -> dict[str, str]:
     """The text by file name of scenario.yaml, cell.yaml and tree.xml; the first names the others."""
     values = scenario.file.model_dump(mode="json") | {"cell": "cell.yaml", "tree": "tree.xml", "seed": seed}
     values["task"] = scenario.file.TASK
+    if scenario.file.draw is None:
+        del values["draw"]
     return {
         "scenario.yaml": _yaml(values),
         "cell.yaml": _yaml(scenario.cell.model_dump(mode="json")),

@@ -180,13 +180,13 @@ class _Source:
         warn_of_old_words(document, task.old_outcomes if task else {})
         file = self._read(case, document, {a.path[0] for a in assignments}, self._model(task))
         cell, tree = self._cell_and_tree(case, document, of_cell, task)
-        inputs, obstacles, faults = (
-            repr(value_at(document.value, (key,))) for key in ("inputs", "obstacles", "faults")
+        inputs, obstacles, faults, draw = (
+            repr(value_at(document.value, (key,))) for key in ("inputs", "obstacles", "faults", "draw")
         )
         self._once(case, check_tree_inputs, (tree, inputs, id(cell)), document, tree, cell, task)
         self._once(case, check_names, (tree, obstacles, faults, id(cell), task), document, tree, cell, task)
         gravity = repr(value_at(document.value, ("gravity",)))
-        self._once(case, check_obstacles, (obstacles, gravity, id(cell)), document, cell, task)
+        self._once(case, check_obstacles, (obstacles, draw, gravity, id(cell)), document, cell, task)
         if not (file and cell and tree):
             return None
         name = self.path.name.removesuffix(".yaml").removesuffix(".scenario")

@@ -65,12 +65,17 @@ def _misplaced(
 ) -> Iterator[Finding]:
     obstacles = validated_part(document, ("obstacles",), _LIST)
     seen = set()
+    drawn = validated_part(document, ("draw", "obstacles"), _LIST) or ()
+    kinds = {f"{kind.get('name')}_" for kind in drawn if isinstance(kind, dict)}
     for i in range(len(obstacles or [])):
         here: Path = ("obstacles", i)
         name = validated_part(document, (*here, "name"), _TEXT)
         if name is not None and name in seen:
             yield Finding(*document.place((*here, "name")), f"two obstacles {quoted(name)}; rename one")
         seen.add(name)
+        if name is not None and name.rstrip("0123456789") in kinds:
+            message = f"obstacle {quoted(name)} bears the name of a drawn one; rename one"
+            yield Finding(*document.place((*here, "name")), message)
         who = "obstacle" + (f" {quoted(name)}" if name is not None else "")
         jitter = validated_part(document, (*here, "jitter"), _JITTER) or (0.0, 0.0, 0.0)  # none if it is wrong
         size = validated_part(document, (*here, "size"), _SIZE)
@@ -81,7 +86,7 @@ def _misplaced(
                 yield Finding(*place, f"{who} reaches {deep:.3f} m below the floor; raise it to 0")
             if size is not None and yaw_deg is not None and cell is not None:
                 bottom = JitteredBox(np.array(spot), size, yaw_deg, jitter)
-                for what, body, depth in _entered(cell, task, gravity, _with_stand(bottom, stands), parameters):
+                for what, body, depth in entered(cell, task, gravity, with_stand(bottom, stands), parameters):
                     message = f"{who}{what} reaches {depth:.3f} m into {cut(body)}; move it, or jitter it less"
                     yield Finding(*place, message)
 
@@ -97,7 +102,10 @@ def _spots(document: Document, obstacle: Path) -> Iterator[tuple[Path, Vector, G
             yield (*either, gravity), spot, gravity
 
 
-def _with_stand(piece: JitteredBox, stands: StandParameters) -> dict[str, JitteredBox]:
+def with_stand(
+    piece: JitteredBox,
+    stands: StandParameters = StandParameters(),  # noqa: B008 - it does not change
+) -> dict[str, JitteredBox]:
     """A piece, whose `center` is here that of its bottom, and its stand if it has one, by what messages call them."""
     x, y, bottom = piece.center.tolist()
     boxes = {"": replace(piece, center=np.array([x, y, bottom + 0.5 * piece.size[2]]))}
@@ -107,14 +115,17 @@ def _with_stand(piece: JitteredBox, stands: StandParameters) -> dict[str, Jitter
     return boxes
 
 
-def _entered(
+def entered(
     cell: Cell,
     task: "Task | None",
     gravity: Gravity | None,
     boxes: Mapping[str, JitteredBox],
-    parameters: PlacementParameters,
+    parameters: PlacementParameters = PlacementParameters(),
 ) -> Iterator[tuple[str, str, float]]:
-    """Which of the boxes (by name) reaches into which other body, and how deep (m); each body once."""
+    """Which of the boxes (by name) reaches into which other body, and how deep (m); each body once.
+
+    Without a known gravity (None) what hangs is left out.
+    """
     told = set()
     for what, box in boxes.items():
         for body, depth in [

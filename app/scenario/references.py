@@ -12,6 +12,7 @@ from regrasp.app.files.validation import validated_part
 from regrasp.app.files.yaml_lines import Document
 from regrasp.app.scenario.schema import TreeInput
 from regrasp.app.scenario.tree_file import names_of
+from regrasp.app.task.expect import CellName
 from regrasp.behaviors.registry import Leaves, leaves_of
 from regrasp.interfaces.cell import Cell
 from regrasp.interfaces.fault import JawFault
@@ -44,8 +45,12 @@ def check_tree_inputs(document: Document, tree: Path | None, cell: Cell | None, 
 
 
 def check_names(document: Document, tree: Path | None, cell: Cell | None, task: "Task | None") -> None:
-    """Raises `Findings` if faults name obstacles, arms, cameras, or nodes of the tree, that do not exist."""
-    if found := [*_obstacles(document), *_devices(document, cell), *_nodes(document, tree, task)]:
+    """Raises `Findings` if faults name obstacles, arms, cameras, or nodes of the tree, that do not exist.
+
+    The same for what expectations name.
+    """
+    named = [*_obstacles(document), *_devices(document, cell), *_nodes(document, tree, task)]
+    if found := [*named, *_expected(document, cell, task)]:
         raise Findings(found)
 
 
@@ -98,6 +103,19 @@ def _nodes(document: Document, tree: Path | None, task: "Task | None") -> Iterat
             alike = [other for other in names if ("/" in other) == ("/" in name)]
             message = f"no node {quoted(name)} in {tree.name}; {nearest(name, alike)}"
             yield Finding(*document.place(("faults", i, "when", "node")), message)
+
+
+def _expected(document: Document, cell: Cell | None, task: "Task | None") -> Iterator[Finding]:
+    """Names of the cell that expectations hold."""
+    names = names_of(cell, task)
+    for key, field in ({} if task is None else task.expect().model_fields).items():
+        name = value_at(document.value, ("expect", key))
+        for kind in (mark.kind for mark in field.metadata if isinstance(mark, CellName)):
+            known = names.get(kind)
+            if known is None or not isinstance(name, str) or known.get(name) == "":
+                continue
+            wrong = f"{quoted(name)} {known[name]}" if name in known else f"no {quoted(name)}; {nearest(name, known)}"
+            yield Finding(*document.place(("expect", key)), f"expect.{key}: {wrong}")
 
 
 def _node_names(tree: Path, task: "Task | None") -> set[str]:

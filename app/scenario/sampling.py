@@ -8,7 +8,7 @@ from regrasp.app.scenario.schema import ScenarioFile
 from regrasp.interfaces.cell import Box
 from regrasp.interfaces.fault import Fault
 from regrasp.interfaces.fields import Color
-from regrasp.interfaces.scene import Obstacle
+from regrasp.interfaces.scene import Obstacle, SceneSetup
 
 
 @dataclass(frozen=True)
@@ -38,6 +38,13 @@ def draw_obstacles(
             stand = Box(name=f"{piece.name} stand", center=(x, y, bottom / 2), size=post, color=stands.color)
         drawn.append(Obstacle(box, float(np.deg2rad(piece.yaw_deg)), stand))
     return tuple(drawn)
+
+
+def scene_setup(file: ScenarioFile, seed: int) -> SceneSetup:
+    """What this seed adds to the cell: the obstacles where it puts them, and the faults with their beginnings."""
+    rng = np.random.default_rng([seed, 0])
+    obstacles = draw_obstacles(file, rng)
+    return SceneSetup(obstacles, draw_faults(file, rng))
 
 
 def draw_faults(file: ScenarioFile, rng: np.random.Generator) -> tuple[Fault, ...]:

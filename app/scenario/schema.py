@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, get_args
 from pydantic import AfterValidator, Field, JsonValue, create_model
 from pydantic.fields import FieldInfo
 
+from regrasp.app.task.draw import Draw
 from regrasp.app.task.expect import Expect
 from regrasp.app.task.find import task_named
 from regrasp.interfaces.cause import CauseCode
@@ -162,6 +163,13 @@ class ScenarioFile(Model):
             examples=[[{"name": "a", "size": [0.1, 0.1, 0.2], "position": [0, 0, 0]}]],
         ),
     ] = ()
+    draw: Annotated[
+        Draw | None,
+        Field(
+            description="What the seed draws besides; a scene that cannot be solved is thrown away.",
+            examples=[{"light": {"brightness": [0.6, 1.3]}}],
+        ),
+    ] = None
     light: Annotated[
         LightSpec, Field(description="The light in place of the cell's.", examples=[{"brightness": 0.5}])
     ] = LightSpec()
@@ -212,6 +220,7 @@ class ScenarioFile(Model):
 def unknown_task_model() -> type[ScenarioFile]:
     """The model of files whose task is not known yet: any faults and expectations."""
     fields: dict[str, Any] = {
+        "draw": (dict[str, Any] | None, ScenarioFile.model_fields["draw"]),
         "faults": (tuple[Any, ...], ScenarioFile.model_fields["faults"]),
         "expect": (dict[str, Any], _with_default(ScenarioFile.model_fields["expect"], {})),
     }
@@ -239,6 +248,7 @@ def scenario_model(task: "Task") -> type[ScenarioFile]:
     name.examples = [task.name]
     fields: dict[str, Any] = {
         "task": (str | None, name),
+        "draw": (task.draw() | None, ScenarioFile.model_fields["draw"]),
         "faults": (tuple[spec, ...], ScenarioFile.model_fields["faults"]),  # type: ignore[valid-type]
         "expect": (expect, _with_default(ScenarioFile.model_fields["expect"], expect())),
     }

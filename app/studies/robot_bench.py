@@ -21,7 +21,7 @@ from scipy.spatial.transform import RigidTransform
 from regrasp.app.campaigns.table import print_table
 from regrasp.app.files.resources import shipped
 from regrasp.app.robots.robot_file import load_robot
-from regrasp.app.studies.mesh_check import MeshCheck
+from regrasp.app.studies.mesh_check import MeshCheck, Surroundings
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cell import Box
 from regrasp.interfaces.robot.urdf import pose_of
@@ -161,7 +161,7 @@ def _planning(
     seconds, paths = _plan_all(model, ends, parameters.margin)
     touching = "coal is not installed"
     if find_spec("coal") is not None:
-        check = MeshCheck(kin, boxes)
+        check = MeshCheck(kin, Surroundings(boxes))
         touching = f"{sum(check.touches(path) for path in paths)} of {len(paths)}"
     median, most = (f"{1e3 * np.quantile(seconds, share):.1f}" for share in (0.5, 0.9))
     solved = f"{len(paths)} of {len(seconds)}"

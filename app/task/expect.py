@@ -1,12 +1,20 @@
 """What a scenario of any task may expect, as a pydantic model."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
 from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.fields import Model, NotNegative
+
+
+@dataclass(frozen=True)
+class CellName:
+    """Marks a field that holds a name of the cell, of a kind that the task's `cell_names` tell."""
+
+    kind: str
 
 
 class Expect(Model):

@@ -10,6 +10,8 @@ if TYPE_CHECKING:
     from regrasp.behaviors.services import Services
     from regrasp.sim.world import World
 
+LEAST_TOUCH = 1.0  # N; a weaker touch is not told
+
 ExpectT = TypeVar("ExpectT", bound=Expect)
 
 
@@ -18,6 +20,14 @@ class Judge(Generic[ExpectT]):
 
     def __init__(self, world: "World[Any]", services: "Services", expect: ExpectT) -> None:
         self.world, self.services, self.expect = world, services, expect
+        self._told: dict[str, float] = {}  # the forces of touches that were told, by their pairs
+
+    def new_touches(self) -> Iterator[tuple[str, float]]:
+        """The pairs whose greatest force (N) has doubled since they were told last; a weak touch is not told."""
+        for pair, force in self.world.contact_peaks.items():
+            if force > 2.0 * self._told.get(pair, 0.5 * LEAST_TOUCH):
+                self._told[pair] = force
+                yield pair, force
 
     def observe(self, now: float) -> None:
         """Look at the ground truth after a tick at second `now`."""

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from regrasp.app.files.findings import Finding
     from regrasp.app.files.yaml_lines import Document
+    from regrasp.app.task.draw import Draw
     from regrasp.app.task.expect import Expect
     from regrasp.app.task.judge import Judge
     from regrasp.app.task.signals import SignalGroup
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from regrasp.behaviors.services import Services
     from regrasp.interfaces.cell import Cell
     from regrasp.interfaces.fault import Fault, When
+    from regrasp.interfaces.scene import Gravity, SceneSetup
     from regrasp.sim.objects import TaskObjects
     from regrasp.sim.world import World
 
@@ -43,6 +45,10 @@ class Task:
     cell_names: Part["Callable[[Any | None], dict[str, dict[str, str]]]"] | None = None
     # What an obstacle, a `JitteredBox` in a cell and a gravity (None: unknown), overlaps: a name and a depth in m.
     obstacle_overlaps: Part["Callable[..., Iterable[tuple[str, float]]]"] | None = None
+    # The model of what a scenario's seed may draw.
+    draw: Part["type[Draw]"] = Part("regrasp.app.task.draw:Draw")
+    # Why a drawn scene, a cell with a gravity and a `SceneSetup`, cannot be solved, in a few words; "" if it can.
+    unsolvable: Part["Callable[[Any, Gravity, SceneSetup], str]"] | None = None
     expect: Part["type[Expect]"] = Part("regrasp.app.task.expect:Expect")
     causes: Part["Iterable[StrEnum]"] = Part("regrasp.app.task.part:NOTHING")  # of its leaves' failures
     when: Part["type[When]"] = Part("regrasp.interfaces.fault:When")

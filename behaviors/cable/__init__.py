@@ -8,6 +8,7 @@ from regrasp.behaviors.cable.look_closer import LookCloser
 from regrasp.behaviors.cable.monitor import Monitor
 from regrasp.behaviors.cable.recover import MakeRoom, WaitUntilStill
 from regrasp.behaviors.cable.regrasp import Regrasp
+from regrasp.behaviors.cable.replug import CarryToSocket, CheckSocket, LetGoOfPlug, LookAtPlug, Replug
 from regrasp.behaviors.cable.spiral_search import SpiralSearch
 from regrasp.behaviors.cable.stow import LetGo, LookAtStow
 from regrasp.behaviors.cable.unplug import Unplug
@@ -18,16 +19,21 @@ LEAVES: dict[str, type[WithServices]] = {
     leaf.__name__: leaf
     for leaf in (
         Carry,
+        CarryToSocket,
         CheckCameras,
+        CheckSocket,
         DetectSlip,
         Holding,
         Insert,
         LetGo,
+        LetGoOfPlug,
+        LookAtPlug,
         LookAtStow,
         LookCloser,
         MakeRoom,
         Monitor,
         Regrasp,
+        Replug,
         SpiralSearch,
         Unplug,
         UseTechnique,

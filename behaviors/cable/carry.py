@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-from regrasp.behaviors.cable.hand import HandLeaf
+from regrasp.behaviors.cable.hand import HandLeaf, LookInHand
 from regrasp.behaviors.cable.keys import HELD
 from regrasp.behaviors.keys import Keys
 from regrasp.behaviors.leaf import LeafSteps
@@ -27,31 +27,14 @@ class Carry(HandLeaf):
         yield self.services.motion.carry_to_clip(self.held())
 
 
-class Insert(HandLeaf):
+class Insert(LookInHand):
     """Looks how the connector lies in the hand, and brings it straight into the clip."""
 
     NEEDS: ClassVar[Keys] = (HELD,)
-    WRITES: ClassVar[Keys] = (HELD,)
     parameters: ClassVar[InsertParameters] = InsertParameters()
 
     def steps(self) -> LeafSteps:
         """See the class."""
-        yield from self._look()
+        yield from self.look_in_hand(self.parameters.look_time)
         yield self.services.motion.insert(self.held())
         yield from self.wait(self.parameters.seat_time)
-
-    def _look(self) -> LeafSteps:
-        """Correct the belief of how the connector lies in the hand by what the overview camera sees of it."""
-        motion, perception = self.services.motion, self.services.perception
-        # Only later frames: in this moment the hand may still move.
-        looked = yield from self.ask(perception.watch(self.overview, self.parameters.look_time, later=True))
-        seen = looked.estimates
-        held = self.read(HELD, None)
-        found = None if held is None else perception.in_hand(seen, motion.tool(self.hand), held)
-        if found is None:
-            self.say("the hand hides the connector", frames=len(seen))
-            return
-        shift, turn = round(found.shift, 4), round(found.turn_deg, 1)
-        self.say("connector in the hand", whole=found.whole, shift=shift, turn_deg=turn, trusted=found.trusted)
-        if found.trusted:
-            self.write(HELD, found.pose)

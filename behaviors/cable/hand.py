@@ -1,9 +1,10 @@
 """Steps that several of the cable's leaves share: looking, and what the hand does."""
 
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, ClassVar, TypeVar
 
 from regrasp.behaviors.cable.keys import HELD
 from regrasp.behaviors.cable.services import CableServices
+from regrasp.behaviors.keys import Keys
 from regrasp.behaviors.leaf import LeafFailed, LeafSteps, StepsLeaf
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cable.cause import CableCause
@@ -64,3 +65,30 @@ class HandLeaf(CableLeaf):
         why = yield from self.ask(self.services.motion.draw_back())
         if why:
             self.say("left out", why=why)
+
+
+class LookInHand(HandLeaf):
+    """A leaf that looks how the connector lies in the hand before it goes on."""
+
+    WRITES: ClassVar[Keys] = (HELD,)
+
+    def look_in_hand(self, seconds: float, least_turn_deg: float = 0.0) -> LeafSteps:
+        """Correct the belief of how the connector lies in the hand by what the overview camera sees of it.
+
+        A turn by less than `least_turn_deg` is taken for an error of the sight.
+        """
+        motion, perception = self.services.motion, self.services.perception
+        # Only later frames: in this moment the hand may still move.
+        looked = yield from self.ask(perception.watch(self.overview, seconds, later=True))
+        seen = looked.estimates
+        held = self.read(HELD, None)
+        found = None
+        if held is not None:
+            found = perception.in_hand(seen, motion.tool(self.hand), held, least_turn_deg=least_turn_deg)
+        if found is None:
+            self.say("the hand hides the connector", frames=len(seen))
+            return
+        shift, turn = round(found.shift, 4), round(found.turn_deg, 1)
+        self.say("connector in the hand", whole=found.whole, shift=shift, turn_deg=turn, trusted=found.trusted)
+        if found.trusted:
+            self.write(HELD, found.pose)

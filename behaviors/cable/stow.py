@@ -2,7 +2,7 @@
 
 from collections.abc import Generator
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from regrasp.behaviors.cable.hand import HandLeaf
 from regrasp.behaviors.cable.keys import HELD, NOTICES, LossNotice
@@ -12,8 +12,12 @@ from regrasp.behaviors.leaf import LeafFailed, LeafSteps
 from regrasp.interfaces.cable.cause import CableCause
 from regrasp.interfaces.cable.sight import Estimate
 from regrasp.interfaces.cause import CauseCode
+from regrasp.interfaces.evidence import Evidence
 from regrasp.interfaces.request import Request
 from regrasp.motion.failure import PlanningError
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import RigidTransform
 
 
 @dataclass(frozen=True)
@@ -41,6 +45,10 @@ class LetGo(HandLeaf):
         yield self.services.motion.let_go()
         self.clear(HELD)
         yield from self.wait(self.parameters.open_time)
+        yield from self.leave()
+
+    def leave(self) -> LeafSteps:
+        """Bring the open hand away."""
         yield from self.draw_back()
         yield self.services.motion.leave_clip()
 
@@ -53,7 +61,19 @@ class LookAtStow(LookLeaf):
 
     READS: ClassVar[Keys] = (NOTICES,)
     WRITES: ClassVar[Keys] = (NOTICES,)
+    PLACE: ClassVar[str] = "the clip"
+    STATE: ClassVar[str] = "stowed"
+    CAUSE: ClassVar[CableCause] = CableCause.NOT_STOWED
     parameters: ClassVar[LookAtStowParameters] = LookAtStowParameters()
+
+    @property
+    def seat(self) -> "RigidTransform":
+        """world_from_connector where it should be."""
+        return self.services.known.cable.clip.world_from_seat
+
+    def seated(self, estimate: Estimate) -> Evidence:
+        """Whether a connector seen so is there."""
+        return self.services.perception.stowed(estimate)
 
     def steps(self) -> LeafSteps:
         """See the class."""
@@ -63,20 +83,20 @@ class LookAtStow(LookLeaf):
         if trouble is not None:
             seen = yield from self._look_from_the_other(trouble)
         if not seen:
-            self._lost("no camera sees the connector at the clip")
+            self._lost(f"no camera sees the connector at {self.PLACE}")
         else:
-            evidence = perception.stowed(seen[-1])
-            self.say("looked at the clip", distance=round(evidence.value, 4), stowed=evidence.detected)
+            evidence = self.seated(seen[-1])
+            self.say(f"looked at {self.PLACE}", distance=round(evidence.value, 4), **{self.STATE: evidence.detected})
             if not evidence.detected:
                 self._lost(evidence.sentence)
 
     def _look_from_the_other(self, trouble: str) -> Generator[Request[None] | None, None, list[Estimate]]:
         motion, perception = self.services.motion, self.services.perception
-        self.say(f"the {self.search} camera looks at the clip", why=trouble)
+        self.say(f"the {self.search} camera looks at {self.PLACE}", why=trouble)
         if (other := perception.trouble(self.search)) is not None:
             raise LeafFailed(CauseCode.CAMERA_FAILED, f"{trouble}; {other}")
         try:
-            view = motion.best_view(self.services.known.cable.clip.world_from_seat)
+            view = motion.best_view(self.seat)
             looked = yield from self.go_and_look(view, self.parameters.look_time)
         except PlanningError as error:
             raise LeafFailed(
@@ -90,4 +110,4 @@ class LookAtStow(LookLeaf):
 
     def _lost(self, message: str) -> None:
         self.write(NOTICES, (*self.read(NOTICES), LossNotice(self.services.clock.now(), "place")))
-        raise LeafFailed(CableCause.NOT_STOWED, message)
+        raise LeafFailed(self.CAUSE, message)

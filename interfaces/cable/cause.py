@@ -10,4 +10,7 @@ class CableCause(StrEnum):
     CONNECTOR_NOT_FOUND = "connector_not_found"
     SEARCH_EXHAUSTED = "search_exhausted"
     NOT_STOWED = "not_stowed"
+    NOT_PLUGGED = "not_plugged"
+    CABLE_TOO_SHORT = "cable_too_short"
+    CABLE_TOO_LONG = "cable_too_long"
     NOT_STILL = "not_still"

@@ -40,3 +40,15 @@ class Grip:
 
     gap: float
     pose: "RigidTransform"
+
+
+@dataclass(frozen=True, eq=False)
+class PluggedIn:
+    """How a plug went in: at which of the `tries`, how far `across` (2,) m from where the socket was believed to be.
+
+    `strongest` is the greatest force in N that the hand felt on the way.
+    """
+
+    tries: int
+    across: FloatArray
+    strongest: float

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, Protocol
 
 from regrasp.interfaces.arrays import FloatArray
-from regrasp.interfaces.cable.motion import Grip, View, Viewpoint
+from regrasp.interfaces.cable.motion import Grip, PluggedIn, View, Viewpoint
 from regrasp.interfaces.cable.sight import Estimate, InHand, NoEstimate, Sightings, TrackHealth, TrackState
 from regrasp.interfaces.evidence import Evidence
 from regrasp.interfaces.request import Request
@@ -73,6 +73,22 @@ class CableMotionService(MotionService, Protocol):
 
     def leave_clip(self) -> Request[None]:
         """Bring the hand to its sleep pose without sweeping the stowed end out of its clip."""
+        ...
+
+    def check_socket(self, name: str) -> None:
+        """Raises PlanningError unless the cable lets its end lie in the socket of that name."""
+        ...
+
+    def carry_to_socket(self, held: "RigidTransform", name: str) -> Request[None]:
+        """Bring the held connector before the socket of that name."""
+        ...
+
+    def plug_in(self, held: "RigidTransform", name: str) -> Request[PluggedIn]:
+        """Push the held connector into the socket before it, by force feeling, until a gentle pull does not move it."""
+        ...
+
+    def leave_socket(self, name: str) -> Request[None]:
+        """Draw the open hand back from the plugged connector, and bring it to its sleep pose."""
         ...
 
     def search_views(self, last_seen: FloatArray | None) -> tuple[FloatArray, Iterator[Viewpoint]]:
@@ -155,8 +171,17 @@ class CablePerceptionService(PerceptionService, Protocol):
         """Whether a connector seen so lies in the clip."""
         ...
 
-    def in_hand(self, seen: Sequence[Estimate], tool: "RigidTransform", held: "RigidTransform") -> InHand | None:
-        """How the connector lies in the hand at `tool` that was believed to hold it so; None where too little shows."""
+    def plugged(self, estimate: Estimate, socket: str) -> Evidence:
+        """Whether a connector seen so lies in the socket of that name."""
+        ...
+
+    def in_hand(
+        self, seen: Sequence[Estimate], tool: "RigidTransform", held: "RigidTransform", *, least_turn_deg: float = 0.0
+    ) -> InHand | None:
+        """How the connector lies in the hand at `tool` that was believed to hold it so; None where too little shows.
+
+        A turn by less than `least_turn_deg` is taken for an error of the sight.
+        """
         ...
 
     def obstacles_beside(self, world_from_connector: "RigidTransform") -> tuple[FloatArray, float]:

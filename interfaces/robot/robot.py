@@ -18,6 +18,7 @@ from regrasp.interfaces.fields import Color, JointAngle, Model
 from regrasp.interfaces.quote import nearest, quoted
 from regrasp.interfaces.robot import urdf
 from regrasp.interfaces.robot.chain import Chain
+from regrasp.interfaces.robot.inertia import LinkInertias, link_inertias
 from regrasp.interfaces.robot.linkage import Linkage
 from regrasp.interfaces.robot.parallel_jaw import ParallelJaw
 from regrasp.interfaces.robot.parts import (
@@ -143,6 +144,12 @@ class Robot(Model):
             levers=self._given_levers(_levers(origins, last_from_tool, slides)),
             last_from_tool=last_from_tool,
         )
+
+    @cached_property
+    def inertias(self) -> LinkInertias:
+        """What the chain's links weigh, with the jaw half open."""
+        jaw = self.gripper_positions(0.5 * self.gripper.opening)
+        return link_inertias(self.element(), len(self.chain) + 1, lambda link: self._placed(link, np.eye(4), jaw))
 
     @cached_property
     def mounted(self) -> tuple[int, FloatArray]:

@@ -12,6 +12,7 @@ from regrasp.interfaces.cable.motion import View, Viewpoint
 from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.cell import FixedMount
 from regrasp.interfaces.wall_time import counts_as
+from regrasp.motion.arguments import finite_pose, vector
 from regrasp.motion.cable.viewing import ViewingParameters, approached, outline, views_of
 from regrasp.motion.cable.viewpoints import closer_views, spiral
 from regrasp.motion.failure import PlanningError
@@ -44,7 +45,7 @@ class SearchMotion(Motion):
 
         It begins where the connector was `last_seen` (3,) m; None: at the middle of a panel.
         """
-        start, viewing = last_seen, self.parameters.viewing
+        start, viewing = None if last_seen is None else vector("the place", last_seen), self.parameters.viewing
         if start is None:
             start = np.array(next(box.center for box in self.known.boxes if box.name == viewing.start_at))
         overview = self.known.camera(self.known.cable.overview)
@@ -56,10 +57,13 @@ class SearchMotion(Motion):
 
         Raises PlanningError when there is none.
         """
+        finite_pose("the camera's pose", world_from_camera)
         return self._first_view([world_from_camera])
 
     def view_of(self, place: FloatArray, world_from_camera: RigidTransform) -> View:
         """A view of a `place` (3,) m that was glimpsed from a camera. Raises PlanningError when there is none."""
+        vector("the place", place)
+        finite_pose("the camera's pose", world_from_camera)
         return self._first_view(views_of(place, world_from_camera, self.parameters.viewing.spiral.distance))
 
     @counts_as("planning")
@@ -68,6 +72,7 @@ class SearchMotion(Motion):
 
         Raises PlanningError when there is none.
         """
+        finite_pose("the connector's pose", world_from_connector)
         viewing, model = self.parameters.viewing, self.model(self.search_arm)
         points = outline(world_from_connector, self.known.cable.connector.length)
         for pose in closer_views(world_from_connector, viewing.close_views):

@@ -1,15 +1,14 @@
-"""How a hand brings the connector that it holds into a clip."""
+"""How a hand brings the connector that it holds into a clip or a socket."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from regrasp.interfaces.arrays import FloatArray
-from regrasp.interfaces.cable.cell import Clip
 from regrasp.interfaces.wall_time import counts_as
-from regrasp.motion.failure import PlanningError
-from regrasp.motion.planning.straight import straight_line
+from regrasp.motion.planning.straight import straight_lines
 from regrasp.motion.robots.kinematics import ArmKinematics
 from regrasp.motion.robots.poses import angle_between
 from regrasp.motion.scene.collision import CollisionModel
@@ -28,61 +27,70 @@ class SeatingParameters:
     speed_to: float = 0.5  # share of the joints' speed on the way there; choice
     speed_in: float = 0.2  # share of the joints' speed on the way in; choice
 
+    @property
+    def straight_in(self) -> list[FloatArray]:
+        """The only corner of the way into the clip: straight before where the hand ends, in its frame."""
+        return [np.array([-self.distance, 0.0, 0.0])]
+
 
 @counts_as("planning")
 def poses_before(
     models: tuple[CollisionModel, CollisionModel],
     q: FloatArray,
-    clip: Clip,
+    seat: RigidTransform,
     held: RigidTransform,
+    back: Sequence[FloatArray],
     parameters: SeatingParameters = SeatingParameters(),
 ) -> list[RigidTransform]:
-    """Hand poses (world_from_tool) in front of the clip from which a straight path in is free, the best first.
+    """Hand poses (world_from_tool) from which a free way leads straight in to a seat, the best first.
 
     `models` are the hand's collision models on the way there, with what it holds, and on the way in. It stands at
-    joints `q` (6,) rad and holds the connector so (`held`: tool_from_connector). Those poses come first that turn it
-    least.
+    joints `q` (n,) rad and holds the connector so (`held`: tool_from_connector), which belongs at `seat`
+    (world_from_connector). The way in has its corners `back` (3,) m from where the hand ends, in the hand's frame, the
+    furthest first. Those poses come first that turn it least.
     """
     model, near = models
     kin, margin = model.kinematics, parameters.margin
     goals = []
-    for seated in _seated_poses(clip, held, np.linspace(-np.pi, np.pi, parameters.rolls, endpoint=False)):
-        before = seated.copy()
-        before[:3, 3] -= parameters.distance * seated[:3, 0]
+    for seated in _seated_poses(seat, held, np.linspace(-np.pi, np.pi, parameters.rolls, endpoint=False)):
+        before, *way = [_displaced(seated, corner) for corner in (*back, np.zeros(3))]
         starts = (start for start in kin.ik(before, q) if model.free(start, margin))
-        if any(_straight_in(kin, near, start, seated, margin, parameters.line_step) for start in starts):
+        if any(_free_way(kin, near, start, way, margin, parameters.line_step) for start in starts):
             goals.append(before)
-    if not goals:
-        return []
     now = kin.tool_matrix(q)
     goals.sort(key=lambda pose: angle_between(now, pose))
     return [RigidTransform.from_matrix(pose) for pose in goals]
 
 
-def _straight_in(
-    kin: ArmKinematics, near: CollisionModel, q: FloatArray, seated: FloatArray, margin: float, step: float
+def _displaced(pose: FloatArray, displacement: FloatArray) -> FloatArray:
+    """The pose (4, 4) after a displacement (3,) m in its own frame."""
+    displaced = pose.copy()
+    displaced[:3, 3] += pose[:3, :3] @ displacement
+    return displaced
+
+
+def _free_way(
+    kin: ArmKinematics, near: CollisionModel, q: FloatArray, way: Sequence[FloatArray], margin: float, step: float
 ) -> bool:
-    """Whether a free straight path leads from joints (6,) to the pose (4, 4) that seats the connector."""
-    try:
-        return near.path_free(straight_line(kin, q, seated, step), margin)
-    except PlanningError:
-        return False
+    """Whether straight lines from joints (n,) through poses (4, 4) are free."""
+    path = straight_lines(kin, q, way, step)
+    return path is not None and near.path_free(path, margin)
 
 
 @counts_as("planning")
-def seated_pose(tool: RigidTransform, clip: Clip, held: RigidTransform, rolls: int) -> RigidTransform:
-    """world_from_tool that seats the held connector, with the one of so many `rolls` that turns the hand least.
+def seated_pose(tool: RigidTransform, seat: RigidTransform, held: RigidTransform, rolls: int) -> RigidTransform:
+    """world_from_tool that brings the held connector to `seat`, with the one of so many `rolls` that turns it least.
 
-    `tool` is world_from_tool now, `held` is tool_from_connector.
+    `tool` is world_from_tool now, `held` is tool_from_connector, `seat` is world_from_connector.
     """
     now = tool.as_matrix()
-    poses = _seated_poses(clip, held, np.linspace(-np.pi, np.pi, rolls))
+    poses = _seated_poses(seat, held, np.linspace(-np.pi, np.pi, rolls))
     return RigidTransform.from_matrix(min(poses, key=lambda pose: angle_between(now, pose)))
 
 
-def _seated_poses(clip: Clip, held: RigidTransform, rolls: FloatArray) -> FloatArray:
+def _seated_poses(seat: RigidTransform, held: RigidTransform, rolls: FloatArray) -> FloatArray:
     """world_from_tool (n, 4, 4) that seat the connector, `held` (tool_from_connector), turned by `rolls` (n,) rad."""
     turns = np.zeros((len(rolls), 4, 4))
     turns[:, :3, :3] = Rotation.from_euler("x", rolls[:, None]).as_matrix()
     turns[:, 3, 3] = 1.0
-    return np.asarray(clip.world_from_seat.as_matrix() @ turns @ held.inv().as_matrix())
+    return np.asarray(seat.as_matrix() @ turns @ held.inv().as_matrix())

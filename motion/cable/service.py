@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Collection, Generator, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
 import numpy as np
@@ -15,9 +15,12 @@ from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.cell import Box
 from regrasp.interfaces.devices import Arm, Clock, Gripper
 from regrasp.interfaces.request import Request
+from regrasp.motion.arguments import finite_pose, share
+from regrasp.motion.cable.cable_reach import CableReachParameters
 from regrasp.motion.cable.cable_shape import cable_course, connector_points
 from regrasp.motion.cable.carry_paths import CarryPathParameters, carry_paths, first_free
 from regrasp.motion.cable.held import connector_spheres
+from regrasp.motion.cable.plugging import PluggingParameters
 from regrasp.motion.cable.search import SearchMotion, SearchMotionParameters
 from regrasp.motion.cable.seating import SeatingParameters, poses_before, seated_pose
 from regrasp.motion.failure import PlanningError
@@ -53,6 +56,8 @@ class CableMotionParameters(SearchMotionParameters):
     unplug: UnplugParameters = field(default_factory=UnplugParameters)
     carry: CarryPathParameters = field(default_factory=CarryPathParameters)
     seating: SeatingParameters = field(default_factory=SeatingParameters)
+    cable_reach: CableReachParameters = field(default_factory=CableReachParameters)
+    plugging: PluggingParameters = field(default_factory=PluggingParameters)
 
 
 class CableMotion(SearchMotion):
@@ -105,11 +110,13 @@ class CableMotion(SearchMotion):
         self, world_from_connector: RigidTransform, *, point_cloud: PointCloudSource | None = None
     ) -> MotionRequest:
         """`pick` the connector where it hangs at the end of its cable, of which the arm keeps clear."""
+        finite_pose("the connector's pose", world_from_connector)
         cable = cable_course(self.known, world_from_connector)
         return self._pick_connector(world_from_connector, 0.0, cable, point_cloud)
 
     def grip(self, world_from_connector: RigidTransform) -> Request[Grip]:
         """Close the hand's jaw on the connector; the answer is what it holds then. It fails as `close` does."""
+        finite_pose("the connector's pose", world_from_connector)
 
         def steps() -> Generator[None, None, Grip]:
             gap = yield from self._done(self.close(self.hand, 2 * self.known.cable.connector.radius))
@@ -125,6 +132,7 @@ class CableMotion(SearchMotion):
 
     def pull_out(self, plug: RigidTransform) -> MotionRequest:
         """Draw the gripped plug (world_from_connector) out along its axis, and then away from the panel, to -x."""
+        finite_pose("the plug's pose", plug)
         values = self.parameters.unplug
 
         def steps() -> Iterator[None]:
@@ -149,6 +157,9 @@ class CableMotion(SearchMotion):
         any free path. Where possible there is room for a jaw that opens on the way, as after a slip. From the goal the
         tool must also reach the poses `onward` (goal_from_tool) in straight lines.
         """
+        for pose in (*goals, held, *onward):
+            finite_pose("a pose of the tool or the connector", pose)
+        share("the speed", speed)
 
         def steps() -> Iterator[None]:
             spheres = self.held_spheres(held)
@@ -162,20 +173,23 @@ class CableMotion(SearchMotion):
                 solutions = [end for goal in goals for end in kin.ik(goal, q)]
                 ends = [end for end in solutions if can_continue(kin, end, onward, carry.step)]
                 path = yield from self._shortest_plan(model, q, np.array(ends).reshape(-1, len(kin)), carry.searched)
-            yield from self.execution.follow(arm, path, speed)
+            pull = np.concatenate([held.translation, held.rotation.apply([1.0, 0.0, 0.0])])
+            yield from self.execution.follow(arm, path, speed, replace(self._guard.carrying, pull=pull))
 
-        return self.execution.request(arm, steps())
+        return self.execution.request(arm, self._past_touches(arm, steps))
 
     def carry_to_clip(self, held: RigidTransform) -> MotionRequest:
         """Bring the held connector (tool_from_connector) before the clip, from where the hand can go in and back out.
 
         It fails with OUT_OF_REACH when no hand pose there is free.
         """
+        finite_pose("the held connector's pose", held)
         seating = self.parameters.seating
 
         def steps() -> Iterator[None]:
             models = self.model(self.hand, held=self.held_spheres(held)), self._model_without_clip()
-            goals = poses_before(models, self.joints(self.hand), self.known.cable.clip, held, seating)
+            seat = self.known.cable.clip.world_from_seat
+            goals = poses_before(models, self.joints(self.hand), seat, held, seating.straight_in, seating)
             if not goals:
                 message = "no free hand pose brings the held connector into the clip"
                 raise PlanningError(CauseCode.OUT_OF_REACH, message)
@@ -187,11 +201,12 @@ class CableMotion(SearchMotion):
 
     def insert(self, held: RigidTransform) -> MotionRequest:
         """Bring the held connector (tool_from_connector) straight into the clip, with the roll that turns it least."""
+        finite_pose("the held connector's pose", held)
         seating = self.parameters.seating
 
         def steps() -> Iterator[None]:
-            goal = seated_pose(self.tool(self.hand), self.known.cable.clip, held, seating.fine_rolls)
-            yield from self._done(self.straight(self.hand, goal, speed=seating.speed_in))
+            goal = seated_pose(self.tool(self.hand), self.known.cable.clip.world_from_seat, held, seating.fine_rolls)
+            yield from self._done(self.straight(self.hand, goal, speed=seating.speed_in, pressing=True))
 
         return self._together(self.hand, steps())
 
@@ -219,15 +234,14 @@ class CableMotion(SearchMotion):
 
     def leave_clip(self) -> MotionRequest:
         """Bring the hand to its sleep pose without sweeping the stowed end out of its clip."""
-        seat, cable = self.known.cable.clip.world_from_seat, self.known.cable
+        return self._together(self.hand, self._sleep_clear_of(self.known.cable.clip.world_from_seat))
 
-        def steps() -> Iterator[None]:
-            connector = connector_points(seat, cable.connector.length)
-            self.keep_clear(np.vstack([connector, cable_course(self.known, seat)]))
-            yield from self._done(self.sleep(self.hand))
-            self.keep_clear(NO_POINTS)
-
-        return self._together(self.hand, steps())
+    def _sleep_clear_of(self, connector: RigidTransform) -> Iterator[None]:
+        """Steps that bring the hand to its sleep pose clear of a connector at that place and of its cable."""
+        points = connector_points(connector, self.known.cable.connector.length)
+        self.keep_clear(np.vstack([points, cable_course(self.known, connector)]))
+        yield from self._done(self.sleep(self.hand))
+        self.keep_clear(NO_POINTS)
 
     def held_spheres(self, held: RigidTransform) -> FloatArray:
         """Spheres (n, 4) m in the tool frame that stand for a held connector (tool_from_connector); see `model`."""

@@ -12,7 +12,9 @@ import ompl.util as ou
 
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cause import CauseCode
+from regrasp.motion.arguments import finite, not_negative, rows
 from regrasp.motion.failure import PlanningError
+from regrasp.motion.robots.kinematics import past_limits
 from regrasp.motion.scene.collision import CollisionModel
 
 ou.setLogLevel(ou.LOG_NONE)
@@ -23,7 +25,7 @@ class PlannerParameters:
     """The planner's effort."""
 
     max_checks: int = 40000  # configurations that all searches together may check; choice
-    searches: int = 4  # another search begins when the fine check of a path fails; choice
+    searches: int = 4  # while the fine check of a path fails, another search begins; a last one checks finely; choice
     # m, each joint's rad times its lever, of a search's longest edge. OMPL's default, a fifth of the space's extent, is
     # 1.2 for the ViperX and 4.5 for the UR5e: most edges of that length collide, and a folded arm finds no way out.
     # 0.3 solves most queries in clutter, of 1.2, 0.6, 0.3 and 0.15, and takes no longer.
@@ -32,6 +34,7 @@ class PlannerParameters:
     # hand 0.3 m off the joint's axis comes nearer by no more
     fine_slack: float = 0.003
     shortcuts: int = 80  # tries to shorten a path; choice
+    past_limit: float = 0.05  # rad or m that a start may be read past a joint's limit: encoders are off by less
     escape_step: float = 0.02  # rad of a step away from something near; choice: the step of a coarse check
     escape_steps: int = 100  # at most; choice
     escape_directions: int = 32  # random ones a step, besides the joints' own; choice
@@ -48,24 +51,32 @@ def plan(
     """Joint path (k, n) from `start` (n,) to one of `goals` (m, n), `margin` metres from everything.
 
     A start that is nearer than `margin` but does not touch (after a grasp beside a panel) is first led away: the path
-    begins with small steps along which the clearance only grows.
+    begins with small steps along which the clearance only grows. One that is read a little past a joint's limit is
+    first led back.
 
-    Raises PlanningError: MOTION_BLOCKED if the start touches something, OUT_OF_REACH without goals,
-    NO_COLLISION_FREE_GOAL if no goal keeps the margin, PLANNING_FAILED if no path was found.
+    Raises PlanningError: MOTION_BLOCKED if the start touches something or lies past a limit, OUT_OF_REACH without goals
+    within the limits, NO_COLLISION_FREE_GOAL if none of them keeps the margin, PLANNING_FAILED if no path was found.
+    Raises ValueError for joints or a margin that are not finite, and for a margin below 0.
     """
-    start, goals = np.asarray(start, float), np.asarray(goals, float).reshape(-1, len(start))
-    escape = _escape(model, start, margin, np.random.default_rng(seed), parameters)
+    start = finite("the start's joints", start)
+    goals = rows("the goals' joints", goals, len(start))
+    margin = not_negative("the margin", margin)
+    inside = _inside(model, start, parameters.past_limit)
+    escape = _escape(model, inside, margin, np.random.default_rng(seed), parameters)
+    if inside is not start:
+        escape = np.vstack([start, escape])
     free_goals = _free_goals(model, goals, margin)
     for goal in free_goals:
         if model.path_free(np.array([escape[-1], goal]), margin):
             return _joined(escape, np.array([escape[-1], goal]))
     budget = _Budget(parameters.max_checks)
-    for search in range(parameters.searches):
-        found = _search(model, escape[-1], free_goals, seed + search, budget, margin, parameters.longest_edge)
-        path = _shortened(model, found, margin, np.random.default_rng([seed, search]), parameters.shortcuts)
+    for search in range(parameters.searches + 1):
+        edges = _Edges(model, margin, fine=search == parameters.searches)
+        found = _search(edges, escape[-1], free_goals, seed + search, budget, parameters.longest_edge)
+        path = _shortened(edges, found, np.random.default_rng([seed, search]), parameters.shortcuts)
         if model.path_free(path, max(0.0, margin - parameters.fine_slack)):
             return _joined(escape, path)
-    message = f"{parameters.searches} paths found, none free when checked finely"
+    message = f"{parameters.searches + 1} paths found, none free when checked finely"
     raise PlanningError(CauseCode.PLANNING_FAILED, message)
 
 
@@ -79,19 +90,37 @@ class _Budget:
         return self.left <= 0
 
 
+@dataclass(frozen=True)
+class _Edges:
+    """Straight joint motions in a model that keep `margin` m, checked at its coarse or fine steps."""
+
+    model: CollisionModel
+    margin: float
+    fine: bool
+
+    def free(self, qa: FloatArray, qb: FloatArray) -> bool:
+        """Whether that from joints `qa` (n,) to `qb` is free."""
+        return self.model.edge_free(qa, qb, self.margin, fine=self.fine)
+
+    def checks(self, qa: FloatArray, qb: FloatArray) -> int:
+        """How many configurations that checks."""
+        step = self.model.fine_step if self.fine else self.model.coarse_step
+        return 1 + int(np.abs(qb - qa).max() / step)
+
+
 class _EdgeCheck(ob.MotionValidator):
     """Straight joint motions checked in one call, and counted. States are joints times their levers."""
 
-    def __init__(self, space: ob.SpaceInformation, model: CollisionModel, margin: float, budget: _Budget) -> None:
+    def __init__(self, space: ob.SpaceInformation, edges: _Edges, budget: _Budget) -> None:
         super().__init__(space)
-        self._model, self._margin, self._budget = model, margin, budget
+        self._edges, self._budget = edges, budget
 
     def checkMotion(self, a: ob.State, b: ob.State) -> bool:  # noqa: N802 (OMPL's name)
         """Whether the motion between two states is free."""
-        levers = self._model.kinematics.chain.levers
+        levers = self._edges.model.kinematics.chain.levers
         qa, qb = _joints(a, levers), _joints(b, levers)
-        self._budget.left -= 1 + int(np.abs(qb - qa).max() / self._model.coarse_step)
-        return self._model.edge_free(qa, qb, self._margin)
+        self._budget.left -= self._edges.checks(qa, qb)
+        return self._edges.free(qa, qb)
 
 
 def _joints(state: ob.State, levers: FloatArray) -> FloatArray:
@@ -99,19 +128,18 @@ def _joints(state: ob.State, levers: FloatArray) -> FloatArray:
 
 
 def _search(
-    model: CollisionModel,
+    edges: _Edges,
     start: FloatArray,
     goals: FloatArray,
     seed: int,
     budget: _Budget,
-    margin: float,
     longest_edge: float,
 ) -> FloatArray:
     """Waypoints (k, n) by RRTConnect (Kuffner and LaValle 2000); PlanningError when the budget runs out.
 
     Distances between states are those of the joints, each times its lever: big joints count more.
     """
-    kin = model.kinematics
+    model, margin, kin = edges.model, edges.margin, edges.model.kinematics
     levers, count = kin.chain.levers, len(kin)
     space = ob.RealVectorStateSpace(count)
     bounds = ob.RealVectorBounds(count)
@@ -127,7 +155,7 @@ def _search(
         budget.left -= 1
         return model.free(_joints(state, levers), margin)
 
-    check = _EdgeCheck(information, model, margin, budget)
+    check = _EdgeCheck(information, edges, budget)
     setup.setStateValidityChecker(valid)
     information.setMotionValidator(check)
     first = space.allocState()
@@ -160,12 +188,29 @@ def _free_goals(model: CollisionModel, goals: FloatArray, margin: float) -> Floa
         raise PlanningError(CauseCode.OUT_OF_REACH, "no joint angles reach the goal")
     free = goals[[model.free(goal, margin) for goal in goals]]
     if not len(free):
-        distance, what = max(model.nearest(goal) for goal in goals)
+        within = [goal for goal in goals if not past_limits(model.kinematics, goal)]
+        if not within:
+            message = (
+                f"none of {len(goals)} goals lies within the joints' limits: {past_limits(model.kinematics, goals[0])}"
+            )
+            raise PlanningError(CauseCode.OUT_OF_REACH, message)
+        distance, what = max(model.nearest(goal) for goal in within)
         message = (
             f"none of {len(goals)} goals keeps {margin * 1e3:.0f} mm: the best has {distance * 1e3:.0f} mm to {what}"
         )
         raise PlanningError(CauseCode.NO_COLLISION_FREE_GOAL, message)
     return free
+
+
+def _inside(model: CollisionModel, start: FloatArray, past_limit: float) -> FloatArray:
+    """The start (n,), led back within the limits if it is read past them; PlanningError when that is too far."""
+    kin = model.kinematics
+    inside = np.clip(start, kin.lower, kin.upper)
+    if np.array_equal(inside, start):
+        return start
+    if np.abs(inside - start).max() > past_limit:
+        raise PlanningError(CauseCode.MOTION_BLOCKED, f"the arm stands past its limits: {past_limits(kin, start)}")
+    return np.asarray(inside)
 
 
 def _escape(
@@ -197,27 +242,25 @@ def _directions(rng: np.random.Generator, count: int, joints: int) -> FloatArray
     return np.vstack([np.eye(joints), -np.eye(joints), mixed])
 
 
-def _shortened(
-    model: CollisionModel, path: FloatArray, margin: float, rng: np.random.Generator, tries: int
-) -> FloatArray:
+def _shortened(edges: _Edges, path: FloatArray, rng: np.random.Generator, tries: int) -> FloatArray:
     """Path with random stretches replaced by straight lines wherever these are free (shortcutting)."""
     for _ in range(tries):
         if len(path) < 3:
             break
         i, j = np.sort(rng.uniform(0, len(path) - 1, 2))
         a, b = _at(path, i), _at(path, j)
-        if int(j) > int(i) and model.edge_free(a, b, margin):
+        if int(j) > int(i) and edges.free(a, b):
             path = np.vstack([path[: int(i) + 1], a, b, path[int(j) + 1 :]])
             path = path[np.append(True, np.abs(np.diff(path, axis=0)).max(axis=1) > 1e-6)]
-            path = _without_needless(model, path, margin)
+            path = _without_needless(edges, path)
     return path
 
 
-def _without_needless(model: CollisionModel, path: FloatArray, margin: float) -> FloatArray:
+def _without_needless(edges: _Edges, path: FloatArray) -> FloatArray:
     """Path without the waypoints whose neighbours a free straight line joins."""
     i = 1
     while i < len(path) - 1:
-        if model.edge_free(path[i - 1], path[i + 1], margin):
+        if edges.free(path[i - 1], path[i + 1]):
             path = np.delete(path, i, axis=0)
         else:
             i += 1

@@ -12,6 +12,8 @@ from regrasp.motion.failure import PlanningError
 from regrasp.motion.robots.kinematics import ArmKinematics
 from regrasp.motion.robots.poses import multiply, poses_between
 
+LONGEST_LINE = 20.0  # m; no arm on a rail reaches so far, and a line is cut into steps of millimetres
+
 
 def straight_line(
     kin: ArmKinematics,
@@ -25,9 +27,13 @@ def straight_line(
 
     The goal may be a matrix (4, 4). Waypoints lie at most `step` metres and `turn_step` rad of rotation apart; the
     rotation turns evenly (slerp). More than `max_joint_step` rad of one joint between two waypoints would be a change
-    to another branch of the inverse kinematics. Raises PlanningError OUT_OF_REACH where no solution continues the path.
+    to another branch of the inverse kinematics. Raises PlanningError OUT_OF_REACH where no solution continues the path,
+    or where the line leads further than `LONGEST_LINE`.
     """
     target = goal if isinstance(goal, np.ndarray) else goal.as_matrix()
+    length = float(np.linalg.norm(target[:3, 3] - kin.tool_matrix(q0)[:3, 3]))
+    if length > LONGEST_LINE:
+        raise PlanningError(CauseCode.OUT_OF_REACH, f"a straight line of {length:.3g} m is out of any arm's reach")
     found = _follow_line(kin, q0, target, step, turn_step, max_joint_step)
     if isinstance(found, _Stop):
         raise PlanningError(CauseCode.OUT_OF_REACH, str(found))

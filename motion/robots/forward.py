@@ -10,7 +10,7 @@ from regrasp.motion.robots.poses import multiply, rotation_matrix
 
 ANY_AXIS, SLIDE = 3, 4  # kinds of joints; 0, 1 and 2 turn about x, y and z
 # Columns of a joint table; compiled functions take one array in half the time that they take four.
-_AXIS, KIND, SIGN = 3, 6, 7
+AXIS, KIND, SIGN = 3, 6, 7
 
 
 def joint_table(chain: Chain) -> FloatArray:
@@ -54,9 +54,9 @@ def link_frames_in(base: FloatArray, joints: FloatArray, q: FloatArray) -> Float
             for r in range(3):
                 for k in range(3):
                     frame[r, k] = parent[r, k]
-                    frame[r, 3] += parent[r, k] * joints[i, _AXIS + k] * q[i]
+                    frame[r, 3] += parent[r, k] * joints[i, AXIS + k] * q[i]
         else:
-            turn = rotation_matrix(q[i] * joints[i, _AXIS : _AXIS + 3])
+            turn = rotation_matrix(q[i] * joints[i, AXIS : AXIS + 3])
             for r in range(3):
                 for k in range(3):
                     frame[r, k] = parent[r, 0] * turn[0, k] + parent[r, 1] * turn[1, k] + parent[r, 2] * turn[2, k]
@@ -100,7 +100,7 @@ def tool_jacobian(base: FloatArray, joints: FloatArray, last_from_tool: FloatArr
         axis = np.zeros(3)
         for r in range(3):
             for k in range(3):
-                axis[r] += frames[i, r, k] * joints[i, _AXIS + k]
+                axis[r] += frames[i, r, k] * joints[i, AXIS + k]
         if joints[i, KIND] == SLIDE:
             out[:3, i] = axis
         else:

@@ -57,6 +57,8 @@ class ArmKinematics:
     `lower`, `upper` (n,) are the joints' limits. Arms of six revolute joints that have a closed form are solved by it,
     with all branches; others by iteration, with some of their solutions. A rail is moved only where the arm alone does
     not reach. The *tip* is the frame at the tool's place that is parallel to the last link's.
+
+    Raises ValueError for joints whose lower limit is not below the upper.
     """
 
     def __init__(
@@ -71,6 +73,7 @@ class ArmKinematics:
         self.joints: FloatArray = joint_table(chain)
         self.last_from_tool = np.ascontiguousarray(chain.last_from_tool)
         self.lower, self.upper = chain.lower, chain.upper
+        _check_limits(chain)
         self.tip = np.ascontiguousarray(self.last_from_tool[:3, 3])  # in the last link's frame
         self._rail = robot.rail is not None
         turn = self.last_from_tool[:3, :3]
@@ -92,6 +95,13 @@ class ArmKinematics:
     def __len__(self) -> int:
         """How many joints are driven."""
         return len(self.chain)
+
+    @property
+    def reach(self) -> float:
+        """How far (m) the tool can be from the base at most: all links in a line, a rail at its end."""
+        links = np.linalg.norm(self.chain.origins, axis=1).sum() + np.linalg.norm(self.tip)
+        slides = np.maximum(np.abs(self.lower), np.abs(self.upper))[self.chain.slides].sum()
+        return float(links + slides)
 
     def link_frames(self, q: FloatArray) -> FloatArray:
         """World frames (n + 1, 4, 4) of the base and the links, see `Chain`, for joints (n,)."""
@@ -181,6 +191,21 @@ class ArmKinematics:
     def within_limits(self, rows: FloatArray, near: FloatArray | None = None) -> FloatArray:
         """The rows (k, n) within the joint limits, rounding errors aside; whole turns nearest to `near` (n,)."""
         return np.asarray(_within_limits(rows, self._bounds, self._turning, self._zero if near is None else near))
+
+
+def _check_limits(chain: Chain) -> None:
+    for name, lower, upper in zip(chain.names, chain.lower, chain.upper, strict=True):
+        if not lower < upper:
+            raise ValueError(f"limits of {name} contradict: lower {lower:g} is not below upper {upper:g}")
+
+
+def past_limits(kin: ArmKinematics, q: FloatArray) -> str:
+    """Which of the joints (n,) lie past their limits, and where they and the limits are; '' when none does."""
+    past = (q < kin.lower) | (q > kin.upper)
+    return ", ".join(
+        f"{kin.chain.names[i]} {q[i]:.4g}, limits {kin.lower[i]:.4g} to {kin.upper[i]:.4g}"
+        for i in np.flatnonzero(past)
+    )
 
 
 def _closed_form(chain: Chain, first: int) -> _ClosedForm | None:

@@ -187,7 +187,7 @@ class CollisionModel:
         parameters: CollisionParameters = CollisionParameters(),
     ) -> None:
         self.kinematics = kinematics
-        self.coarse_step, self._fine_step = parameters.coarse_step, parameters.fine_step
+        self.coarse_step, self.fine_step = parameters.coarse_step, parameters.fine_step
         self._names = [box.name for box in boxes]
         links, parts, local, pairs = _body_spheres(kinematics, body)
         distance = grid or DistanceGrid(np.full((1, 1, 1), FREE_DISTANCE, np.float32), np.zeros(3), 1e-3)
@@ -223,14 +223,14 @@ class CollisionModel:
         inside = bool(np.all((q >= self.kinematics.lower) & (q <= self.kinematics.upper)))
         return inside and bool(_free(np.asarray(q, float), margin, *self._free_arguments))
 
-    def edge_free(self, qa: FloatArray, qb: FloatArray, margin: float) -> bool:
-        """Whether the straight joint motion is free, its end included (not its start), checked coarsely."""
-        return self._edge_free(qa, qb, margin, self.coarse_step)
+    def edge_free(self, qa: FloatArray, qb: FloatArray, margin: float, *, fine: bool = False) -> bool:
+        """Whether the straight joint motion is free, its end included (not its start), checked coarsely or finely."""
+        return self._edge_free(qa, qb, margin, self.fine_step if fine else self.coarse_step)
 
     def path_free(self, path: FloatArray, margin: float) -> bool:
         """Whether the joint path (k, 6) is free from its first row to its last, checked finely."""
         edges = pairwise(np.asarray(path, float))
-        return self.free(path[0], margin) and all(self._edge_free(a, b, margin, self._fine_step) for a, b in edges)
+        return self.free(path[0], margin) and all(self.edge_free(a, b, margin, fine=True) for a, b in edges)
 
     def clearance(self, q: FloatArray) -> float:
         """Least distance (m) to anything, the arm's own links included; a negative one is a penetration depth."""
@@ -241,6 +241,11 @@ class CollisionModel:
         distance, what = _nearest(np.asarray(q, float), *self._arguments)
         names = {_ITSELF: "itself", _GRID: "seen surface", _OTHER_ARM: "other arm"}
         return float(distance), names[what] if what < 0 else self._names[what]
+
+    @property
+    def links(self) -> NDArray[np.int64]:
+        """The chain's links (n,) that the arm's spheres are on."""
+        return self._arguments[3]
 
     def spheres(self, q: FloatArray) -> FloatArray:
         """The arm's spheres (n, 4) in world at joints (n,), for another arm's model."""

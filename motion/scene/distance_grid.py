@@ -43,6 +43,35 @@ class DistanceGrid:
         occupied[tuple(index.T)] = True
         return cls.from_occupied(occupied, lower, h)
 
+    @classmethod
+    def of_boxes(
+        cls,
+        centers: NDArray[np.float64],
+        sizes: NDArray[np.float64],
+        yaws: NDArray[np.float64],
+        h: float,
+        border: float,
+    ) -> "DistanceGrid":
+        """Grid of the true distances to n boxes, and `border` m round them; they are negative inside.
+
+        `centers` and `sizes` (the edges) are (n, 3) m; each box is turned by its `yaws` (n,) rad about z.
+        """
+        wide = 0.5 * np.hypot(sizes[:, 0], sizes[:, 1])
+        reach = np.column_stack([wide, wide, 0.5 * sizes[:, 2]]) + border
+        lower, upper = (centers - reach).min(axis=0), (centers + reach).max(axis=0)
+        x, y, z = (np.arange(low, high, h) + 0.5 * h for low, high in zip(lower, upper, strict=True))
+        nearest = np.full((len(x), len(y), len(z)), FREE_DISTANCE)
+        for center, half, yaw in zip(centers, 0.5 * sizes, yaws, strict=True):
+            dx, dy = x[:, None] - center[0], y[None] - center[1]
+            along = np.abs(np.cos(yaw) * dx + np.sin(yaw) * dy) - half[0]
+            across = np.abs(np.cos(yaw) * dy - np.sin(yaw) * dx) - half[1]
+            up = np.abs(z - center[2]) - half[2]
+            outside = np.hypot(np.hypot(np.maximum(along, 0), np.maximum(across, 0))[..., None], np.maximum(up, 0))
+            inside = np.minimum(np.maximum(np.maximum(along, across)[..., None], up), 0)
+            nearest = np.minimum(nearest, outside + inside)
+        # A point may lie half a voxel's diagonal off the centre at which the distance is known.
+        return cls((nearest - 0.5 * np.sqrt(3.0) * h).astype(np.float32), lower, h)
+
     def at(self, points: NDArray[np.float64]) -> NDArray[np.float32]:
         """Distances (n,) m at points (n, 3) in world; `FREE_DISTANCE` outside the grid."""
         index = np.floor((points - self.lower) / self.h).astype(int)

@@ -7,10 +7,15 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import FloatArray
+from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.cell import Box, KnownCell, WristMount
 from regrasp.interfaces.devices import Arm, Gripper
 from regrasp.interfaces.frame import RgbdFrame
 from regrasp.interfaces.wall_time import counts_as
+from regrasp.motion.arguments import positive, rows
+from regrasp.motion.failure import PlanningError
+from regrasp.motion.robots.contact_guard import Touch
+from regrasp.motion.robots.contact_place import ContactPlaceParameters, contact_place, felt_points
 from regrasp.motion.robots.ik_parameters import InverseKinematicsParameters
 from regrasp.motion.robots.kinematics import ArmKinematics
 from regrasp.motion.robots.spheres import sphere_distances
@@ -27,9 +32,13 @@ class PlanningSceneParameters:
     # m round an arm where seen points are its own: 13 mm of depth error, half a voxel's diagonal, 5 mm of arm error
     arm_margin: float = 0.025
     touching: float = 0.005  # m; a seen point so near to a standing arm is no obstacle
+    # m further from a base than the arm's links are long: what it carries and where a camera looks
+    beyond_reach: float = 0.2
     grid_border: float = 0.2  # m round the voxels; no sphere of an arm is thicker
     sight_samples: int = 24  # points on a line of sight that must be free; choice
     sight_range: tuple[float, float] = (0.15, 0.85)  # shares of a line of sight that are checked: not its ends; choice
+    felt_time: float = 60.0  # s that a felt place stays on the map; what was felt may move, as a cable does; choice
+    contact: ContactPlaceParameters = field(default_factory=ContactPlaceParameters)
     collision: CollisionParameters = field(default_factory=CollisionParameters)
     kinematics: InverseKinematicsParameters = field(default_factory=InverseKinematicsParameters)
 
@@ -55,16 +64,20 @@ class PlanningScene:
         self._boxes = known.solids()
         self._grid: DistanceGrid | None = None
         self._points = self._more = NO_POINTS
+        self._felt: list[tuple[float, FloatArray]] = []  # when, and points (n, 3) m
         self._spacing = 0.01  # m, until the first voxels come
 
     @counts_as("planning")
     def set_obstacles(self, points: FloatArray, spacing: float) -> None:
         """Keep clear of occupied voxels from now on: centres (n, 3) m in the world, and the edge `spacing` m.
 
-        Points where an arm is now, or sleeps, do not count: what was seen there was an arm.
+        Points where an arm is now, or sleeps, do not count: what was seen there was an arm. Nor do points that no arm
+        reaches. Raises ValueError for points that are not finite and a spacing that is not above 0.
         """
         margin = self._scene_parameters.arm_margin
-        self._points, self._spacing = points, spacing
+        self._points, self._spacing = self._within_reach(points), positive("the spacing", spacing)
+        now = max((arm.reading().stamp for arm in self.arms.values()), default=0.0)
+        self._felt = [(at, felt) for at, felt in self._felt if at > now - self._scene_parameters.felt_time]
         for spec in self.known.arms:
             for q in (self.joints(spec.name), np.array(spec.sleep)):
                 self._points = _points_beyond(self._points, self.model(spec.name, others=False).spheres(q), margin)
@@ -72,12 +85,33 @@ class PlanningScene:
 
     @counts_as("planning")
     def keep_clear(self, points: FloatArray) -> None:
-        """Keep clear of these points (n, 3) m too, such as a cable's; they replace an earlier call's."""
-        self._more = points
+        """Keep clear of these points (n, 3) m too, such as a cable's; they replace an earlier call's.
+
+        Points that no arm reaches do not count. Raises ValueError for points that are not finite.
+        """
+        self._more = self._within_reach(points)
         self._rebuild_grid()
 
+    @counts_as("planning")
+    def feel(self, arm: str, touch: Touch) -> FloatArray:
+        """Keep clear of where an arm touched something, as well; the place (3,) m in the world."""
+        model = self.model(arm, others=False)
+        spheres, kin = model.spheres(touch.joints), self.kinematics[arm]
+        place, inward = contact_place(kin, spheres, model.links, touch, self._scene_parameters.contact)
+        self._felt.append((touch.stamp, felt_points(place, inward, self._spacing, self._scene_parameters.contact)))
+        self._rebuild_grid()
+        return place
+
+    def _within_reach(self, points: FloatArray) -> FloatArray:
+        """The points (n, 3) m as far from an arm's base as it reaches, and `beyond_reach`; the grid grows no larger."""
+        seen = rows("the points", points, 3)
+        beyond, near = self._scene_parameters.beyond_reach, np.zeros(len(seen), np.bool_)
+        for kin in self.kinematics.values():
+            near |= np.linalg.norm(seen - kin.base[:3, 3], axis=1) < kin.reach + beyond
+        return seen[near]
+
     def _rebuild_grid(self) -> None:
-        points = np.vstack([self._points, self._more])
+        points = np.vstack([self._points, self._more, *(felt for _, felt in self._felt)])
         if not len(points):
             self._grid = None
             return
@@ -105,13 +139,20 @@ class PlanningScene:
             spheres = model.spheres(self.joints(arm))
             self._points = _points_beyond(self._points, spheres, touching + 2 * self._spacing)
             self._more = _points_beyond(self._more, spheres, touching + 2 * self._spacing)
+            self._felt = [(at, _points_beyond(felt, spheres, touching + 2 * self._spacing)) for at, felt in self._felt]
             self._rebuild_grid()
             model = self.model(arm, held=held, without=without, opening=opening)
         return model
 
     def joints(self, arm: str) -> FloatArray:
-        """The arm's joints (n,) as read."""
-        return self.arms[arm].reading().positions
+        """The arm's joints (n,) as read. Raises PlanningError ARM_FAILED where an encoder gives no number."""
+        positions = self.arms[arm].reading().positions
+        if not np.isfinite(positions).all():
+            names = self.kinematics[arm].chain.names
+            silent = ", ".join(names[i] for i in np.flatnonzero(~np.isfinite(positions)))
+            message = f"the {arm} arm's encoders give no number for {silent}"
+            raise PlanningError(CauseCode.ARM_FAILED, message)
+        return positions
 
     def tool(self, arm: str) -> RigidTransform:
         """world_from_tool as read."""
@@ -176,4 +217,8 @@ class PlanningScene:
 
 def _points_beyond(points: FloatArray, spheres: FloatArray, margin: float) -> FloatArray:
     """The points (n, 3) further than `margin` m from the spheres (m, 4)."""
-    return points[sphere_distances(points, spheres)[0] > margin]
+    reach = spheres[:, 3:] + margin
+    lower, upper = (spheres[:, :3] - reach).min(axis=0), (spheres[:, :3] + reach).max(axis=0)
+    near = np.all((points >= lower) & (points <= upper), axis=1)  # most points lie far from an arm
+    near[near] = sphere_distances(points[near], spheres)[0] <= margin
+    return points[~near]

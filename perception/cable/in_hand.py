@@ -25,11 +25,13 @@ def connector_in_hand(
     length: float,
     tool: RigidTransform,
     held: RigidTransform,
+    least_turn_deg: float = 0.0,
     parameters: InHandParameters = InHandParameters(),
 ) -> InHand | None:
     """How a connector of `length` m lies in the hand at `tool` (world_from_tool); None where too little of it is seen.
 
-    `held` is tool_from_connector as believed.
+    `held` is tool_from_connector as believed. One that seems to have turned by less than `least_turn_deg` has not: then
+    only where its tip is seen counts.
     """
     long = [e for e in seen if e.extent >= parameters.min_extent]
     if not long:
@@ -42,6 +44,10 @@ def connector_in_hand(
     shift = float(np.linalg.norm(found.translation - held.translation))
     cosine = connector_axis(found) @ connector_axis(held)
     turn = float(np.rad2deg(np.arccos(np.clip(cosine, -1.0, 1.0))))
+    if turn < least_turn_deg:
+        tip = [0.5 * length, 0.0, 0.0]
+        place = held.translation + found.apply(tip) - held.apply(tip)
+        found = RigidTransform.from_components(place, held.rotation)
     return InHand(found, whole, shift, turn, shift < parameters.max_shift)
 
 

@@ -163,14 +163,22 @@ class CablePerception(Perception):
         """Whether a connector seen so lies in the clip."""
         return seen_at(estimate.position, np.array(self._known.cable.clip.seat), self.parameters.stowed_radius)
 
+    def plugged(self, estimate: Estimate, socket: str) -> Evidence:
+        """Whether a connector seen so lies in the socket of that name."""
+        plug = self._known.cable.socket(socket).world_from_plug(self._known.cable.connector.length)
+        return seen_at(estimate.position, plug.translation, self.parameters.stowed_radius)
+
     @counts_as("perception")
-    def in_hand(self, seen: Sequence[Estimate], tool: RigidTransform, held: RigidTransform) -> InHand | None:
+    def in_hand(
+        self, seen: Sequence[Estimate], tool: RigidTransform, held: RigidTransform, *, least_turn_deg: float = 0.0
+    ) -> InHand | None:
         """How the connector lies in the hand at `tool` (world_from_tool), where it was believed to be `held`.
 
-        `held` is tool_from_connector. None where too little of it is seen.
+        `held` is tool_from_connector. None where too little of it is seen. A turn by less than `least_turn_deg` is
+        taken for an error of the sight.
         """
         length = self._known.cable.connector.length
-        return connector_in_hand(seen, length, tool, held, self.parameters.in_hand)
+        return connector_in_hand(seen, length, tool, held, least_turn_deg, self.parameters.in_hand)
 
     def obstacles_beside(self, world_from_connector: RigidTransform) -> tuple[FloatArray, float]:
         """`obstacles` without guesses near a connector: it was looked at, so only surfaces that were seen count."""

@@ -126,6 +126,12 @@ class SocketHold:
         """Whether the plug is still in."""
         return self._hold is not None
 
+    def release(self) -> None:
+        """Let the plug go."""
+        if self._hold is not None:
+            self._hold.release()
+            self._hold = None
+
     def step(self) -> None:
         """Check the force; call after every physics step."""
         if self._hold is None:
@@ -133,8 +139,7 @@ class SocketHold:
         force = self._hold.force()
         pull = math.hypot(*force) if self._axis is None else sum(map(operator.mul, force, self._axis))
         if pull > self._limit:
-            self._hold.release()
-            self._hold = None
+            self.release()
 
 
 class ClipHold:
@@ -184,7 +189,7 @@ class ClipHold:
         if self.holds:
             self._pull(connector)
             return
-        aligned = float(_x_axis(np.array(connector.quaternion)) @ self._axis) > self._cos
+        aligned = float(x_axis(np.array(connector.quaternion)) @ self._axis) > self._cos
         resting = self._armed and aligned and math.hypot(*connector.velocity) < self._parameters.click_speed
         self._resting = self._resting + self._dt if resting else 0.0
         if self._resting >= self._parameters.click_seconds:
@@ -209,7 +214,7 @@ def _lip_wrench(
     `state` (13,) is the connector's position, quaternion, velocity and rate; `seat` (3,) m and `seat_axis` (3,) the
     seat's position and x axis. `force` (3,) and `torque` (3,) are stiffness, limit and damping in their units.
     """
-    axis, velocity, rate = _x_axis(state[3:7]), state[7:10], state[10:13]
+    axis, velocity, rate = x_axis(state[3:7]), state[7:10], state[10:13]
     pull = _limited(force[0] * (seat - state[:3]), force[1]) - force[2] * velocity
     turning = rate - axis * np.sum(rate * axis)
     turn = _limited(torque[0] * np.cross(axis, seat_axis), torque[1]) - torque[2] * turning
@@ -217,7 +222,7 @@ def _lip_wrench(
 
 
 @numba.njit(cache=True)
-def _x_axis(quaternion: FloatArray) -> FloatArray:
+def x_axis(quaternion: FloatArray) -> FloatArray:
     """The x axis (3,) of the frame that a quaternion x, y, z, w (4,) of any length turns."""
     x, y, z, w = quaternion / np.sqrt(np.sum(quaternion * quaternion))
     return np.array([x * x - y * y - z * z + w * w, 2 * (x * y + z * w), 2 * (x * z - y * w)])

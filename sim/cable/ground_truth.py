@@ -37,8 +37,12 @@ class CableTruth(GroundTruth[CableObjects]):
         return self._world.arms[self._hand].in_tool(self._objects.connector_position())
 
     def plugged(self) -> bool:
-        """Whether the connector sits in its socket."""
-        return self._objects.socket.holds
+        """Whether the connector sits in a socket, or still on its stand."""
+        return self._objects.plugged()
+
+    def plugged_into(self) -> str | None:
+        """Name of the socket in which the connector sits; None if it sits in none."""
+        return self._objects.plugged_into()
 
     def stowed(self) -> bool:
         """Whether the connector sits in the clip."""

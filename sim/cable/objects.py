@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import product
 
 import numpy as np
 import pybullet as p
@@ -15,6 +16,7 @@ from regrasp.sim.cable.cable import BodyState, CableBody, CableParameters, build
 from regrasp.sim.cable.effects import effects_on
 from regrasp.sim.cable.fixtures import BodyLink, ClipHold, ClipParameters, SocketHold, build_fixtures
 from regrasp.sim.cable.laying import LayingParameters, lay_cable
+from regrasp.sim.cable.mouth import MouthParameters, SocketMouth
 from regrasp.sim.cable.phase import PhaseParameters, PhaseWatch
 from regrasp.sim.engine import Engine
 from regrasp.sim.faults.effects import TaskEffects
@@ -37,6 +39,7 @@ class CableObjectsParameters:
     cable: CableParameters = field(default_factory=CableParameters)
     laying: LayingParameters = field(default_factory=LayingParameters)
     clip: ClipParameters = field(default_factory=ClipParameters)
+    mouth: MouthParameters = field(default_factory=MouthParameters)
     phase: PhaseParameters = field(default_factory=PhaseParameters)
 
 
@@ -44,12 +47,14 @@ class CableObjects(TaskObjects):
     """The cable task's objects in one world.
 
     `connector_at` is the pose world_from_connector at the start, on a stand; None for the connector in its socket.
-    `cable`, `socket` (or the stand) and `clip` are there once the world is built.
+    `cable`, `socket` (or the stand), `clip` and the `mouths` of the sockets by name are there once the world is built;
+    the last socket, which holds the cable's other end, has none.
     """
 
     cable: CableBody
     socket: SocketHold
     clip: ClipHold
+    mouths: dict[str, SocketMouth]
 
     def __init__(
         self,
@@ -76,8 +81,15 @@ class CableObjects(TaskObjects):
     def lay_out(self, engine: Engine, fixed: Mapping[str, int]) -> None:
         """See `TaskObjects`: the cable comes to rest in its socket or on its stand."""
         self._filter_collisions(engine, fixed)
+        obstacles = [body for name, body in fixed.items() if name.startswith("obstacle ")]
+        meetings = list(product(range(self.cable.connector_link + 1), obstacles))
+        for link, body in meetings:  # the way to where it begins is not the run's
+            engine.let_pass(self.cable.body, link, body)
         self.socket = self._plug(engine)
+        for link, body in meetings:
+            engine.let_meet(self.cable.body, link, body)
         self.clip = self._build_clip(engine)
+        self.mouths = self._open_mouths()
         self._connector: BodyState = self.cable.connector_state()
 
     def effects(self) -> TaskEffects:
@@ -85,9 +97,11 @@ class CableObjects(TaskObjects):
         return effects_on(self.cable, self._parameters.knock_seconds)
 
     def before_step(self) -> None:
-        """See `TaskObjects`: the cable's springs and the clip act."""
+        """See `TaskObjects`: the cable's springs, the clip and the sockets' mouths act."""
         self.cable.apply_springs()
         self.clip.step(self._connector)
+        for mouth in self.mouths.values():
+            mouth.step(self._connector)
 
     def after_step(self) -> None:
         """See `TaskObjects`: the socket may let go."""
@@ -96,13 +110,23 @@ class CableObjects(TaskObjects):
 
     def update_triggers(self, now: float, triggers: TriggerState) -> None:
         """See `TaskObjects`: the share of the way that the held connector has been carried, and the phases."""
-        position, plugged = np.array(self._connector.position), self.socket.holds
+        position, plugged = np.array(self._connector.position), self.plugged()
         pads = (False, False) if plugged else self.pads_touching(self.cell.known.cable.hand)
         speed = math.hypot(*self._connector.velocity)
         self._phase.step(now, position, speed, pads, plugged, self.clip.holds)
         held = all(pads) and not plugged
         triggers.shares["carried"] = float((position - self._start) @ self._way) / self._way_sq if held else None
         triggers.phases = self._phase.began
+
+    def plugged(self) -> bool:
+        """Whether a socket, or the stand, holds the connector."""
+        return self.socket.holds or self.plugged_into() is not None
+
+    def plugged_into(self) -> str | None:
+        """Name of the socket that holds the connector; None if none does."""
+        if self.socket.holds and self._stand is None:
+            return self.cell.known.cable.plugged_into
+        return next((name for name, mouth in self.mouths.items() if mouth.holds), None)
 
     def pads_touching(self, arm: str) -> tuple[bool, bool]:
         """Whether the left and the right pad of that arm touch the connector now."""
@@ -162,6 +186,11 @@ class CableObjects(TaskObjects):
         if stand is None:
             return SocketHold(hold, np.asarray(socket.axis), socket.pull_out_force)
         return SocketHold(hold, None, self._parameters.stand_force)
+
+    def _open_mouths(self) -> dict[str, SocketMouth]:
+        known, link = self.cell.known.cable, BodyLink(self._client, self.cable.body, self.cable.connector_link)
+        parameters = self._parameters.mouth
+        return {socket.name: SocketMouth(link, socket, known.connector, parameters) for socket in known.sockets[:-1]}
 
     def _build_clip(self, engine: Engine) -> ClipHold:
         return ClipHold(

@@ -14,6 +14,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from regrasp.interfaces.arrays import FloatArray, Mask
 from regrasp.interfaces.cell import Cell, WristMount
+from regrasp.interfaces.devices import Guard
 from regrasp.interfaces.reading import JointReading
 from regrasp.interfaces.robot.parts import Placed
 from regrasp.interfaces.trajectory import Trajectory
@@ -67,6 +68,7 @@ class SimArm:
         self._late_joints = False  # whether the last command was more than some servo can do in a step
         self._gains = [parameters.position_gain] * count, [parameters.velocity_gain] * count, chain.torques.tolist()
         self._trajectory: Trajectory | None = None
+        self._guard: Guard | None = None
         self._started = 0.0
         self._servo: FloatArray = np.array(spec.sleep, float)  # where the servos stand, rad
         self._target = self._servo.copy()  # where they were told to go, rad
@@ -91,14 +93,16 @@ class SimArm:
     def reading(self) -> JointReading:
         """Quantised encoder positions, which are less than the truth by the offsets; velocities; servo torques."""
         states = p.getJointStates(self.body, self.joints, physicsClientId=self.client)
-        positions = self._signs * np.array([s[0] for s in states]) - self.offsets + self._encoder_slip
+        true, velocities, _, efforts = zip(*states, strict=True)
+        positions = self._signs * np.array(true) - self.offsets + self._encoder_slip
         step = self.robot.calibration.encoder_step
-        return JointReading(
-            self.now(),
-            np.round(positions / step) * step,
-            self._signs * np.array([s[1] for s in states]),
-            self._signs * np.array([s[3] for s in states]),
-        )
+        quantised = np.rint(positions / step) * step
+        return JointReading(self.now(), quantised, self._signs * np.array(velocities), self._signs * np.array(efforts))
+
+    def gravity(self) -> FloatArray:
+        """See `regrasp.interfaces.devices.Arm`."""
+        engine = p.getPhysicsEngineParameters(physicsClientId=self.client)
+        return np.array([engine[f"gravityAcceleration{axis}"] for axis in "XYZ"])
 
     def now(self) -> float:
         """Simulated seconds since the last `restart_clock`."""
@@ -109,9 +113,9 @@ class SimArm:
         self._steps = 0
         self.gripper.restart_clock()
 
-    def follow(self, trajectory: Trajectory) -> None:
+    def follow(self, trajectory: Trajectory, guard: Guard | None = None) -> None:
         """See `regrasp.interfaces.devices.Arm`."""
-        self._trajectory, self._started = trajectory, self.now()
+        self._trajectory, self._started, self._guard = trajectory, self.now(), guard
 
     def stop(self) -> None:
         """See `regrasp.interfaces.devices.Arm`: all joints come to rest together."""
@@ -174,6 +178,11 @@ class SimArm:
 
     def step(self) -> None:
         """Set the servos for the next physics step."""
+        if self._trajectory is not None and self._guard is not None:
+            reading = self.reading()
+            if self._guard(reading):
+                self._trajectory = None
+                self._drive(reading.positions - self._encoder_slip, np.zeros(len(reading.positions)))
         if self._trajectory is not None:
             t = self.now() + self._dt - self._started
             q, v = self._trajectory.sample(t)

@@ -29,6 +29,7 @@ study demo --seeds 0:1 --out loop
 study pose --out loop
 study pose --cell loop.yaml
 study coverage --out loop
+study motion --out loop
 calibrate --images loop
 calibrate --out loop.yaml
 calibrate --draw loop

@@ -11,7 +11,7 @@ import pytest
 from regrasp.interfaces.cable.services import CableMotionService, CablePerceptionService, GripService
 from regrasp.interfaces.devices import Arm, Clock, Gripper
 from regrasp.interfaces.services import MotionService, PerceptionService, StillnessService
-from regrasp.motion.cable.service import CableMotion
+from regrasp.motion.cable.socket_motion import SocketMotion
 from regrasp.motion.grasping.gap_test import GripWatch
 from regrasp.motion.service import Motion
 from regrasp.perception.cable.service import CablePerception
@@ -19,7 +19,7 @@ from regrasp.perception.service import Perception, StillnessWatch
 
 PAIRS: list[tuple[type[Any], type[Any]]] = [
     (MotionService, Motion),
-    (CableMotionService, CableMotion),
+    (CableMotionService, SocketMotion),
     (CableMotionService, fake_services.FakeMotion),
     (PerceptionService, Perception),
     (CablePerceptionService, CablePerception),
@@ -75,7 +75,7 @@ def test_a_signature_that_differs_is_noticed() -> None:
 
 if TYPE_CHECKING:  # and mypy sees that the types agree, too
 
-    def _motion(motion: Motion, cable: CableMotion, fake: fake_services.FakeMotion) -> tuple[MotionService, ...]:
+    def _motion(motion: Motion, cable: SocketMotion, fake: fake_services.FakeMotion) -> tuple[MotionService, ...]:
         both: tuple[CableMotionService, CableMotionService] = (cable, fake)
         return (motion, *both)
 

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.devices import TICK as TICK
+from regrasp.interfaces.devices import Guard
 from regrasp.interfaces.reading import GripperReading, JointReading
 from regrasp.interfaces.request import Request
 from regrasp.interfaces.trajectory import Trajectory
@@ -37,7 +38,10 @@ class FakeArm:
     def reading(self) -> JointReading:
         return JointReading(self.clock.t, self._now(), self._rate(), np.zeros(6))
 
-    def follow(self, trajectory: Trajectory) -> None:
+    def gravity(self) -> NDArray[np.float64]:
+        return np.zeros(3)
+
+    def follow(self, trajectory: Trajectory, guard: Guard | None = None) -> None:
         assert np.abs(trajectory.positions[0] - self._now()).max() < 1e-6, "a trajectory begins where the arm is"
         self.at = self._now()
         self.followed.append((self.clock.t, trajectory))

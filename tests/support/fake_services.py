@@ -16,7 +16,7 @@ from regrasp.behaviors import LEAVES, keys
 from regrasp.behaviors.cable.keys import FOUND, HELD, NOTICES, Found, LossNotice
 from regrasp.behaviors.cable.services import CableServices
 from regrasp.interfaces.cable.cell import CableKnown
-from regrasp.interfaces.cable.motion import Grip, View, Viewpoint
+from regrasp.interfaces.cable.motion import Grip, PluggedIn, View, Viewpoint
 from regrasp.interfaces.cable.sight import Estimate, InHand, NoEstimate, NotSeen, Sightings, TrackHealth, TrackState
 from regrasp.interfaces.cause import Cause, CauseCode
 from regrasp.interfaces.cell import Box, FixedMount
@@ -93,10 +93,11 @@ class FakeMotion:
         self.error: Exception | None = None
         self.hand = RigidTransform.from_translation([0.3, 0.0, 0.4])
         self.grippers = {arm.name: FakeGripper(clock) for arm in known.arms}
-        self.execution = Execution({}, self.grippers, {}, clock, 0.0)  # for its jaws
+        self.execution = Execution({}, self.grippers, {}, {}, clock, 0.0)  # for its jaws
         self.moves: list[tuple[str, Vector]] = []
         self.shifts: list[tuple[str, Vector]] = []
         self.cancelled: list[str] = []
+        self.plugged: list[tuple[str, RigidTransform]] = []  # sockets, and how the hand held the connector
         self.stopped = 0
         self.reachable: Callable[[RigidTransform], bool] = lambda pose: True
 
@@ -122,7 +123,9 @@ class FakeMotion:
         self.shifts.append((arm, np.asarray(displacement)))
         return self.work(arm)
 
-    def straight(self, arm: str, goal: RigidTransform, *, speed: float | None = None) -> Request[None]:
+    def straight(
+        self, arm: str, goal: RigidTransform, *, speed: float | None = None, pressing: bool = False
+    ) -> Request[None]:
         return self.work(arm)
 
     def close(self, arm: str, thickness: float) -> Request[float]:
@@ -196,6 +199,24 @@ class FakeMotion:
         return Request(steps(), back.cancel)
 
     def leave_clip(self) -> Request[None]:
+        return self.sleep(self.known.cable.hand)
+
+    def check_socket(self, name: str) -> None:
+        if self.error:
+            raise self.error
+
+    def carry_to_socket(self, held: RigidTransform, name: str) -> Request[None]:
+        return self.work(self.known.cable.hand)
+
+    def plug_in(self, held: RigidTransform, name: str) -> Request[PluggedIn]:
+        def steps() -> Generator[None, None, PluggedIn]:
+            self.plugged.append((name, held))
+            yield from self._steps()
+            return PluggedIn(2, np.array([0.0025, 0.00433]), 9.8765)
+
+        return Request(steps(), lambda: self.cancelled.append(self.known.cable.hand))
+
+    def leave_socket(self, name: str) -> Request[None]:
         return self.sleep(self.known.cable.hand)
 
     def search_views(self, last_seen: Vector | None) -> tuple[Vector, Iterator[Viewpoint]]:
@@ -329,8 +350,14 @@ class FakePerception:
     def stowed(self, estimate: Estimate) -> Evidence:
         return seen_at(estimate.position, np.array(self.known.cable.clip.seat), 0.04)
 
-    def in_hand(self, seen: Sequence[Estimate], tool: RigidTransform, held: RigidTransform) -> InHand | None:
-        return connector_in_hand(seen, self.known.cable.connector.length, tool, held)
+    def plugged(self, estimate: Estimate, socket: str) -> Evidence:
+        plug = self.known.cable.socket(socket).world_from_plug(self.known.cable.connector.length)
+        return seen_at(estimate.position, plug.translation, 0.04)
+
+    def in_hand(
+        self, seen: Sequence[Estimate], tool: RigidTransform, held: RigidTransform, *, least_turn_deg: float = 0.0
+    ) -> InHand | None:
+        return connector_in_hand(seen, self.known.cable.connector.length, tool, held, least_turn_deg)
 
     def obstacles_beside(self, world_from_connector: RigidTransform) -> tuple[Vector, float]:
         return self.obstacles()

@@ -1,6 +1,6 @@
 """`make bench`: the time that our functions take against the bare library calls in them, measured in one process.
 
-Then our planner against another one, and where the time of whole runs goes.
+Then our planner against another one on a few queries of `regrasp study motion`, and where the time of whole runs goes.
 """
 
 import io
@@ -25,7 +25,7 @@ from regrasp.app.scenario.load import cases, load_scenario
 from regrasp.app.studies.wall_parts import PARTS_HEADER, part_lines
 from regrasp.app.tasks.cable.cells import cable_cell
 from regrasp.app.tasks.cable.studies.demo import SCENARIOS
-from regrasp.app.tasks.cable.studies.planner_bench import print_planner_bench
+from regrasp.app.tasks.cable.studies.motion.study import run_motion
 from regrasp.behaviors import LEAVES
 from regrasp.interfaces.cable.cell import CableCell
 from regrasp.interfaces.frame import RgbdFrame
@@ -260,6 +260,6 @@ def detector_stages(cell: CableCell, width: int) -> dict[str, tuple[Call, Call]]
 
 if __name__ == "__main__":
     print_bench()
-    print_planner_bench()
+    run_motion(range(12), jobs=1, out=None)
     print()
     print_whole_runs()

@@ -25,4 +25,5 @@ def cell_names(cell: "CableCell | None") -> dict[str, dict[str, str]]:
     plugged = cable.plugged_into
     empty = f"is empty at the start: the cell's plugged_into is {quoted(plugged)}; write {PLUGGED_INTO}"
     sockets = {socket.name: "" if socket.name == plugged else empty for socket in cable.sockets}
-    return {"socket": {PLUGGED_INTO: ""} | sockets, "technique": techniques}
+    free = {socket.name: "" for socket in cable.sockets} | {cable.sockets[-1].name: "holds the cable's other end"}
+    return {"socket": {PLUGGED_INTO: ""} | sockets, "free_socket": {PLUGGED_INTO: ""} | free, "technique": techniques}

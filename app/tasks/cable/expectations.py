@@ -27,9 +27,15 @@ class Expect(expect.Expect):
     end: Annotated[
         EndState | None,
         Field(
-            description="Where the connector is then, by ground truth; left out: stowed if the outcome is success.",
+            description="Where the connector is then, by ground truth; left out: plugged with a `socket`, else stowed "
+            "if the outcome is success.",
             examples=["plugged"],
         ),
+    ] = None
+    socket: Annotated[
+        str | None,
+        Field(description="Name of the socket that holds the connector then.", examples=["back_5"]),
+        expect.CellName("free_socket"),
     ] = None
     tries: Annotated[
         int | None,
@@ -60,4 +66,6 @@ class Expect(expect.Expect):
     @property
     def end_state(self) -> EndState | None:
         """`end`, or what it is when it is left out."""
+        if self.end is None and self.socket is not None:
+            return "plugged"
         return "stowed" if self.end is None and self.outcome == "success" else self.end

@@ -15,6 +15,7 @@ from regrasp.behaviors.cable.keys import FOUND, NOTICES
 from regrasp.behaviors.cable.services import CableServices
 from regrasp.behaviors.keys import value_of
 from regrasp.interfaces.arrays import FloatArray
+from regrasp.interfaces.cable.cell import PLUGGED_INTO
 from regrasp.interfaces.wall_time import counts_as
 from regrasp.sim.cable.ground_truth import CableTruth
 from regrasp.sim.cable.objects import CableObjects
@@ -89,7 +90,7 @@ class CableJudge(Judge[Expect]):
             self._watch_hold(now)
             return
         self._held.update(now, False)
-        if self._was_held and not self._truth.stowed():
+        if self._was_held and not (self._truth.stowed() or self._truth.plugged()):
             if self._unheld_at is None:
                 self._unheld_at = now if self._grip.sliding.since is None else self._grip.sliding.since
             if self._untouched.update(now, not self._truth.touched()) >= PhaseParameters.lost_seconds:
@@ -130,6 +131,10 @@ class CableJudge(Judge[Expect]):
         if (wanted := self.expect.end_state) is not None:
             end = self._end_state()
             yield Expectation("end", end == wanted, end, wanted)
+        if (name := self.expect.socket) is not None:
+            name = self._cable.plugged_into if name == PLUGGED_INTO else name
+            socket = self._truth.plugged_into()
+            yield Expectation("socket", socket == name, socket, name)
 
     def _end_state(self) -> EndState:
         if self._truth.stowed():

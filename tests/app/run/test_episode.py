@@ -13,6 +13,7 @@ from regrasp.app.files.findings import Findings
 from regrasp.app.records.explain import explanation
 from regrasp.app.records.reader import read_record
 from regrasp.app.records.result import Result
+from regrasp.app.records.summary import run_summary
 from regrasp.app.run.episode import run_episode
 from regrasp.app.run.observers import Observers
 from regrasp.app.scenario.load import Scenario, load_scenario
@@ -219,6 +220,36 @@ def test_the_record_holds_what_it_takes_to_run_the_same_again(tmp_path: Path) ->
     assert again.file == made.file.model_copy(update=named)
     run_episode(again, tmp_path / "again", seed=4)
     assert (tmp_path / "again/ticks.jsonl").read_bytes() == (tmp_path / "run/ticks.jsonl").read_bytes()
+
+
+DRAW = (
+    "draw={obstacles: [{name: foam, count: [1, 2], size: {x: [0.05, 0.05], y: [0.05, 0.05], z: [0.05, 0.1]}, "
+    "region: {x: [0.3, 0.4], y: [-0.2, 0.2]}}]}"
+)
+
+
+def test_the_record_of_a_drawn_scene_shows_it_and_runs_it_again(tmp_path: Path) -> None:
+    short = scenario(tmp_path, '<GivesUp name="reach"/>', "limits.sim_seconds=0.3", DRAW)
+    result = run_episode(short, tmp_path / "run", seed=701)
+    begin = records(tmp_path / "run", "events.jsonl")[0]
+    assert result.thrown_away is not None
+    assert begin["thrown_away"] == result.thrown_away
+    assert set(result.thrown_away) == {"scenes", "blocks"}
+    again = load_scenario(str(tmp_path / "run/scenario.yaml"))
+    assert again.file.draw is None
+    assert again.file.obstacles
+    assert "thrown away" in run_summary(result, tmp_path)
+    other = run_episode(again, tmp_path / "again", seed=701)
+    assert other.thrown_away is None
+    for name in ("ticks.jsonl", "signals.f32", "scenario.yaml", "cell.yaml"):
+        assert (tmp_path / "again" / name).read_bytes() == (tmp_path / "run" / name).read_bytes()
+
+
+def test_a_scene_that_cannot_be_drawn_leaves_no_record(tmp_path: Path) -> None:
+    in_the_panel = DRAW.replace("[0.3, 0.4]", "[0.51, 0.51]")[:-1] + ", tries: 1}"
+    with pytest.raises(Findings, match="no room for its blocks"):
+        run_episode(scenario(tmp_path, '<GivesUp name="reach"/>', in_the_panel), tmp_path / "run", seed=1)
+    assert not (tmp_path / "run").exists()
 
 
 def test_ctrl_c_between_two_ticks_leaves_a_whole_record(tmp_path: Path, ends: list[tuple[bool, float]]) -> None:

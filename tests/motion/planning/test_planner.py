@@ -11,7 +11,7 @@ from regrasp.interfaces.cell import Box
 from regrasp.motion.failure import PlanningError
 from regrasp.motion.planning.planner import PlannerParameters, plan
 from regrasp.motion.robots.kinematics import ArmKinematics
-from regrasp.motion.scene.collision import CollisionModel
+from regrasp.motion.scene.collision import CollisionModel, CollisionParameters
 
 KIN = ArmKinematics(VX300S, RigidTransform.identity())
 FLOOR = Box(name="floor", center=(0.2, 0, -0.02), size=(2.4, 2.4, 0.04))
@@ -94,3 +94,48 @@ def test_a_start_nearer_than_the_margin_is_led_away_with_growing_clearance() -> 
     inside = 1 + next(i for i, c in enumerate(first) if c >= 0.02)
     assert first[:inside] == sorted(first[:inside])
     assert free_everywhere(model, path[inside - 1 :], 0.019)
+
+
+def test_a_way_that_coarse_checks_miss_is_found_by_fine_ones() -> None:
+    blind = CollisionModel(KIN, [FLOOR, POST], parameters=CollisionParameters(coarse_step=10.0))
+    assert blind.edge_free(LEFT, RIGHT, 0.01), "coarsely the post is not there"
+    path = plan(blind, LEFT, RIGHT[None], seed=0, margin=0.01)
+    assert free_everywhere(MODEL, path, 0.007)
+
+
+def test_a_start_a_little_past_a_limit_is_led_back() -> None:
+    start = LEFT.copy()
+    start[5] = KIN.upper[5] + 0.02
+    path = plan(MODEL, start, RIGHT[None], seed=0, margin=0.01)
+    assert path[0] == pytest.approx(start)
+    assert path[1] == pytest.approx(np.clip(start, KIN.lower, KIN.upper))
+    assert free_everywhere(MODEL, path[1:], 0.007)
+    start[5] = KIN.upper[5] + 0.2
+    with pytest.raises(PlanningError, match=r"past its limits: wrist_rotate 3\.342, limits") as caught:
+        plan(MODEL, start, RIGHT[None], seed=0)
+    assert caught.value.code is CauseCode.MOTION_BLOCKED
+
+
+def test_goals_past_the_limits_do_not_count() -> None:
+    past = RIGHT.copy()
+    past[1] = 2.0
+    path = plan(MODEL, LEFT, np.array([past, RIGHT]), seed=0)
+    assert path[-1] == pytest.approx(RIGHT)
+    blocked = np.array([0.0, 0.0, 0.0, 0.0, 0.3, 0.0])
+    with pytest.raises(PlanningError, match=r"none of 2 goals keeps 10 mm: the best has -\d+ mm to post"):
+        plan(MODEL, LEFT, np.array([past, blocked]), seed=0)
+    with pytest.raises(PlanningError, match=r"limits: shoulder 2, limits -1\.85 to 1\.257") as caught:
+        plan(MODEL, LEFT, past[None], seed=0)
+    assert caught.value.code is CauseCode.OUT_OF_REACH
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_numbers_that_are_not_finite_are_refused(value: float) -> None:
+    wrong = RIGHT.copy()
+    wrong[3] = value
+    with pytest.raises(ValueError, match="the goals' joints: 1 of 6 numbers are not finite"):
+        plan(MODEL, LEFT, wrong[None], seed=0)
+    with pytest.raises(ValueError, match="the start's joints: 1 of 6 numbers are not finite"):
+        plan(MODEL, wrong, LEFT[None], seed=0)
+    with pytest.raises(ValueError, match="the margin is"):
+        plan(MODEL, LEFT, RIGHT[None], seed=0, margin=value)

@@ -1,16 +1,12 @@
 """The socket and the clip on a free connector without gravity."""
 
-from dataclasses import dataclass
-
 import numpy as np
-import pybullet as p
 import pytest
+from free_plug import FreePlug, free_plug
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cable.cell import CableCell
-from regrasp.sim.cable.cable import BodyState
-from regrasp.sim.cable.fixtures import BodyLink, ClipHold, ClipParameters, Hold, SocketHold
+from regrasp.sim.cable.fixtures import ClipHold, ClipParameters, Hold, SocketHold
 from regrasp.sim.cable.objects import CableObjectsParameters
 
 STAND_FORCE = CableObjectsParameters().stand_force
@@ -19,56 +15,13 @@ LET_GO = 1.0  # N around the stated force
 SEATED = 0.0005  # m
 
 
-@dataclass
-class Plug:
-    """A connector alone."""
-
-    client: int
-    body: int
-    step: float
-
-    @property
-    def link(self) -> BodyLink:
-        return BodyLink(self.client, self.body, -1)
-
-    def state(self) -> BodyState:
-        place = p.getBasePositionAndOrientation(self.body, physicsClientId=self.client)
-        return BodyState(*place, *p.getBaseVelocity(self.body, physicsClientId=self.client))
-
-    def put(self, pose: RigidTransform, velocity: FloatArray | None = None) -> None:
-        p.resetBasePositionAndOrientation(
-            self.body, pose.translation.tolist(), pose.rotation.as_quat().tolist(), physicsClientId=self.client
-        )
-        p.resetBaseVelocity(
-            self.body, [0, 0, 0] if velocity is None else velocity.tolist(), [0, 0, 0], physicsClientId=self.client
-        )
-
-    def advance(self, seconds: float, clip: ClipHold | None = None, force: FloatArray | None = None) -> None:
-        for _ in range(round(seconds / self.step)):
-            state = self.state()
-            if clip is not None:
-                clip.step(state)
-            if force is not None:
-                at = state.position
-                p.applyExternalForce(self.body, -1, force.tolist(), at, p.WORLD_FRAME, physicsClientId=self.client)
-            p.stepSimulation(physicsClientId=self.client)
+@pytest.fixture
+def plug(cell: CableCell, client: int) -> FreePlug:
+    return free_plug(cell, client)
 
 
 @pytest.fixture
-def plug(cell: CableCell, client: int) -> Plug:
-    radius, length, mass = (
-        cell.known.cable.connector.radius,
-        cell.known.cable.connector.length,
-        cell.hidden.cable.connector_mass,
-    )
-    body = p.createMultiBody(mass, -1, -1, physicsClientId=client)
-    inertia = [mass * radius**2 / 2] + [mass * (3 * radius**2 + length**2) / 12] * 2
-    p.changeDynamics(body, -1, localInertiaDiagonal=inertia, linearDamping=0, angularDamping=0, physicsClientId=client)
-    return Plug(client, body, 1.0 / cell.hidden.step_rate)
-
-
-@pytest.fixture
-def clip(cell: CableCell, plug: Plug) -> ClipHold:
+def clip(cell: CableCell, plug: FreePlug) -> ClipHold:
     mass, length, radius = (
         cell.hidden.cable.connector_mass,
         cell.known.cable.connector.length,
@@ -86,7 +39,7 @@ def near_seat(cell: CableCell, distance: float, angle_deg: float) -> RigidTransf
     return RigidTransform.from_components(seat.translation + offset, seat.rotation * tilt)
 
 
-def seated(cell: CableCell, plug: Plug, clip: ClipHold) -> None:
+def seated(cell: CableCell, plug: FreePlug, clip: ClipHold) -> None:
     plug.put(cell.known.cable.clip.world_from_seat)
     plug.advance(0.5, clip)
     assert clip.holds
@@ -105,7 +58,7 @@ def seated(cell: CableCell, plug: Plug, clip: ClipHold) -> None:
     ],
 )
 def test_it_takes_an_end_that_rests_in_its_mouth(
-    cell: CableCell, plug: Plug, clip: ClipHold, distance: float, angle_deg: float, caught: bool
+    cell: CableCell, plug: FreePlug, clip: ClipHold, distance: float, angle_deg: float, caught: bool
 ) -> None:
     plug.put(near_seat(cell, distance, angle_deg))
     plug.advance(1.5, clip)
@@ -117,7 +70,7 @@ def test_it_takes_an_end_that_rests_in_its_mouth(
 
 
 @pytest.mark.parametrize("speed", [0.03, 0.5])
-def test_it_does_not_take_a_passing_end(cell: CableCell, plug: Plug, clip: ClipHold, speed: float) -> None:
+def test_it_does_not_take_a_passing_end(cell: CableCell, plug: FreePlug, clip: ClipHold, speed: float) -> None:
     plug.put(near_seat(cell, 0.04, 0.0), -speed * np.array([2.0, -1.0, 2.0]) / 3.0)
     closest = np.inf
     for _ in range(round(0.1 / speed / 0.01)):
@@ -128,7 +81,9 @@ def test_it_does_not_take_a_passing_end(cell: CableCell, plug: Plug, clip: ClipH
     assert closest < 0.01  # m: it did pass through the mouth
 
 
-def test_it_does_not_take_an_end_that_rests_for_too_short_a_time(cell: CableCell, plug: Plug, clip: ClipHold) -> None:
+def test_it_does_not_take_an_end_that_rests_for_too_short_a_time(
+    cell: CableCell, plug: FreePlug, clip: ClipHold
+) -> None:
     plug.put(near_seat(cell, 0.005, 0.0))
     plug.advance(0.15, clip)
     assert not clip.holds
@@ -139,7 +94,7 @@ DIRECTIONS = [(1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.6, -0.8)]
 
 @pytest.mark.parametrize("direction", DIRECTIONS)
 def test_it_holds_ten_newtons(
-    cell: CableCell, plug: Plug, clip: ClipHold, direction: tuple[float, float, float]
+    cell: CableCell, plug: FreePlug, clip: ClipHold, direction: tuple[float, float, float]
 ) -> None:
     seated(cell, plug, clip)
     plug.advance(3.0, clip, 10.0 * np.asarray(direction))
@@ -152,7 +107,7 @@ def test_it_holds_ten_newtons(
 
 @pytest.mark.parametrize("direction", DIRECTIONS)
 def test_it_lets_go_above_its_force(
-    cell: CableCell, plug: Plug, clip: ClipHold, direction: tuple[float, float, float]
+    cell: CableCell, plug: FreePlug, clip: ClipHold, direction: tuple[float, float, float]
 ) -> None:
     seated(cell, plug, clip)
     force = 10.0
@@ -162,7 +117,7 @@ def test_it_lets_go_above_its_force(
     assert force == pytest.approx(cell.known.cable.clip.hold_force, abs=LET_GO)
 
 
-def test_what_was_pulled_out_is_taken_again_only_after_it_left(cell: CableCell, plug: Plug, clip: ClipHold) -> None:
+def test_what_was_pulled_out_is_taken_again_only_after_it_left(cell: CableCell, plug: FreePlug, clip: ClipHold) -> None:
     seated(cell, plug, clip)
     plug.put(near_seat(cell, 0.021, 0.0))
     plug.advance(0.01, clip)
@@ -178,7 +133,7 @@ def test_what_was_pulled_out_is_taken_again_only_after_it_left(cell: CableCell, 
 
 
 @pytest.mark.parametrize(("force", "stays"), [(5.0, True), (9.5, True), (10.5, False), (15.0, False)])
-def test_a_socket_lets_go_at_its_pull_out_force(plug: Plug, force: float, stays: bool) -> None:
+def test_a_socket_lets_go_at_its_pull_out_force(plug: FreePlug, force: float, stays: bool) -> None:
     socket = SocketHold(Hold(plug.link, RigidTransform.identity()), np.array([0.0, 1.0, 0.0]), 10.0)
     for _ in range(480):
         plug.advance(plug.step, force=np.array([0.0, -force, 0.0]))
@@ -188,7 +143,7 @@ def test_a_socket_lets_go_at_its_pull_out_force(plug: Plug, force: float, stays:
     assert (moved < 1e-4) == stays  # m
 
 
-def test_a_single_steps_spike_does_not_unplug(plug: Plug) -> None:
+def test_a_single_steps_spike_does_not_unplug(plug: FreePlug) -> None:
     socket = SocketHold(Hold(plug.link, RigidTransform.identity()), np.array([0.0, 1.0, 0.0]), 10.0)
     for i in range(100):
         plug.advance(plug.step, force=np.array([40.0 if i == 50 else 0.0, 0.0, 0.0]))
@@ -199,7 +154,7 @@ def test_a_single_steps_spike_does_not_unplug(plug: Plug) -> None:
 @pytest.mark.parametrize("direction", [*DIRECTIONS, (0.0, 1.0, 0.0), (0.0, -1.0, 0.0)])
 @pytest.mark.parametrize(("share", "stays"), [(0.95, True), (1.05, False)])
 def test_a_stand_lets_go_at_its_force_whichever_way(
-    plug: Plug, direction: tuple[float, float, float], share: float, stays: bool
+    plug: FreePlug, direction: tuple[float, float, float], share: float, stays: bool
 ) -> None:
     stand = SocketHold(Hold(plug.link, RigidTransform.identity()), None, STAND_FORCE)
     for _ in range(480):

@@ -19,7 +19,7 @@ _KEPT = "are kept there as they end: the same command again goes on there."
 
 def add_to(study: typer.Typer) -> None:
     """Add the studies to `regrasp study`."""
-    for command in (demo, pose, coverage):
+    for command in (demo, pose, coverage, contact, motion):
         study.command(command.__name__)(command)
 
 
@@ -132,6 +132,57 @@ def coverage(
         from regrasp.app.tasks.cable.studies.pose.trial import setups_of
 
     raise typer.Exit(run_coverage(setups_of(names, cell, renderer=renderer), chosen, jobs, out))
+
+
+def contact(
+    seeds: Annotated[str, typer.Option(metavar="A:B", help="Trials: seeds from A up to, not including, B.")] = "0:20",
+    jobs: Annotated[int, typer.Option(min=1, help="Trials side by side.")] = os.cpu_count() or 1,
+    out: Annotated[Path | None, typer.Option(help=f"Folder of contact.json. Trials {_KEPT}")] = None,
+) -> None:
+    """Put a foam block in a moving arm's way, unseen.
+
+    How hard the arm presses before it stops, and whether it finds another way; how soon it halts when it is told to.
+    Two trials a seed, without and with gravity, some seconds each.
+
+    \b
+    Example:
+      regrasp study contact --seeds 0:20 --out results/contact
+    """
+    chosen, wrong = parse_seeds(seeds), folders.folder_findings(out) if out is not None else []
+    if wrong:
+        raise Findings(wrong)
+    with late_imports():
+        from regrasp.app.tasks.cable.studies.contact import run_contact
+
+    raise typer.Exit(run_contact(chosen, jobs, out))
+
+
+def motion(
+    seeds: Annotated[str, typer.Option(metavar="A:B", help="Queries: seeds from A up to, not including, B.")] = "0:100",
+    jobs: Annotated[int, typer.Option(min=1, help="Queries side by side; more than one blurs the times.")] = 1,
+    out: Annotated[Path | None, typer.Option(help=f"Folder of motion.json. Queries {_KEPT}")] = None,
+) -> None:
+    """Ask the planner retrieval queries in cluttered cells.
+
+    Each seed puts one to four pieces of foam into the thesis's cell. Three of four ask for a path that exists: from
+    sleep or a viewpoint to a view of the lost end, to a grasp of it, with it to the clip, to sleep. Every fourth asks
+    for what cannot be done, whose cause must be named. birrt of pybullet-planning is asked the same, and coal checks
+    every path by meshes, where they are installed: pip install -e '.[bench]' in the project's folder.
+
+    \b
+    Example:
+      regrasp study motion --seeds 0:100 --out results/motion
+
+    \b
+    Exit code: 0 done, 1 a query broke off, 2 bad input, 130 Ctrl-C.
+    """
+    chosen = parse_seeds(seeds)
+    if out is not None and (wrong := folders.folder_findings(out)):
+        raise Findings(wrong)
+    with late_imports():
+        from regrasp.app.tasks.cable.studies.motion.study import run_motion
+
+    raise typer.Exit(run_motion(chosen, jobs, out))
 
 
 def _techniques(text: str | None, wrong: list[Finding]) -> list[str]:

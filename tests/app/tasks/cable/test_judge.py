@@ -26,6 +26,7 @@ class Truth:
     fingers: int = 0  # that touch the connector
     in_clip: bool = False
     in_socket: bool = False
+    socket: str = "back_4"
     speed: float = 0.0
     pixels: int = 0
     peaks: dict[str, float] = field(default_factory=dict)
@@ -43,6 +44,9 @@ class Truth:
 
     def plugged(self) -> bool:
         return self.in_socket
+
+    def plugged_into(self) -> str | None:
+        return self.socket if self.in_socket else None
 
     def connector_in_hand(self) -> NDArray[np.float64]:
         return np.array([0.0, 0.0, self.in_hand])
@@ -70,7 +74,7 @@ class Run:
 
     def __post_init__(self) -> None:
         Blackboard.clear()
-        cable = SimpleNamespace(overview="rear", search="wrist")
+        cable = SimpleNamespace(overview="rear", search="wrist", plugged_into="back_4")
         cell = SimpleNamespace(known=SimpleNamespace(cable=cable))
         world = SimpleNamespace(
             objects=SimpleNamespace(cell=cell), now=lambda: (self.tick - 1) * TICK, contact_peaks=self.truth.peaks
@@ -164,11 +168,12 @@ def test_a_hold_regained_within_a_moment_is_no_loss(gap: float, losses: int) -> 
     assert len(run.judge.losses) == losses
 
 
-def test_what_one_pad_still_touches_or_the_clip_holds_is_not_lost() -> None:
+@pytest.mark.parametrize("place", ["in_clip", "in_socket"])
+def test_what_one_pad_still_touches_or_clip_or_socket_holds_is_not_lost(place: str) -> None:
     run = Run()
     run.go(1.0, fingers=2)
     run.go(2.0, fingers=1)
-    run.go(2.0, fingers=0, in_clip=True)
+    run.go(2.0, fingers=0, **{place: True})
     assert run.judge.losses == []
 
 
@@ -241,6 +246,19 @@ def test_the_end_is_by_the_truth_not_by_what_the_robot_says() -> None:
     run.go(0.1, in_socket=False, in_clip=True)
     assert run.verdict("end") == (True, "stowed")
     assert run.verdict("outcome", outcome="time_limit") == (False, "time_limit")
+
+
+@pytest.mark.parametrize("wanted", ["back_4", "plugged_into"])
+def test_the_socket_that_holds_the_end_is_the_expected_one(wanted: str) -> None:
+    run = Run(Expect(socket=wanted))
+    run.go(0.1)
+    assert run.verdict("end") == (False, "lost")
+    assert run.verdict("socket") == (False, None)
+    run.go(0.1, in_socket=True, socket="back_1")
+    assert run.verdict("end") == (True, "plugged")
+    assert run.verdict("socket") == (False, "back_1")
+    run.go(0.1, socket="back_4")
+    assert run.verdict("socket") == (True, "back_4")
 
 
 def test_a_failure_that_is_expected_is_met_by_its_cause() -> None:

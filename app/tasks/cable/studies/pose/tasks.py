@@ -1,4 +1,4 @@
-"""Runs the scenes of a pose study as a campaign: in processes, each kept as it ends."""
+"""Runs the scenes of a study as a campaign: in processes, each kept as it ends."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

@@ -1,0 +1,1 @@
+"""The motion study: retrieval queries to the planner in cluttered cells."""

@@ -1,0 +1,102 @@
+"""Contact detection on a moving arm: the drives' efforts against those that its rigid-body dynamics ask for."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from regrasp.interfaces.arrays import FloatArray
+from regrasp.interfaces.reading import JointReading
+from regrasp.motion.robots.dynamics import ArmDynamics
+
+
+@dataclass(frozen=True, eq=False)
+class ContactLimits:
+    """What counts as a touch.
+
+    Without a contact the simulated arms differ from their model by 0.05 N m at most. The limits leave room for the
+    friction of real drives.
+    """
+
+    share: float  # of a joint's greatest effort: 0.12 is 1.3 N m at a ViperX's waist, 2 to 4 N at its hand
+    # s, time constant with which an effort that lasts becomes the usual one: what grows more slowly is no touch
+    adaptation: float = 0.25
+    # Where something pulls at the hand, m, and the unit vector along which it may pull as it likes, (6,) in the tool
+    # frame; None: nowhere.
+    pull: FloatArray | None = None
+
+
+@dataclass(frozen=True)
+class ContactGuardParameters:
+    """What counts as a touch of an arm that moves freely, that pulls an elastic thing along, and that presses."""
+
+    free: ContactLimits = ContactLimits(0.12)  # choice
+    carrying: ContactLimits = ContactLimits(0.4)  # choice: a bent cable turns the wrist with half a newton metre
+    # A plug that is gripped askew jams in its socket up to what the drives can do: this stops at a blow only; choice
+    pressing: ContactLimits = ContactLimits(2.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Touch:
+    """What a guard felt at `stamp` s.
+
+    The joints (n,), their velocities (n,), and the efforts (n,), N m or N, of a force from outside on them.
+    """
+
+    stamp: float
+    joints: FloatArray
+    velocities: FloatArray
+    efforts: FloatArray
+
+
+class ContactGuard:
+    r"""Implements `regrasp.interfaces.devices.Guard` for one motion of an arm.
+
+    The efforts from outside are what inverse dynamics leave of the drives' efforts :math:`\tau`:
+
+    .. math:: r = M(q) \ddot q + C(q, \dot q) \dot q + g(q) - \tau
+
+    with the acceleration by the last two velocities. A touch is a difference of :math:`r` from its own slow mean
+    beyond the `limits`, shares of the joints' `torques` (n,), N m or N. Of a taut cable, whose pull grows as quickly
+    as that of a wall, the share of :math:`r` along :math:`J^T f` of its direction f is taken away first.
+    See Haddadin, De Luca, Albu-Schaeffer 2017,
+    "Robot Collisions: A Survey", III-B.
+    `gravity` is (3,) m/s2 in the world.
+    """
+
+    def __init__(
+        self,
+        dynamics: ArmDynamics,
+        gravity: FloatArray,
+        torques: FloatArray,
+        limits: ContactLimits,
+    ) -> None:
+        self._dynamics, self._gravity, self._adaptation = dynamics, gravity, limits.adaptation
+        self._limits, self._pull = limits.share * torques, limits.pull
+        self._last: JointReading | None = None
+        self._usual: FloatArray | None = None
+        self.touch: Touch | None = None
+
+    def __call__(self, reading: JointReading) -> bool:
+        """Whether the arm must stop now."""
+        last, self._last = self._last, reading
+        if last is None or reading.stamp <= last.stamp:
+            return False
+        interval = reading.stamp - last.stamp
+        accelerations = (reading.velocities - last.velocities) / interval
+        wanted = self._dynamics.efforts(reading.positions, reading.velocities, accelerations, self._gravity)
+        outside = wanted - reading.efforts
+        if self._usual is None:
+            self._usual = outside
+        change = outside - self._usual
+        if (np.abs(self._without_pull(reading.positions, change)) > self._limits).any():
+            self.touch = Touch(reading.stamp, reading.positions, last.velocities, change)
+        self._usual = self._usual + min(interval / self._adaptation, 1.0) * change
+        return self.touch is not None
+
+    def _without_pull(self, q: FloatArray, efforts: FloatArray) -> FloatArray:
+        """The efforts (n,) less those that a force along the pull explains best, by the limits as weights."""
+        if self._pull is None:
+            return efforts
+        along = self._dynamics.efforts_of_pull(q, self._pull) / self._limits
+        share = float(along @ (efforts / self._limits)) / max(float(along @ along), 1e-12)
+        return efforts - share * along * self._limits
