@@ -22,6 +22,7 @@ from typing import Any
 from hostile_files import KINDS, RECORD, SHIPPED, Case, cases
 
 from regrasp.app.files.findings import Findings
+from regrasp.app.files.resources import shipped
 
 RECORDED = KINDS[len(SHIPPED) :]
 FORMATS = ("ascii", "dot", "groot", "json", "mermaid", "svg")
@@ -113,8 +114,10 @@ def _wrong(code: int, error: BaseException | None, out: str, told: str) -> str |
 def _work(pipe: Any, folder: str) -> None:
     """Read what the pipe brings; tell how it went and what files were opened for writing meanwhile."""
     os.chdir(folder)
-    for kind in KINDS:
-        read(Case(kind, (RECORD / kind).read_bytes() if kind in RECORDED else b"", ""), Path(folder))  # all imports
+    # all imports first, and all functions that are compiled on their first call
+    whole = [(kind, path) for kind in SHIPPED for path in shipped(kind).values()]
+    for kind, path in [*whole, *((name, RECORD / name) for name in RECORDED)]:
+        read(Case(kind, path.read_bytes(), ""), Path(folder))
     written: list[str] = []
 
     def audit(event: str, args: tuple[Any, ...]) -> None:
