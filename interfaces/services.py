@@ -1,7 +1,7 @@
 """What leaves of every task ask of the robot's services. `motion` and `perception` answer, in tests stand-ins do."""
 
 from collections.abc import Collection, Sequence
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.frame import RgbdFrame
@@ -11,6 +11,14 @@ if TYPE_CHECKING:
     from scipy.spatial.transform import RigidTransform
 
     from regrasp.interfaces.cell import Box
+
+
+class Obstacles(NamedTuple):
+    """A map of obstacles: voxels by their centres in the world."""
+
+    points: FloatArray  # (n, 3) m, seen to be full
+    spacing: float  # m, the voxels' edge
+    unseen: FloatArray  # (m, 3) m, behind seen surfaces: assumed to be full until a camera shows them
 
 
 class MotionService(Protocol):
@@ -69,8 +77,8 @@ class MotionService(Protocol):
         """world_from_tool as read."""
         ...
 
-    def set_obstacles(self, points: FloatArray, spacing: float) -> None:
-        """Keep clear of occupied voxels from now on: centres (n, 3) m in the world, and the edge `spacing` m."""
+    def set_obstacles(self, points: FloatArray, spacing: float, unseen: FloatArray) -> None:
+        """Keep clear of these voxels from now on, see `Obstacles`; an unseen one is entered where no other way is."""
         ...
 
     def keep_clear(self, points: FloatArray) -> None:
@@ -118,7 +126,7 @@ class PerceptionService(Protocol):
         """Map what a camera sees if that is a new thing; its number of voxels, else 0."""
         ...
 
-    def obstacles(self) -> tuple[FloatArray, float]:
+    def obstacles(self) -> Obstacles:
         """What is mapped: centres (n, 3) m, world, of full voxels, and their edge in m."""
         ...
 

@@ -25,9 +25,12 @@ from regrasp.motion.planning.planner import PlannerParameters, plan
 from regrasp.motion.planning.straight import can_continue, straight_line
 from regrasp.motion.request import MotionRequest
 from regrasp.motion.robots.arm_offsets import JointOffsetParameters, joint_offsets
+from regrasp.motion.robots.contact_guard import ContactLimits
 from regrasp.motion.robots.dynamics import ArmDynamics
 from regrasp.motion.scene.collision import Clearances, CollisionModel
 from regrasp.motion.scene.planning_scene import NO_POINTS, PlanningScene, PlanningSceneParameters
+
+_NO_WAY = (CauseCode.NO_COLLISION_FREE_GOAL, CauseCode.PLANNING_FAILED, CauseCode.MOTION_BLOCKED)
 
 # Points (n, 3) m in the world that a camera saw from that second on; None while there is no such picture.
 PointCloudSource = Callable[[float], FloatArray | None]
@@ -38,6 +41,7 @@ class MotionParameters:
     """The parameters of all parts of the motion service."""
 
     approach_speed: float = 0.3  # share of the joints' speed on straight paths near things; choice
+    unseen_speed: float = 0.3  # share of the joints' speed of a path through space that no camera has seen; choice
     touches: int = 6  # that end a motion; after each before it the arm goes on by another way; choice
     camera_timeout: float = 1.0  # s that a camera has to show the arm; a sound one needs 0.2
     clearances: Clearances = field(default_factory=Clearances)
@@ -85,11 +89,11 @@ class Motion(PlanningScene):
         goals = rows("the goals' joints", goals, len(self.kinematics[arm]))
         _check_margin(margin)
 
-        def steps() -> Iterator[None]:
-            path = self._plan(self.start_model(arm), self.joints(arm), goals, margin, tight)
-            yield from self.execution.follow(arm, path, 1.0)
+        def steps(unseen: bool) -> Iterator[None]:
+            path = self._plan(self.start_model(arm, unseen=unseen), self.joints(arm), goals, margin, tight)
+            yield from self.execution.follow(arm, path, self._pace(unseen))
 
-        return self.execution.request(arm, self._past_touches(arm, steps))
+        return self.execution.request(arm, self._tries(arm, steps))
 
     def move_tool(
         self,
@@ -107,9 +111,9 @@ class Motion(PlanningScene):
             finite_pose("the tool's pose", pose)
         _check_margin(margin)
 
-        def steps() -> Iterator[None]:
+        def steps(unseen: bool) -> Iterator[None]:
             kin, q = self.kinematics[arm], self.joints(arm)
-            model = self.start_model(arm)
+            model = self.start_model(arm, unseen=unseen)
 
             def path_to(ends: FloatArray) -> FloatArray:
                 goals = [end for end in ends if can_continue(kin, end, onward)]
@@ -126,9 +130,9 @@ class Motion(PlanningScene):
                 if kin.robot.rail is None:
                     raise
                 path = path_to(kin.ik(world_from_tool))
-            yield from self.execution.follow(arm, path, 1.0)
+            yield from self.execution.follow(arm, path, self._pace(unseen))
 
-        return self.execution.request(arm, self._past_touches(arm, steps))
+        return self.execution.request(arm, self._tries(arm, steps))
 
     def sleep(self, arm: str) -> MotionRequest:
         """Bring an arm to its sleep pose, out of the cameras' and the other arms' way."""
@@ -157,11 +161,14 @@ class Motion(PlanningScene):
         *,
         checked: bool = True,
         without: Collection[Box] = (),
+        held: FloatArray | None = None,
+        contact: ContactLimits | None = None,
     ) -> MotionRequest:
         """Move the tool straight by `displacement` (3,) m in the world, without turning it.
 
-        `checked`: only if the arm meets nothing but the boxes `without`. A motion that begins in a box cannot be
-        checked; there the arm may press or pull.
+        `checked`: only if the arm, with the spheres `held` (see `model`), meets nothing but the boxes `without`. A
+        motion that begins in a box cannot be checked; there the arm may press or pull. `contact`: what counts as a
+        touch (default: of an arm that moves freely).
         """
         way = vector("the displacement", displacement)
 
@@ -170,11 +177,12 @@ class Motion(PlanningScene):
             tool = kin.tool(q)
             goal = RigidTransform.from_components(tool.translation + way, tool.rotation)
             path = straight_line(kin, q, goal)
-            model = self.start_model(arm, without=without)
             if checked:
+                # Where it stands no camera sees: at this speed it may go back through what it hides.
+                model = self.start_model(arm, held=held, without=without, unseen=False)
                 self._check_shift(model, path, float(np.linalg.norm(way)))
-            contact = None if checked else self._guard.pressing
-            yield from self.execution.follow(arm, path, self.parameters.approach_speed, contact)
+            limits = contact if checked else self._guard.pressing
+            yield from self.execution.follow(arm, path, self.parameters.approach_speed, limits)
 
         return self.execution.request(arm, steps())
 
@@ -188,25 +196,30 @@ class Motion(PlanningScene):
         clear_of: FloatArray | None = None,
         without: Collection[Box] = (),
         point_cloud: PointCloudSource | None = None,
+        enter_unseen: bool = True,
+        last: Callable[[Grasp], bool] | None = None,
     ) -> MotionRequest:
         """Open the jaw and bring it round a cylinder; the jaw stays open.
 
         The cylinder lies `shallow` metres nearer to the finger tips than the pads' middle. The arm keeps clear of the
         points `clear_of` (n, 3) m, except where the jaw takes hold: pushing a cable moves the connector. On the last
         straight way it may touch the boxes `without`. Before that it is corrected by the `point_cloud` that a camera
-        sees of it.
+        sees of it. `enter_unseen`: where there is no other way, slowly through space that no camera has seen. Grasps
+        of which `last` is true are tried after all others.
         """
         finite_pose("the cylinder's pose", world_from_cylinder)
         near_points = None if clear_of is None else rows("the points to keep clear of", clear_of, 3)
 
-        def steps() -> Iterator[None]:
+        def steps(unseen: bool) -> Iterator[None]:
             q, jaw = self.joints(arm), self.parameters.execution.jaw
             self._keep_clear_but_near(near_points, world_from_cylinder.translation)
-            model = self.start_model(arm, opening=jaw.open_gap)
+            model = self.start_model(arm, opening=jaw.open_gap, unseen=unseen)
             widest = self.known.arm(arm).robot.gripper.opening
             candidates = pick_candidates(world_from_cylinder, cylinder, shallow, widest, self.parameters.pick)
+            if last is not None:
+                candidates.sort(key=last)
             try:
-                approaches = self._approaches(arm, model, candidates, without)
+                approaches = self._approaches(arm, model, candidates, without, unseen)
             except PlanningError as error:
                 if error.code is not CauseCode.OUT_OF_REACH:
                     raise
@@ -215,7 +228,7 @@ class Motion(PlanningScene):
             self.grippers[arm].open(jaw.open_gap)
             path = self._plan(model, q, np.array([approach[0] for approach in approaches]))
             approach = min(approaches, key=lambda approach: float(np.abs(approach[0] - path[-1]).max()))
-            yield from self.execution.follow(arm, path, 1.0)
+            yield from self.execution.follow(arm, path, self._pace(unseen))
             yield from self.execution.open_jaw(arm, jaw.open_gap - jaw.slack)
             offsets = yield from self._measure_offsets(arm, point_cloud)
             # With offsets the arm goes first to where it should stand now.
@@ -224,7 +237,7 @@ class Motion(PlanningScene):
             yield from self.execution.follow(arm, approach, self.parameters.approach_speed)
             self.keep_clear(NO_POINTS)
 
-        return self.execution.request(arm, self._past_touches(arm, steps))
+        return self.execution.request(arm, self._tries(arm, steps, enter_unseen))
 
     def close(self, arm: str, thickness: float) -> Request[float]:
         """Close the jaw on a thing of `thickness` m; the answer is the gap (m) between the pads that hold it.
@@ -253,18 +266,31 @@ class Motion(PlanningScene):
         """Disable an arm or its jaw: every later request to it fails with this cause. Returns the error to raise."""
         return self.execution.give_up(arm, code, message)
 
-    def _past_touches(self, arm: str, steps: Callable[[], Iterator[None]]) -> Iterator[None]:
-        """The steps, from the beginning after each touch, with what was felt on the map. Raises the last TouchError."""
-        for left in range(self.parameters.touches - 1, -1, -1):
+    def _tries(self, arm: str, steps: Callable[[bool], Iterator[None]], enter_unseen: bool = True) -> Iterator[None]:
+        """The steps, from the beginning after each touch, with what was felt on the map. Raises the last TouchError.
+
+        They are told whether unseen space counts as occupied: where nothing is found with it, it no longer does if
+        `enter_unseen`.
+        """
+        touches, unseen = 0, True
+        while True:
             try:
-                yield from steps()
+                yield from steps(unseen)
             except TouchError as error:
-                place = self.feel(arm, error.touch)
-                if not left:
+                place, touches = self.feel(arm, error.touch), touches + 1
+                if touches == self.parameters.touches:
                     raise
                 self._on_anomaly(f"felt at {place.round(3).tolist()}: the {arm} arm looks for another way")
+            except PlanningError as error:
+                if error.code not in _NO_WAY or not (unseen and enter_unseen and self.has_unseen):
+                    raise
+                unseen = False
             else:
                 return
+
+    def _pace(self, unseen: bool) -> float:
+        """The share of the joints' speed for a free path, by whether `unseen` space counted as occupied."""
+        return 1.0 if unseen else self.parameters.unseen_speed
 
     def _unreachable(self, arm: str, place: FloatArray, ends: int) -> PlanningError:
         """The error for a pose of the tool at `place` (3,) m that `ends` joint angles reach, none with a way on."""
@@ -281,8 +307,12 @@ class Motion(PlanningScene):
         return f"{distance:.2f} m from its base, and its links measure {kin.reach:.2f} m"
 
     def _check_shift(self, model: CollisionModel, path: FloatArray, length: float) -> None:
-        """Raises PlanningError MOTION_BLOCKED with the nearest thing unless a path of `length` m is free."""
-        if model.path_free(path[1:], self.parameters.clearances.near_margins[0]):
+        """Raises PlanningError MOTION_BLOCKED with the nearest thing unless a path of `length` m is free.
+
+        Free is as far from everything as the path begins, or the greatest near margin.
+        """
+        margins = self.parameters.clearances.near_margins
+        if model.path_free(path[1:], float(np.clip(model.clearance(path[0]), margins[-1], margins[0]))):
             return
         distance, what = min(model.nearest(q) for q in path[1:])
         message = f"{length:.2f} m straight on the arm is {-1e3 * distance:.0f} mm in {what}"
@@ -304,10 +334,15 @@ class Motion(PlanningScene):
         return np.zeros(len(self.kinematics[arm]))
 
     def _approaches(
-        self, arm: str, model: CollisionModel, candidates: Sequence[Grasp], without: Collection[Box]
+        self,
+        arm: str,
+        model: CollisionModel,
+        candidates: Sequence[Grasp],
+        without: Collection[Box],
+        unseen: bool = True,
     ) -> list[FloatArray]:
         """Joint paths (k, n) from standoff to grasp; `model` counts away from what is grasped."""
-        near = self.model(arm, without=without, opening=self.parameters.execution.jaw.open_gap)
+        near = self.model(arm, without=without, opening=self.parameters.execution.jaw.open_gap, unseen=unseen)
         clearances, pick = self.parameters.clearances, self.parameters.pick
         return find_approaches(model, near, self.joints(arm), candidates, clearances, pick)
 

@@ -12,6 +12,7 @@ from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cell import FixedMount, KnownCell
 from regrasp.interfaces.devices import Camera, Clock
 from regrasp.interfaces.frame import RgbdFrame
+from regrasp.interfaces.services import Obstacles
 from regrasp.interfaces.wall_time import counts_as
 from regrasp.perception.camera.health import CameraHealth, CameraHealthParameters
 from regrasp.perception.camera.model import NEAREST_DEPTH, pixel_rays
@@ -150,9 +151,10 @@ class Perception:
             return 0
         return filled
 
-    def obstacles(self) -> tuple[FloatArray, float]:
-        """The mapped obstacles: centres (n, 3) m, world, of full voxels, and their edge in m."""
-        return self.occupancy.occupied_points(), self.occupancy.voxel_size
+    def obstacles(self) -> Obstacles:
+        """The mapped obstacles."""
+        seen = self.occupancy.occupied_points(guessed=False)
+        return Obstacles(seen, self.occupancy.voxel_size, self.occupancy.unseen_points())
 
     def watch_stillness(self, camera: str) -> StillnessWatch:
         """Begin to watch whether anything moves before a fixed camera."""

@@ -12,7 +12,8 @@ def belief(services: "Services") -> dict[str, Any]:
     """Its arms by their readings, and the obstacles that it has mapped; lengths are rounded to 0.1 mm."""
     motion, names = services.motion, [arm.name for arm in services.known.arms]
     arms = {name: {"joints": motion.joints(name).round(4).tolist(), "tool": pose(motion.tool(name))} for name in names}
-    return {"arms": arms, "occupied_voxels": len(services.perception.obstacles()[0])}
+    mapped = services.perception.obstacles()
+    return {"arms": arms, "occupied_voxels": len(mapped.points) + len(mapped.unseen)}
 
 
 def pose(value: "RigidTransform") -> dict[str, Any]:

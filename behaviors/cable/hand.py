@@ -1,5 +1,6 @@
 """Steps that several of the cable's leaves share: looking, and what the hand does."""
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, TypeVar
 
 from regrasp.behaviors.cable.keys import HELD
@@ -8,11 +9,19 @@ from regrasp.behaviors.keys import Keys
 from regrasp.behaviors.leaf import LeafFailed, LeafSteps, StepsLeaf
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cable.cause import CableCause
+from regrasp.motion.failure import GraspEmptyError
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import RigidTransform
 
 T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class HandParameters:
+    """How the hand leaves an empty grasp."""
+
+    open_time: float = 0.6  # s that the jaw has to open after an empty grasp; choice
 
 
 class CableLeaf(StepsLeaf):
@@ -47,6 +56,8 @@ class CableLeaf(StepsLeaf):
 class HandLeaf(CableLeaf):
     """A leaf in which the hand works. One that asks for `held` NEEDS the key HELD, one that grips WRITES it."""
 
+    leaving: ClassVar[HandParameters] = HandParameters()
+
     def held(self) -> "RigidTransform":
         """tool_from_connector as believed. Raises `LeafFailed` when `DetectSlip` has just noticed a loss."""
         held = self.read(HELD, None)
@@ -59,6 +70,17 @@ class HandLeaf(CableLeaf):
         grip = yield from self.ask(self.services.motion.grip(world_from_connector))
         self.write(HELD, grip.pose)
         self.say("grasped", gap=grip.gap)
+
+    def grip_or_leave(self, world_from_connector: "RigidTransform") -> LeafSteps:
+        """`grip`; a hand that closed on nothing opens and goes back to sleep before GraspEmptyError is raised."""
+        try:
+            yield from self.grip(world_from_connector)
+        except GraspEmptyError:
+            self.services.motion.open_jaw(self.hand)
+            yield from self.wait(self.leaving.open_time)
+            yield from self.draw_back()
+            yield from self.go_to_sleep(self.hand)
+            raise
 
     def draw_back(self) -> LeafSteps:
         """Draw the hand straight back as far as is free. Where no distance is free, only an event says so."""

@@ -23,8 +23,9 @@ class LookCloserParameters:
 class LookCloser(LookLeaf):
     """Brings the wrist camera to two viewpoints where the whole connector should show; then the arm goes to sleep.
 
-    It does so only when the wrist camera found the connector, or only a part of it was seen. SUCCESS in any case: where
-    no better pose is found, the first one stands.
+    It does so only when the wrist camera found the connector, when only a part of it was seen, or when every grasp of
+    it leads through space that no camera has seen. SUCCESS in any case: where no better pose is found, the first one
+    stands.
     """
 
     NEEDS: ClassVar[Keys] = (FOUND,)
@@ -34,7 +35,9 @@ class LookCloser(LookLeaf):
     def steps(self) -> LeafSteps:
         """See the class."""
         best, motion = self.read(FOUND), self.services.motion
-        if best.camera == self.overview and best.whole:
+        connector = best.world_from_connector
+        motion.set_obstacles(*self.services.perception.obstacles_beside(connector))
+        if best.camera == self.overview and best.whole and motion.can_pick_loose(connector):
             return
         taken: list[FloatArray] = []
         whole: list[Estimate] = []

@@ -1,15 +1,27 @@
 """Take the connector out of its socket; where sockets are is known."""
 
+from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from regrasp.behaviors.cable.hand import HandLeaf
 from regrasp.behaviors.cable.keys import HELD
 from regrasp.behaviors.keys import Keys
 from regrasp.behaviors.leaf import LeafPort, LeafSteps
+from regrasp.motion.failure import GraspEmptyError
+
+
+@dataclass(frozen=True)
+class UnplugParameters:
+    """How often the hand tries."""
+
+    tries: int = 3  # choice
 
 
 class Unplug(HandLeaf):
-    """Grips the connector in the `socket` of that name, draws it out along its axis, and away from the panel."""
+    """Grips the connector in the `socket` of that name, draws it out along its axis, and away from the panel.
+
+    A hand that closes on nothing tries again, with another grasp where there is one.
+    """
 
     WRITES: ClassVar[Keys] = (HELD,)
     INPUT_PORTS: ClassVar[dict[str, Any]] = {
@@ -20,10 +32,19 @@ class Unplug(HandLeaf):
         )
     }
 
+    parameters: ClassVar[UnplugParameters] = UnplugParameters()
+
     def steps(self) -> LeafSteps:
         """See the class."""
         cable, motion = self.services.known.cable, self.services.motion
         plug = cable.socket(self.get_input("socket")).world_from_plug(cable.connector.length)
-        yield motion.pick_plug(plug, point_cloud=self.overview_points)
-        yield from self.grip(plug)
+        for left in range(self.parameters.tries - 1, -1, -1):
+            try:
+                yield from self.ask(motion.pick_plug(plug, point_cloud=self.overview_points))
+                yield from self.grip_or_leave(plug)
+                break
+            except GraspEmptyError as error:
+                if not left:
+                    raise
+                self.say("tries again", why=str(error))
         yield motion.pull_out(plug)

@@ -8,7 +8,7 @@ from regrasp.interfaces.cable.motion import Grip, PluggedIn, View, Viewpoint
 from regrasp.interfaces.cable.sight import Estimate, InHand, NoEstimate, Sightings, TrackHealth, TrackState
 from regrasp.interfaces.evidence import Evidence
 from regrasp.interfaces.request import Request
-from regrasp.interfaces.services import MotionService, PerceptionService
+from regrasp.interfaces.services import MotionService, Obstacles, PerceptionService
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import RigidTransform
@@ -41,6 +41,10 @@ class CableMotionService(MotionService, Protocol):
         self, world_from_connector: "RigidTransform", *, point_cloud: Callable[[float], FloatArray | None] | None = None
     ) -> Request[None]:
         """As `pick_plug`, where the connector hangs at its cable, of which the arm keeps clear."""
+        ...
+
+    def can_pick_loose(self, world_from_connector: "RigidTransform") -> bool:
+        """Whether a grasp of the loose connector is free, with all space that no camera has seen taken for full."""
         ...
 
     def grip(self, world_from_connector: "RigidTransform") -> Request[Grip]:
@@ -184,6 +188,6 @@ class CablePerceptionService(PerceptionService, Protocol):
         """
         ...
 
-    def obstacles_beside(self, world_from_connector: "RigidTransform") -> tuple[FloatArray, float]:
-        """`obstacles` without guesses near the connector."""
+    def obstacles_beside(self, world_from_connector: "RigidTransform") -> Obstacles:
+        """`obstacles` without unseen voxels near the connector."""
         ...

@@ -23,11 +23,14 @@ from regrasp.motion.cable.held import connector_spheres
 from regrasp.motion.cable.plugging import PluggingParameters
 from regrasp.motion.cable.search import SearchMotion, SearchMotionParameters
 from regrasp.motion.cable.seating import SeatingParameters, poses_before, seated_pose
-from regrasp.motion.failure import PlanningError
+from regrasp.motion.failure import GraspEmptyError, PlanningError
 from regrasp.motion.grasping.approach import pick_candidates
 from regrasp.motion.grasping.gap_test import GripWatch
+from regrasp.motion.grasping.grasps import Grasp
 from regrasp.motion.planning.straight import can_continue
 from regrasp.motion.request import MotionRequest
+from regrasp.motion.robots.contact_guard import ContactLimits
+from regrasp.motion.robots.poses import angle_between
 from regrasp.motion.scene.collision import CollisionModel
 from regrasp.motion.scene.planning_scene import NO_POINTS
 from regrasp.motion.service import PointCloudSource
@@ -44,12 +47,16 @@ class UnplugParameters:
     # 20 mm behind the plug
     shallow: float = 0.008
     retreat: float = 0.06  # m away from the panel then; choice
+    # of that, the first that is free; where none is, the way to the clip begins there; choice
+    retreat_shares: tuple[float, ...] = (1.0, 0.6, 0.3)
 
 
 @dataclass(frozen=True)
 class CableMotionParameters(SearchMotionParameters):
     """Those of every task, and of what is done with the cable."""
 
+    # Two grasps nearer than so many m and rad are one: what closed on nothing is tried again after all others; choice
+    same_grasp: tuple[float, float] = (0.015, 0.35)
     connector_padding: float = 1.2  # radii of the spheres that cover a carried connector, in its own radii; choice
     # m straight back from where something was held; the first that is free; choice
     retreats: tuple[float, ...] = (0.10, 0.08, 0.06, 0.05, 0.04, 0.03)
@@ -77,6 +84,7 @@ class CableMotion(SearchMotion):
     ) -> None:
         super().__init__(known, arms, grippers, clock, seed, parameters, on_anomaly)
         self.hand = known.cable.hand
+        self._missed: list[FloatArray] = []  # grasps (4, 4), connector_from_tool, that closed on nothing
 
     def warm_up(self) -> None:
         """Look for a grasp of the plugged connector and drop it.
@@ -98,28 +106,57 @@ class CableMotion(SearchMotion):
         *,
         checked: bool = True,
         without: Collection[Box] = (),
+        held: FloatArray | None = None,
+        contact: ContactLimits | None = None,
     ) -> MotionRequest:
         """As in every task; the clip's bracket may be touched, too."""
-        return super().shift(arm, displacement, checked=checked, without=[*without, *self.known.cable.clip.bracket])
+        without = [*without, *self.known.cable.clip.bracket]
+        return super().shift(arm, displacement, checked=checked, without=without, held=held, contact=contact)
 
     def pick_plug(self, plug: RigidTransform, *, point_cloud: PointCloudSource | None = None) -> MotionRequest:
         """`pick` the connector where it is plugged in, world_from_connector: a panel is near."""
         return self._pick_connector(plug, self.parameters.unplug.shallow, None, point_cloud)
 
     def pick_loose(
-        self, world_from_connector: RigidTransform, *, point_cloud: PointCloudSource | None = None
+        self,
+        world_from_connector: RigidTransform,
+        *,
+        point_cloud: PointCloudSource | None = None,
+        enter_unseen: bool = True,
     ) -> MotionRequest:
         """`pick` the connector where it hangs at the end of its cable, of which the arm keeps clear."""
         finite_pose("the connector's pose", world_from_connector)
         cable = cable_course(self.known, world_from_connector)
-        return self._pick_connector(world_from_connector, 0.0, cable, point_cloud)
+        return self._pick_connector(world_from_connector, 0.0, cable, point_cloud, enter_unseen)
+
+    def can_pick_loose(self, world_from_connector: RigidTransform) -> bool:
+        """Whether a grasp of the loose connector is free, with all space that no camera has seen taken for full."""
+        finite_pose("the connector's pose", world_from_connector)
+        connector, jaw = self.known.cable.connector, self.parameters.execution.jaw
+        self._keep_clear_but_near(cable_course(self.known, world_from_connector), world_from_connector.translation)
+        widest = self.known.arm(self.hand).robot.gripper.opening
+        candidates = pick_candidates(world_from_connector, connector, 0.0, widest, self.parameters.pick)
+        model = self.model(self.hand, opening=jaw.open_gap)
+        try:
+            self._approaches(self.hand, model, candidates, self.known.cable.clip.bracket)
+        except PlanningError:
+            return False
+        finally:
+            self.keep_clear(NO_POINTS)
+        return True
 
     def grip(self, world_from_connector: RigidTransform) -> Request[Grip]:
         """Close the hand's jaw on the connector; the answer is what it holds then. It fails as `close` does."""
         finite_pose("the connector's pose", world_from_connector)
 
         def steps() -> Generator[None, None, Grip]:
-            gap = yield from self._done(self.close(self.hand, 2 * self.known.cable.connector.radius))
+            held = self.tool(self.hand).inv() * world_from_connector
+            try:
+                gap = yield from self._done(self.close(self.hand, 2 * self.known.cable.connector.radius))
+            except GraspEmptyError:
+                self._missed.append(held.inv().as_matrix())
+                raise
+            self._missed.clear()
             return Grip(gap, self.tool(self.hand).inv() * world_from_connector)
 
         return Request(steps())
@@ -131,14 +168,21 @@ class CableMotion(SearchMotion):
         )
 
     def pull_out(self, plug: RigidTransform) -> MotionRequest:
-        """Draw the gripped plug (world_from_connector) out along its axis, and then away from the panel, to -x."""
+        """Draw the gripped plug (world_from_connector) out along its axis, and then, where free, away from the panel.
+
+        That is to -x.
+        """
         finite_pose("the plug's pose", plug)
         values = self.parameters.unplug
 
         def steps() -> Iterator[None]:
-            axis = plug.rotation.apply([1.0, 0.0, 0.0])
+            axis, held = plug.rotation.apply([1.0, 0.0, 0.0]), self.tool(self.hand).inv() * plug
             yield from self._done(self.shift(self.hand, -values.draw_out * axis, checked=False))
-            yield from self._done(self.shift(self.hand, np.array([-values.retreat, 0.0, 0.0]), checked=False))
+            for share_of_way in values.retreat_shares:
+                away = np.array([-share_of_way * values.retreat, 0.0, 0.0])
+                with suppress(PlanningError):
+                    yield from self._done(self._shift_held(self.hand, away, held))
+                    return
 
         return self._together(self.hand, steps())
 
@@ -161,22 +205,22 @@ class CableMotion(SearchMotion):
             finite_pose("a pose of the tool or the connector", pose)
         share("the speed", speed)
 
-        def steps() -> Iterator[None]:
+        def steps(unseen: bool) -> Iterator[None]:
             spheres = self.held_spheres(held)
-            model, q, kin = self.start_model(arm, held=spheres), self.joints(arm), self.kinematics[arm]
+            model, q, kin = self.start_model(arm, held=spheres, unseen=unseen), self.joints(arm), self.kinematics[arm]
             clearances, carry = self.parameters.clearances, self.parameters.carry
             candidates = carry_paths(self.known, kin, q, goals, held, carry)
             paths = (path for path in candidates if can_continue(kin, path[-1], onward, carry.step))
-            wide = self.model(arm, held=spheres, opening=self.known.arm(arm).robot.gripper.opening)
+            widest = self.known.arm(arm).robot.gripper.opening
+            wide = self.model(arm, held=spheres, opening=widest, unseen=unseen)
             path = first_free((wide, model), clearances.near_margins, paths)
             if path is None:
                 solutions = [end for goal in goals for end in kin.ik(goal, q)]
                 ends = [end for end in solutions if can_continue(kin, end, onward, carry.step)]
                 path = yield from self._shortest_plan(model, q, np.array(ends).reshape(-1, len(kin)), carry.searched)
-            pull = np.concatenate([held.translation, held.rotation.apply([1.0, 0.0, 0.0])])
-            yield from self.execution.follow(arm, path, speed, replace(self._guard.carrying, pull=pull))
+            yield from self.execution.follow(arm, path, min(speed, self._pace(unseen)), self._carrying(held))
 
-        return self.execution.request(arm, self._past_touches(arm, steps))
+        return self.execution.request(arm, self._tries(arm, steps))
 
     def carry_to_clip(self, held: RigidTransform) -> MotionRequest:
         """Bring the held connector (tool_from_connector) before the clip, from where the hand can go in and back out.
@@ -243,6 +287,15 @@ class CableMotion(SearchMotion):
         yield from self._done(self.sleep(self.hand))
         self.keep_clear(NO_POINTS)
 
+    def _shift_held(self, arm: str, displacement: FloatArray, held: RigidTransform) -> MotionRequest:
+        """`shift`, checked, with what the arm holds (tool_from_connector)."""
+        return self.shift(arm, displacement, held=self.held_spheres(held), contact=self._carrying(held))
+
+    def _carrying(self, held: RigidTransform) -> ContactLimits:
+        """What counts as a touch while the cable pulls at what is held (tool_from_connector)."""
+        pull = np.concatenate([held.translation, held.rotation.apply([1.0, 0.0, 0.0])])
+        return replace(self._guard.carrying, pull=pull)
+
     def held_spheres(self, held: RigidTransform) -> FloatArray:
         """Spheres (n, 4) m in the tool frame that stand for a held connector (tool_from_connector); see `model`."""
         return connector_spheres(held, self.known.cable.connector, self.parameters.connector_padding)
@@ -273,7 +326,13 @@ class CableMotion(SearchMotion):
         shallow: float,
         cable: FloatArray | None,
         point_cloud: PointCloudSource | None,
+        enter_unseen: bool = True,
     ) -> MotionRequest:
+        connector_from_world, near = world_from_connector.inv().as_matrix(), self.parameters.same_grasp
+
+        def missed(grasp: Grasp) -> bool:
+            return any(_alike(connector_from_world @ grasp.pose, other, *near) for other in self._missed)
+
         return self.pick(
             self.hand,
             world_from_connector,
@@ -282,6 +341,8 @@ class CableMotion(SearchMotion):
             clear_of=cable,
             without=self.known.cable.clip.bracket,
             point_cloud=point_cloud,
+            enter_unseen=enter_unseen,
+            last=missed if self._missed else None,
         )
 
     def _together(self, arm: str, steps: Generator[None, None, T] | Iterator[None]) -> Request[T]:
@@ -293,6 +354,11 @@ class CableMotion(SearchMotion):
         while not request.poll():
             yield
         return request.answer
+
+
+def _alike(pose: FloatArray, other: FloatArray, distance: float, angle: float) -> bool:
+    """Whether two poses (4, 4) are nearer than so many m and rad."""
+    return bool(np.linalg.norm(pose[:3, 3] - other[:3, 3]) < distance) and angle_between(pose, other) < angle
 
 
 def _length(path: FloatArray, levers: FloatArray) -> float:

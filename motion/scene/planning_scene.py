@@ -62,26 +62,35 @@ class PlanningScene:
             c.mount.arm: c.mount for c in known.cameras if isinstance(c.mount, WristMount)
         }
         self._boxes = known.solids()
-        self._grid: DistanceGrid | None = None
-        self._points = self._more = NO_POINTS
+        self._grids: dict[bool, DistanceGrid | None] = {}  # with what was not seen, and without; made when asked for
+        self._points = self._unseen = self._more = NO_POINTS
         self._felt: list[tuple[float, FloatArray]] = []  # when, and points (n, 3) m
         self._spacing = 0.01  # m, until the first voxels come
 
     @counts_as("planning")
-    def set_obstacles(self, points: FloatArray, spacing: float) -> None:
+    def set_obstacles(self, points: FloatArray, spacing: float, unseen: FloatArray = NO_POINTS) -> None:
         """Keep clear of occupied voxels from now on: centres (n, 3) m in the world, and the edge `spacing` m.
 
-        Points where an arm is now, or sleeps, do not count: what was seen there was an arm. Nor do points that no arm
-        reaches. Raises ValueError for points that are not finite and a spacing that is not above 0.
+        `unseen` (m, 3) m are voxels that no camera has seen, behind seen surfaces: an arm enters them only where it
+        finds no other way. Points where an arm is now, or sleeps, do not count: what was seen there was an arm. Nor do
+        points that no arm reaches. Raises ValueError for points that are not finite and a spacing that is not above 0.
         """
         margin = self._scene_parameters.arm_margin
         self._points, self._spacing = self._within_reach(points), positive("the spacing", spacing)
+        self._unseen = self._within_reach(unseen)
         now = max((arm.reading().stamp for arm in self.arms.values()), default=0.0)
         self._felt = [(at, felt) for at, felt in self._felt if at > now - self._scene_parameters.felt_time]
         for spec in self.known.arms:
             for q in (self.joints(spec.name), np.array(spec.sleep)):
-                self._points = _points_beyond(self._points, self.model(spec.name, others=False).spheres(q), margin)
-        self._rebuild_grid()
+                spheres = self.model(spec.name, others=False).spheres(q)
+                self._points = _points_beyond(self._points, spheres, margin)
+                self._unseen = _points_beyond(self._unseen, spheres, margin)
+        self._grids.clear()
+
+    @property
+    def has_unseen(self) -> bool:
+        """Whether any space in the arms' reach counts as occupied only because no camera has seen it."""
+        return len(self._unseen) > 0
 
     @counts_as("planning")
     def keep_clear(self, points: FloatArray) -> None:
@@ -90,7 +99,7 @@ class PlanningScene:
         Points that no arm reaches do not count. Raises ValueError for points that are not finite.
         """
         self._more = self._within_reach(points)
-        self._rebuild_grid()
+        self._grids.clear()
 
     @counts_as("planning")
     def feel(self, arm: str, touch: Touch) -> FloatArray:
@@ -99,7 +108,7 @@ class PlanningScene:
         spheres, kin = model.spheres(touch.joints), self.kinematics[arm]
         place, inward = contact_place(kin, spheres, model.links, touch, self._scene_parameters.contact)
         self._felt.append((touch.stamp, felt_points(place, inward, self._spacing, self._scene_parameters.contact)))
-        self._rebuild_grid()
+        self._grids.clear()
         return place
 
     def _within_reach(self, points: FloatArray) -> FloatArray:
@@ -110,14 +119,17 @@ class PlanningScene:
             near |= np.linalg.norm(seen - kin.base[:3, 3], axis=1) < kin.reach + beyond
         return seen[near]
 
-    def _rebuild_grid(self) -> None:
-        points = np.vstack([self._points, self._more, *(felt for _, felt in self._felt)])
-        if not len(points):
-            self._grid = None
-            return
-        border = self._scene_parameters.grid_border
-        lower, upper = points.min(axis=0) - border, points.max(axis=0) + border
-        self._grid = DistanceGrid.from_points(points, lower, upper, self._spacing)
+    def _grid(self, unseen: bool = True) -> DistanceGrid | None:
+        """The distances to all points, or to those that were seen, felt or named; None where there are none."""
+        if unseen not in self._grids:
+            guesses = [self._unseen] if unseen else []
+            points = np.vstack([self._points, self._more, *guesses, *(felt for _, felt in self._felt)])
+            grid, border = None, self._scene_parameters.grid_border
+            if len(points):
+                lower, upper = points.min(axis=0) - border, points.max(axis=0) + border
+                grid = DistanceGrid.from_points(points, lower, upper, self._spacing)
+            self._grids[unseen] = grid
+        return self._grids[unseen]
 
     @counts_as("planning")
     def start_model(
@@ -127,21 +139,23 @@ class PlanningScene:
         held: FloatArray | None = None,
         without: Collection[Box] = (),
         opening: float | None = None,
+        unseen: bool = True,
     ) -> CollisionModel:
         """`model` for a motion that begins now; seen points that the arm touches where it stands are forgotten.
 
         Voxels are coarse and cameras err by millimetres: a hand that came in beside an obstacle must get out again.
         """
-        model = self.model(arm, held=held, without=without, opening=opening)
+        model = self.model(arm, held=held, without=without, opening=opening, unseen=unseen)
         distance, what = model.nearest(self.joints(arm))
         touching = self._scene_parameters.touching
         if what == "seen surface" and distance < touching:
-            spheres = model.spheres(self.joints(arm))
-            self._points = _points_beyond(self._points, spheres, touching + 2 * self._spacing)
-            self._more = _points_beyond(self._more, spheres, touching + 2 * self._spacing)
-            self._felt = [(at, _points_beyond(felt, spheres, touching + 2 * self._spacing)) for at, felt in self._felt]
-            self._rebuild_grid()
-            model = self.model(arm, held=held, without=without, opening=opening)
+            spheres, reach = model.spheres(self.joints(arm)), touching + 2 * self._spacing
+            self._points = _points_beyond(self._points, spheres, reach)
+            self._unseen = _points_beyond(self._unseen, spheres, reach)
+            self._more = _points_beyond(self._more, spheres, reach)
+            self._felt = [(at, _points_beyond(felt, spheres, reach)) for at, felt in self._felt]
+            self._grids.clear()
+            model = self.model(arm, held=held, without=without, opening=opening, unseen=unseen)
         return model
 
     def joints(self, arm: str) -> FloatArray:
@@ -181,12 +195,13 @@ class PlanningScene:
         others: bool = True,
         without: Collection[Box] = (),
         opening: float | None = None,
+        unseen: bool = True,
     ) -> CollisionModel:
         """What `arm` must not touch now.
 
         `held` (m, 4) m are spheres in the tool frame that stand for what the hand carries. Without `others` the other
         arms and the seen surfaces do not count; the boxes `without` may be touched. The jaw stands as the fingers read,
-        or `opening` m wide.
+        or `opening` m wide. Without `unseen` the space that no camera has seen counts as free.
         """
         bodies = [
             self.model(name, others=False).spheres(self.joints(name)) for name in self.arms if others and name != arm
@@ -199,7 +214,7 @@ class PlanningScene:
             self.grippers[arm].reading().gap if opening is None else opening,
         )
         other = np.vstack(bodies) if bodies else None
-        grid = self._grid if others else None
+        grid = self._grid(unseen) if others else None
         return CollisionModel(self.kinematics[arm], boxes, body, other, grid, self._scene_parameters.collision)
 
     @counts_as("planning")
@@ -212,7 +227,8 @@ class PlanningScene:
         for box in self._boxes:
             if np.any(np.all(np.abs(rays - box.center) < 0.5 * np.array(box.size), axis=1)):
                 return False
-        return self._grid is None or bool(np.min(self._grid.at(rays)) > 0.0)
+        grid = self._grid()
+        return grid is None or bool(np.min(grid.at(rays)) > 0.0)
 
 
 def _points_beyond(points: FloatArray, spheres: FloatArray, margin: float) -> FloatArray:

@@ -21,6 +21,7 @@ from regrasp.interfaces.devices import Camera, Clock
 from regrasp.interfaces.evidence import Evidence
 from regrasp.interfaces.frame import RgbdFrame
 from regrasp.interfaces.request import Request
+from regrasp.interfaces.services import Obstacles
 from regrasp.interfaces.wall_time import counts_as
 from regrasp.perception.cable.in_hand import InHandParameters, connector_axis, connector_in_hand
 from regrasp.perception.cable.watching import FrameRule, watched
@@ -180,13 +181,11 @@ class CablePerception(Perception):
         length = self._known.cable.connector.length
         return connector_in_hand(seen, length, tool, held, least_turn_deg, self.parameters.in_hand)
 
-    def obstacles_beside(self, world_from_connector: RigidTransform) -> tuple[FloatArray, float]:
-        """`obstacles` without guesses near a connector: it was looked at, so only surfaces that were seen count."""
-        points, size = self.obstacles()
-        seen = {tuple(p) for p in self.occupancy.occupied_points(guessed=False).tolist()}
-        half = 0.5 * self._known.cable.connector.length
-        far = _distance_to_axis(points, world_from_connector, half) > self.parameters.clear_radius
-        return points[far | np.array([tuple(p) in seen for p in points.tolist()], bool)], size
+    def obstacles_beside(self, world_from_connector: RigidTransform) -> Obstacles:
+        """`obstacles` without unseen voxels near a connector: it was looked at, so only seen surfaces count there."""
+        found, half = self.obstacles(), 0.5 * self._known.cable.connector.length
+        far = _distance_to_axis(found.unseen, world_from_connector, half) > self.parameters.clear_radius
+        return found._replace(unseen=found.unseen[far])
 
     def _spared(self) -> Spared | None:
         connector = self._known.cable.connector

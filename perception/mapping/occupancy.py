@@ -85,6 +85,10 @@ class Occupancy:
         """Centres (n, 3) m, world frame, of the voxels seen to be full, and with `guessed` of those assumed to be."""
         return np.asarray(self._centers[self._state >= (Voxel.BEHIND if guessed else Voxel.SURFACE)])
 
+    def unseen_points(self) -> FloatArray:
+        """Centres (n, 3) m, world frame, of the voxels that are only assumed to be full: behind a seen surface."""
+        return np.asarray(self._centers[self._state == Voxel.BEHIND])
+
     def integrate(
         self,
         frame: RgbdFrame,

@@ -180,8 +180,8 @@ def test_without_a_task_the_connector_is_an_obstacle_like_another(known: CableKn
     eyes = Perception(cell, {"rear": eye}, Clock(), believed, list)
     assert eyes.fixed_cameras == ("rear",)
     found = eyes.look_around()
-    points, edge = eyes.obstacles()
-    assert len(points) == found
+    points, edge, unseen = eyes.obstacles()
+    assert len(points) + len(unseen) == found
     assert np.linalg.norm(points - PLACE, axis=1).min() < 0.04
     assert edge == eyes.parameters.occupancy.voxel_size
     spared = perception(known, eye)
@@ -205,13 +205,12 @@ def test_beside_a_connector_that_was_looked_at_a_guess_is_no_obstacle_and_a_surf
     eye.show(seen(FOAM), number=1, stamp=0.0)
     eyes = perception(known, eye)
     eyes.look_around()
-    points, edge = eyes.obstacles()
+    mapped = eyes.obstacles()
     behind = RigidTransform.from_translation(np.add(FOAM.lower, [0.06, 0.06, 0.09]))
-    kept, same = eyes.obstacles_beside(behind)
-    surface = eyes.occupancy.occupied_points(guessed=False)
-    assert same == edge
-    assert {tuple(p) for p in surface.tolist()} <= {tuple(p) for p in kept.tolist()}
-    gone = {tuple(p) for p in points.tolist()} - {tuple(p) for p in kept.tolist()}
+    beside = eyes.obstacles_beside(behind)
+    assert np.array_equal(beside.points, mapped.points)
+    assert beside.spacing == mapped.spacing
+    gone = {tuple(p) for p in mapped.unseen.tolist()} - {tuple(p) for p in beside.unseen.tolist()}
     assert gone
     half = 0.5 * known.cable.connector.length
     assert all(np.linalg.norm(np.array(p) - behind.translation) < 0.05 + half for p in gone)

@@ -25,6 +25,7 @@ from regrasp.interfaces.evidence import Evidence
 from regrasp.interfaces.frame import RgbdFrame
 from regrasp.interfaces.reading import GripperReading
 from regrasp.interfaces.request import Request
+from regrasp.interfaces.services import Obstacles
 from regrasp.motion.cable.viewing import ViewingParameters, approached, views_of
 from regrasp.motion.cable.viewpoints import spiral
 from regrasp.motion.execution import Execution
@@ -147,7 +148,7 @@ class FakeMotion:
     def tool(self, arm: str) -> RigidTransform:
         return self.hand
 
-    def set_obstacles(self, points: Vector, spacing: float) -> None:
+    def set_obstacles(self, points: Vector, spacing: float, unseen: Vector) -> None:
         pass
 
     def keep_clear(self, points: Vector) -> None:
@@ -160,6 +161,9 @@ class FakeMotion:
         self, world_from_connector: RigidTransform, *, point_cloud: PointCloud | None = None
     ) -> Request[None]:
         return self.work(self.known.cable.hand)
+
+    def can_pick_loose(self, world_from_connector: RigidTransform) -> bool:
+        return True
 
     def grip(self, world_from_connector: RigidTransform) -> Request[Grip]:
         def steps() -> Generator[None, None, Grip]:
@@ -302,8 +306,8 @@ class FakePerception:
     def map_new_obstacle(self, camera: str) -> int:
         return 0
 
-    def obstacles(self) -> tuple[Vector, float]:
-        return np.empty((0, 3)), 0.01
+    def obstacles(self) -> Obstacles:
+        return Obstacles(np.empty((0, 3)), 0.01, np.empty((0, 3)))
 
     def watch_stillness(self, camera: str) -> FakeStillness:
         return FakeStillness(lambda: self.frame(camera), self.clock.t)
@@ -359,7 +363,7 @@ class FakePerception:
     ) -> InHand | None:
         return connector_in_hand(seen, self.known.cable.connector.length, tool, held, least_turn_deg)
 
-    def obstacles_beside(self, world_from_connector: RigidTransform) -> tuple[Vector, float]:
+    def obstacles_beside(self, world_from_connector: RigidTransform) -> Obstacles:
         return self.obstacles()
 
 
