@@ -41,7 +41,7 @@ class MotionParameters:
     """The parameters of all parts of the motion service."""
 
     approach_speed: float = 0.3  # share of the joints' speed on straight paths near things; choice
-    unseen_speed: float = 0.3  # share of the joints' speed of a path through space that no camera has seen; choice
+    optimistic_speed: float = 0.3  # share of the joints' speed on a path that may touch something; choice
     touches: int = 6  # that end a motion; after each before it the arm goes on by another way; choice
     camera_timeout: float = 1.0  # s that a camera has to show the arm; a sound one needs 0.2
     clearances: Clearances = field(default_factory=Clearances)
@@ -89,9 +89,9 @@ class Motion(PlanningScene):
         goals = rows("the goals' joints", goals, len(self.kinematics[arm]))
         _check_margin(margin)
 
-        def steps(unseen: bool) -> Iterator[None]:
-            path = self._plan(self.start_model(arm, unseen=unseen), self.joints(arm), goals, margin, tight)
-            yield from self.execution.follow(arm, path, self._pace(unseen))
+        def steps(optimistic: bool) -> Iterator[None]:
+            path = self._plan(self.start_model(arm, optimistic=optimistic), self.joints(arm), goals, margin, tight)
+            yield from self.execution.follow(arm, path, self._pace(optimistic))
 
         return self.execution.request(arm, self._tries(arm, steps))
 
@@ -111,9 +111,9 @@ class Motion(PlanningScene):
             finite_pose("the tool's pose", pose)
         _check_margin(margin)
 
-        def steps(unseen: bool) -> Iterator[None]:
+        def steps(optimistic: bool) -> Iterator[None]:
             kin, q = self.kinematics[arm], self.joints(arm)
-            model = self.start_model(arm, unseen=unseen)
+            model = self.start_model(arm, optimistic=optimistic)
 
             def path_to(ends: FloatArray) -> FloatArray:
                 goals = [end for end in ends if can_continue(kin, end, onward)]
@@ -130,7 +130,7 @@ class Motion(PlanningScene):
                 if kin.robot.rail is None:
                     raise
                 path = path_to(kin.ik(world_from_tool))
-            yield from self.execution.follow(arm, path, self._pace(unseen))
+            yield from self.execution.follow(arm, path, self._pace(optimistic))
 
         return self.execution.request(arm, self._tries(arm, steps))
 
@@ -179,7 +179,7 @@ class Motion(PlanningScene):
             path = straight_line(kin, q, goal)
             if checked:
                 # Where it stands no camera sees: at this speed it may go back through what it hides.
-                model = self.start_model(arm, held=held, without=without, unseen=False)
+                model = self.start_model(arm, held=held, without=without, optimistic=True)
                 self._check_shift(model, path, float(np.linalg.norm(way)))
             limits = contact if checked else self._guard.pressing
             yield from self.execution.follow(arm, path, self.parameters.approach_speed, limits)
@@ -196,7 +196,6 @@ class Motion(PlanningScene):
         clear_of: FloatArray | None = None,
         without: Collection[Box] = (),
         point_cloud: PointCloudSource | None = None,
-        enter_unseen: bool = True,
         last: Callable[[Grasp], bool] | None = None,
     ) -> MotionRequest:
         """Open the jaw and bring it round a cylinder; the jaw stays open.
@@ -204,22 +203,21 @@ class Motion(PlanningScene):
         The cylinder lies `shallow` metres nearer to the finger tips than the pads' middle. The arm keeps clear of the
         points `clear_of` (n, 3) m, except where the jaw takes hold: pushing a cable moves the connector. On the last
         straight way it may touch the boxes `without`. Before that it is corrected by the `point_cloud` that a camera
-        sees of it. `enter_unseen`: where there is no other way, slowly through space that no camera has seen. Grasps
-        of which `last` is true are tried after all others.
+        sees of it. Grasps of which `last` is true are tried after all others.
         """
         finite_pose("the cylinder's pose", world_from_cylinder)
         near_points = None if clear_of is None else rows("the points to keep clear of", clear_of, 3)
 
-        def steps(unseen: bool) -> Iterator[None]:
+        def steps(optimistic: bool) -> Iterator[None]:
             q, jaw = self.joints(arm), self.parameters.execution.jaw
             self._keep_clear_but_near(near_points, world_from_cylinder.translation)
-            model = self.start_model(arm, opening=jaw.open_gap, unseen=unseen)
+            model = self.start_model(arm, opening=jaw.open_gap, optimistic=optimistic)
             widest = self.known.arm(arm).robot.gripper.opening
             candidates = pick_candidates(world_from_cylinder, cylinder, shallow, widest, self.parameters.pick)
             if last is not None:
                 candidates.sort(key=last)
             try:
-                approaches = self._approaches(arm, model, candidates, without, unseen)
+                approaches = self._approaches(arm, model, candidates, without, optimistic)
             except PlanningError as error:
                 if error.code is not CauseCode.OUT_OF_REACH:
                     raise
@@ -228,7 +226,7 @@ class Motion(PlanningScene):
             self.grippers[arm].open(jaw.open_gap)
             path = self._plan(model, q, np.array([approach[0] for approach in approaches]))
             approach = min(approaches, key=lambda approach: float(np.abs(approach[0] - path[-1]).max()))
-            yield from self.execution.follow(arm, path, self._pace(unseen))
+            yield from self.execution.follow(arm, path, self._pace(optimistic))
             yield from self.execution.open_jaw(arm, jaw.open_gap - jaw.slack)
             offsets = yield from self._measure_offsets(arm, point_cloud)
             # With offsets the arm goes first to where it should stand now.
@@ -237,7 +235,7 @@ class Motion(PlanningScene):
             yield from self.execution.follow(arm, approach, self.parameters.approach_speed)
             self.keep_clear(NO_POINTS)
 
-        return self.execution.request(arm, self._tries(arm, steps, enter_unseen))
+        return self.execution.request(arm, self._tries(arm, steps))
 
     def close(self, arm: str, thickness: float) -> Request[float]:
         """Close the jaw on a thing of `thickness` m; the answer is the gap (m) between the pads that hold it.
@@ -266,31 +264,30 @@ class Motion(PlanningScene):
         """Disable an arm or its jaw: every later request to it fails with this cause. Returns the error to raise."""
         return self.execution.give_up(arm, code, message)
 
-    def _tries(self, arm: str, steps: Callable[[bool], Iterator[None]], enter_unseen: bool = True) -> Iterator[None]:
+    def _tries(self, arm: str, steps: Callable[[bool], Iterator[None]]) -> Iterator[None]:
         """The steps, from the beginning after each touch, with what was felt on the map. Raises the last TouchError.
 
-        They are told whether unseen space counts as occupied: where nothing is found with it, it no longer does if
-        `enter_unseen`.
+        They are told whether the map is to be read optimistically (see `model`): where nothing is found otherwise.
         """
-        touches, unseen = 0, True
+        touches, optimistic = 0, False
         while True:
             try:
-                yield from steps(unseen)
+                yield from steps(optimistic)
             except TouchError as error:
                 place, touches = self.feel(arm, error.touch), touches + 1
                 if touches == self.parameters.touches:
                     raise
                 self._on_anomaly(f"felt at {place.round(3).tolist()}: the {arm} arm looks for another way")
             except PlanningError as error:
-                if error.code not in _NO_WAY or not (unseen and enter_unseen and self.has_unseen):
+                if error.code not in _NO_WAY or optimistic:
                     raise
-                unseen = False
+                optimistic = True
             else:
                 return
 
-    def _pace(self, unseen: bool) -> float:
-        """The share of the joints' speed for a free path, by whether `unseen` space counted as occupied."""
-        return 1.0 if unseen else self.parameters.unseen_speed
+    def _pace(self, optimistic: bool) -> float:
+        """The share of the joints' speed for a path, by how the map was read."""
+        return self.parameters.optimistic_speed if optimistic else 1.0
 
     def _unreachable(self, arm: str, place: FloatArray, ends: int) -> PlanningError:
         """The error for a pose of the tool at `place` (3,) m that `ends` joint angles reach, none with a way on."""
@@ -309,10 +306,9 @@ class Motion(PlanningScene):
     def _check_shift(self, model: CollisionModel, path: FloatArray, length: float) -> None:
         """Raises PlanningError MOTION_BLOCKED with the nearest thing unless a path of `length` m is free.
 
-        Free is as far from everything as the path begins, or the greatest near margin.
+        Free is no nearer to anything than where the path begins, or the greatest near margin.
         """
-        margins = self.parameters.clearances.near_margins
-        if model.path_free(path[1:], float(np.clip(model.clearance(path[0]), margins[-1], margins[0]))):
+        if model.path_free(path[1:], min(model.clearance(path[0]), self.parameters.clearances.near_margins[0])):
             return
         distance, what = min(model.nearest(q) for q in path[1:])
         message = f"{length:.2f} m straight on the arm is {-1e3 * distance:.0f} mm in {what}"
@@ -339,10 +335,10 @@ class Motion(PlanningScene):
         model: CollisionModel,
         candidates: Sequence[Grasp],
         without: Collection[Box],
-        unseen: bool = True,
+        optimistic: bool = False,
     ) -> list[FloatArray]:
         """Joint paths (k, n) from standoff to grasp; `model` counts away from what is grasped."""
-        near = self.model(arm, without=without, opening=self.parameters.execution.jaw.open_gap, unseen=unseen)
+        near = self.model(arm, without=without, opening=self.parameters.execution.jaw.open_gap, optimistic=optimistic)
         clearances, pick = self.parameters.clearances, self.parameters.pick
         return find_approaches(model, near, self.joints(arm), candidates, clearances, pick)
 

@@ -122,12 +122,11 @@ class CableMotion(SearchMotion):
         world_from_connector: RigidTransform,
         *,
         point_cloud: PointCloudSource | None = None,
-        enter_unseen: bool = True,
     ) -> MotionRequest:
         """`pick` the connector where it hangs at the end of its cable, of which the arm keeps clear."""
         finite_pose("the connector's pose", world_from_connector)
         cable = cable_course(self.known, world_from_connector)
-        return self._pick_connector(world_from_connector, 0.0, cable, point_cloud, enter_unseen)
+        return self._pick_connector(world_from_connector, 0.0, cable, point_cloud)
 
     def can_pick_loose(self, world_from_connector: RigidTransform) -> bool:
         """Whether a grasp of the loose connector is free, with all space that no camera has seen taken for full."""
@@ -205,20 +204,24 @@ class CableMotion(SearchMotion):
             finite_pose("a pose of the tool or the connector", pose)
         share("the speed", speed)
 
-        def steps(unseen: bool) -> Iterator[None]:
+        def steps(optimistic: bool) -> Iterator[None]:
             spheres = self.held_spheres(held)
-            model, q, kin = self.start_model(arm, held=spheres, unseen=unseen), self.joints(arm), self.kinematics[arm]
+            model, q, kin = (
+                self.start_model(arm, held=spheres, optimistic=optimistic),
+                self.joints(arm),
+                self.kinematics[arm],
+            )
             clearances, carry = self.parameters.clearances, self.parameters.carry
             candidates = carry_paths(self.known, kin, q, goals, held, carry)
             paths = (path for path in candidates if can_continue(kin, path[-1], onward, carry.step))
             widest = self.known.arm(arm).robot.gripper.opening
-            wide = self.model(arm, held=spheres, opening=widest, unseen=unseen)
+            wide = self.model(arm, held=spheres, opening=widest, optimistic=optimistic)
             path = first_free((wide, model), clearances.near_margins, paths)
             if path is None:
                 solutions = [end for goal in goals for end in kin.ik(goal, q)]
                 ends = [end for end in solutions if can_continue(kin, end, onward, carry.step)]
                 path = yield from self._shortest_plan(model, q, np.array(ends).reshape(-1, len(kin)), carry.searched)
-            yield from self.execution.follow(arm, path, min(speed, self._pace(unseen)), self._carrying(held))
+            yield from self.execution.follow(arm, path, min(speed, self._pace(optimistic)), self._carrying(held))
 
         return self.execution.request(arm, self._tries(arm, steps))
 
@@ -326,7 +329,6 @@ class CableMotion(SearchMotion):
         shallow: float,
         cable: FloatArray | None,
         point_cloud: PointCloudSource | None,
-        enter_unseen: bool = True,
     ) -> MotionRequest:
         connector_from_world, near = world_from_connector.inv().as_matrix(), self.parameters.same_grasp
 
@@ -341,7 +343,6 @@ class CableMotion(SearchMotion):
             clear_of=cable,
             without=self.known.cable.clip.bracket,
             point_cloud=point_cloud,
-            enter_unseen=enter_unseen,
             last=missed if self._missed else None,
         )
 

@@ -11,7 +11,7 @@ FREE_DISTANCE = 10.0  # metres; what a grid says where nothing is occupied
 
 @dataclass(frozen=True, eq=False)
 class DistanceGrid:
-    """Distances (m) to the nearest occupied voxel's centre; what is looked up never exceeds the true distance.
+    """Distances (m) to the nearest occupied voxel's centre; what is looked up never exceeds the true `least` distance.
 
     `distance` (nx, ny, nz) float32 m; `lower` (3,) m is the corner of voxel (0, 0, 0) in the world; `h` m is a voxel's
     edge. Outside the grid nothing is known to be occupied. Unseen space counts as free unless it is marked as occupied.
@@ -22,17 +22,26 @@ class DistanceGrid:
     h: float
 
     @classmethod
-    def from_occupied(cls, occupied: NDArray[np.bool_], lower: NDArray[np.float64], h: float) -> "DistanceGrid":
-        """Grid of an occupancy array (nx, ny, nz)."""
+    def from_occupied(
+        cls, occupied: NDArray[np.bool_], lower: NDArray[np.float64], h: float, *, least: bool = True
+    ) -> "DistanceGrid":
+        """Grid of an occupancy array (nx, ny, nz). Not the `least` distances are those between voxels' centres."""
         if not occupied.any():
             return cls(np.full(occupied.shape, FREE_DISTANCE, np.float32), np.asarray(lower, float), h)
         centres = np.asarray(distance_transform_edt(~occupied)) * h
         # A point may lie half a voxel's diagonal off the centre that the transform measured from.
-        return cls((centres - 0.5 * np.sqrt(3.0) * h).astype(np.float32), np.asarray(lower, float), h)
+        off = 0.5 * np.sqrt(3.0) * h if least else 0.0
+        return cls((centres - off).astype(np.float32), np.asarray(lower, float), h)
 
     @classmethod
     def from_points(
-        cls, points: NDArray[np.float64], lower: NDArray[np.float64], upper: NDArray[np.float64], h: float
+        cls,
+        points: NDArray[np.float64],
+        lower: NDArray[np.float64],
+        upper: NDArray[np.float64],
+        h: float,
+        *,
+        least: bool = True,
     ) -> "DistanceGrid":
         """Grid over the box `lower`..`upper` (3,) with a voxel occupied where one of the points (n, 3) lies."""
         lower = np.asarray(lower, float)
@@ -41,7 +50,7 @@ class DistanceGrid:
         index = index[np.all((index >= 0) & (index < shape), axis=1)]
         occupied = np.zeros(tuple(shape), dtype=np.bool_)
         occupied[tuple(index.T)] = True
-        return cls.from_occupied(occupied, lower, h)
+        return cls.from_occupied(occupied, lower, h, least=least)
 
     @classmethod
     def of_boxes(

@@ -62,7 +62,7 @@ class PlanningScene:
             c.mount.arm: c.mount for c in known.cameras if isinstance(c.mount, WristMount)
         }
         self._boxes = known.solids()
-        self._grids: dict[bool, DistanceGrid | None] = {}  # with what was not seen, and without; made when asked for
+        self._grids: dict[bool, DistanceGrid | None] = {}  # optimistic or not; made when asked for
         self._points = self._unseen = self._more = NO_POINTS
         self._felt: list[tuple[float, FloatArray]] = []  # when, and points (n, 3) m
         self._spacing = 0.01  # m, until the first voxels come
@@ -86,11 +86,6 @@ class PlanningScene:
                 self._points = _points_beyond(self._points, spheres, margin)
                 self._unseen = _points_beyond(self._unseen, spheres, margin)
         self._grids.clear()
-
-    @property
-    def has_unseen(self) -> bool:
-        """Whether any space in the arms' reach counts as occupied only because no camera has seen it."""
-        return len(self._unseen) > 0
 
     @counts_as("planning")
     def keep_clear(self, points: FloatArray) -> None:
@@ -119,17 +114,17 @@ class PlanningScene:
             near |= np.linalg.norm(seen - kin.base[:3, 3], axis=1) < kin.reach + beyond
         return seen[near]
 
-    def _grid(self, unseen: bool = True) -> DistanceGrid | None:
-        """The distances to all points, or to those that were seen, felt or named; None where there are none."""
-        if unseen not in self._grids:
-            guesses = [self._unseen] if unseen else []
+    def _grid(self, optimistic: bool = False) -> DistanceGrid | None:
+        """The least distances to all points, or the likely ones to those that were seen; None where there are none."""
+        if optimistic not in self._grids:
+            guesses = [] if optimistic else [self._unseen]
             points = np.vstack([self._points, self._more, *guesses, *(felt for _, felt in self._felt)])
             grid, border = None, self._scene_parameters.grid_border
             if len(points):
                 lower, upper = points.min(axis=0) - border, points.max(axis=0) + border
-                grid = DistanceGrid.from_points(points, lower, upper, self._spacing)
-            self._grids[unseen] = grid
-        return self._grids[unseen]
+                grid = DistanceGrid.from_points(points, lower, upper, self._spacing, least=not optimistic)
+            self._grids[optimistic] = grid
+        return self._grids[optimistic]
 
     @counts_as("planning")
     def start_model(
@@ -139,13 +134,13 @@ class PlanningScene:
         held: FloatArray | None = None,
         without: Collection[Box] = (),
         opening: float | None = None,
-        unseen: bool = True,
+        optimistic: bool = False,
     ) -> CollisionModel:
         """`model` for a motion that begins now; seen points that the arm touches where it stands are forgotten.
 
         Voxels are coarse and cameras err by millimetres: a hand that came in beside an obstacle must get out again.
         """
-        model = self.model(arm, held=held, without=without, opening=opening, unseen=unseen)
+        model = self.model(arm, held=held, without=without, opening=opening, optimistic=optimistic)
         distance, what = model.nearest(self.joints(arm))
         touching = self._scene_parameters.touching
         if what == "seen surface" and distance < touching:
@@ -155,7 +150,7 @@ class PlanningScene:
             self._more = _points_beyond(self._more, spheres, reach)
             self._felt = [(at, _points_beyond(felt, spheres, reach)) for at, felt in self._felt]
             self._grids.clear()
-            model = self.model(arm, held=held, without=without, opening=opening, unseen=unseen)
+            model = self.model(arm, held=held, without=without, opening=opening, optimistic=optimistic)
         return model
 
     def joints(self, arm: str) -> FloatArray:
@@ -195,13 +190,14 @@ class PlanningScene:
         others: bool = True,
         without: Collection[Box] = (),
         opening: float | None = None,
-        unseen: bool = True,
+        optimistic: bool = False,
     ) -> CollisionModel:
         """What `arm` must not touch now.
 
         `held` (m, 4) m are spheres in the tool frame that stand for what the hand carries. Without `others` the other
         arms and the seen surfaces do not count; the boxes `without` may be touched. The jaw stands as the fingers read,
-        or `opening` m wide. Without `unseen` the space that no camera has seen counts as free.
+        or `opening` m wide. `optimistic`: the space that no camera has seen
+        counts as free, and seen surfaces are taken to be where their voxels' centres are.
         """
         bodies = [
             self.model(name, others=False).spheres(self.joints(name)) for name in self.arms if others and name != arm
@@ -214,7 +210,7 @@ class PlanningScene:
             self.grippers[arm].reading().gap if opening is None else opening,
         )
         other = np.vstack(bodies) if bodies else None
-        grid = self._grid(unseen) if others else None
+        grid = self._grid(optimistic) if others else None
         return CollisionModel(self.kinematics[arm], boxes, body, other, grid, self._scene_parameters.collision)
 
     @counts_as("planning")
