@@ -30,7 +30,7 @@ from regrasp.motion.robots.dynamics import ArmDynamics
 from regrasp.motion.scene.collision import Clearances, CollisionModel
 from regrasp.motion.scene.planning_scene import NO_POINTS, PlanningScene, PlanningSceneParameters
 
-_NO_WAY = (CauseCode.NO_COLLISION_FREE_GOAL, CauseCode.PLANNING_FAILED, CauseCode.MOTION_BLOCKED)
+NO_WAY = (CauseCode.NO_COLLISION_FREE_GOAL, CauseCode.PLANNING_FAILED, CauseCode.MOTION_BLOCKED)
 
 # Points (n, 3) m in the world that a camera saw from that second on; None while there is no such picture.
 PointCloudSource = Callable[[float], FloatArray | None]
@@ -279,7 +279,7 @@ class Motion(PlanningScene):
                     raise
                 self._on_anomaly(f"felt at {place.round(3).tolist()}: the {arm} arm looks for another way")
             except PlanningError as error:
-                if error.code not in _NO_WAY or optimistic:
+                if error.code not in NO_WAY or optimistic:
                     raise
                 optimistic = True
             else:

@@ -23,7 +23,8 @@ from regrasp.motion.cable.held import connector_spheres
 from regrasp.motion.cable.plugging import PluggingParameters
 from regrasp.motion.cable.search import SearchMotion, SearchMotionParameters
 from regrasp.motion.cable.seating import SeatingParameters, poses_before, seated_pose
-from regrasp.motion.failure import GraspEmptyError, PlanningError
+from regrasp.motion.cable.tether import Tether, TetherParameters
+from regrasp.motion.failure import GraspEmptyError, PlanningError, TouchError
 from regrasp.motion.grasping.approach import pick_candidates
 from regrasp.motion.grasping.gap_test import GripWatch
 from regrasp.motion.grasping.grasps import Grasp
@@ -33,7 +34,7 @@ from regrasp.motion.robots.contact_guard import ContactLimits
 from regrasp.motion.robots.poses import angle_between
 from regrasp.motion.scene.collision import CollisionModel
 from regrasp.motion.scene.planning_scene import NO_POINTS
-from regrasp.motion.service import PointCloudSource
+from regrasp.motion.service import NO_WAY, PointCloudSource
 
 T = TypeVar("T")
 
@@ -62,6 +63,7 @@ class CableMotionParameters(SearchMotionParameters):
     retreats: tuple[float, ...] = (0.10, 0.08, 0.06, 0.05, 0.04, 0.03)
     unplug: UnplugParameters = field(default_factory=UnplugParameters)
     carry: CarryPathParameters = field(default_factory=CarryPathParameters)
+    tether: TetherParameters = field(default_factory=TetherParameters)
     seating: SeatingParameters = field(default_factory=SeatingParameters)
     cable_reach: CableReachParameters = field(default_factory=CableReachParameters)
     plugging: PluggingParameters = field(default_factory=PluggingParameters)
@@ -204,18 +206,18 @@ class CableMotion(SearchMotion):
             finite_pose("a pose of the tool or the connector", pose)
         share("the speed", speed)
 
-        def steps(optimistic: bool) -> Iterator[None]:
+        def steps(optimistic: bool, tethered: bool) -> Iterator[None]:
             spheres = self.held_spheres(held)
-            model, q, kin = (
-                self.start_model(arm, held=spheres, optimistic=optimistic),
-                self.joints(arm),
-                self.kinematics[arm],
-            )
+            model = self.start_model(arm, held=spheres, optimistic=optimistic)
+            q, kin = self.joints(arm), self.kinematics[arm]
             clearances, carry = self.parameters.clearances, self.parameters.carry
             candidates = carry_paths(self.known, kin, q, goals, held, carry)
             paths = (path for path in candidates if can_continue(kin, path[-1], onward, carry.step))
             widest = self.known.arm(arm).robot.gripper.opening
             wide = self.model(arm, held=spheres, opening=widest, optimistic=optimistic)
+            if tethered:
+                tether = self._tether(arm, held, q, optimistic)
+                model, wide = model.constrained(tether), wide.constrained(tether)
             path = first_free((wide, model), clearances.near_margins, paths)
             if path is None:
                 solutions = [end for goal in goals for end in kin.ik(goal, q)]
@@ -223,7 +225,18 @@ class CableMotion(SearchMotion):
                 path = yield from self._shortest_plan(model, q, np.array(ends).reshape(-1, len(kin)), carry.searched)
             yield from self.execution.follow(arm, path, min(speed, self._pace(optimistic)), self._carrying(held))
 
-        return self.execution.request(arm, self._tries(arm, steps))
+        def tries() -> Iterator[None]:
+            try:
+                yield from self._tries(arm, lambda optimistic: steps(optimistic, True))
+            except PlanningError as error:
+                if error.code not in NO_WAY or isinstance(error, TouchError):
+                    raise
+                self._on_anomaly(
+                    f"no way on which the cable keeps clear, {error}: the {arm} arm goes without regard to it"
+                )
+                yield from self._tries(arm, lambda optimistic: steps(optimistic, False))
+
+        return self.execution.request(arm, tries())
 
     def carry_to_clip(self, held: RigidTransform) -> MotionRequest:
         """Bring the held connector (tool_from_connector) before the clip, from where the hand can go in and back out.
@@ -293,6 +306,12 @@ class CableMotion(SearchMotion):
     def _shift_held(self, arm: str, displacement: FloatArray, held: RigidTransform) -> MotionRequest:
         """`shift`, checked, with what the arm holds (tool_from_connector)."""
         return self.shift(arm, displacement, held=self.held_spheres(held), contact=self._carrying(held))
+
+    def _tether(self, arm: str, held: RigidTransform, q: FloatArray, optimistic: bool) -> Tether:
+        """The cable of what is held (tool_from_connector) as a constraint on a path that begins at joints `q` (n,)."""
+        tether, kin = self.parameters.tether, self.kinematics[arm]
+        grid = self.grid_beside(cable_course(self.known, kin.tool(q) * held), tether.seen_free, optimistic)
+        return Tether(self.known, held, q, kin, self.known.solids(), grid, tether)
 
     def _carrying(self, held: RigidTransform) -> ContactLimits:
         """What counts as a touch while the cable pulls at what is held (tool_from_connector)."""

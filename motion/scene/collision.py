@@ -1,8 +1,10 @@
 """Collision checks of an arm: its spheres against boxes, another arm, seen surfaces and the arm itself."""
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Protocol
 
 import numba as nb
 import numpy as np
@@ -55,7 +57,7 @@ class ArmBody:
 
 
 @nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
-def _box_distance(p: FloatArray, box: FloatArray) -> float:
+def box_distance(p: FloatArray, box: FloatArray) -> float:
     """Signed distance of a point (3,) to a box (6,): centre and half edges."""
     outside, inside = 0.0, -1e9
     for a in range(3):
@@ -67,7 +69,7 @@ def _box_distance(p: FloatArray, box: FloatArray) -> float:
 
 
 @nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
-def _grid_distance(p: FloatArray, distance: NDArray[np.float32], lower: FloatArray, h: float) -> float:
+def grid_distance(p: FloatArray, distance: NDArray[np.float32], lower: FloatArray, h: float) -> float:
     """Distance at a point (3,), by the grid's `distance`, `lower` corner and voxel edge `h`."""
     i, j, k = np.floor((p[0] - lower[0]) / h), np.floor((p[1] - lower[1]) / h), np.floor((p[2] - lower[2]) / h)
     shape = distance.shape
@@ -88,14 +90,14 @@ def _nearest(  # type: ignore[no-untyped-def]
             continue
         p, r = world[n, :3], world[n, 3]
         for b in range(boxes.shape[0]):
-            d = _box_distance(p, boxes[b]) - r
+            d = box_distance(p, boxes[b]) - r
             if d < best:
                 best, what = d, b
         for m in range(others.shape[0]):
             d = np.sqrt(square_distance(p, others[m])) - r - others[m, 3]
             if d < best:
                 best, what = d, _OTHER_ARM
-        d = _grid_distance(p, distance, lower, h) - r
+        d = grid_distance(p, distance, lower, h) - r
         if d < best:
             best, what = d, _GRID
     for m in range(pairs.shape[0]):
@@ -137,7 +139,7 @@ def _free(  # type: ignore[no-untyped-def]
         near_box = _meets_box(bounds[g], bounds[g, 3] + margin, boxes)
         for n in range(starts[g], starts[g + 1]):
             p, reach = world[n], world[n, 3] + margin
-            if (near_box and _meets_box(p, reach, boxes)) or _grid_distance(p, distance, lower, h) < reach:
+            if (near_box and _meets_box(p, reach, boxes)) or grid_distance(p, distance, lower, h) < reach:
                 return False
         group = world[starts[g] : starts[g + 1]]
         for m in range(other_bounds.shape[0]):
@@ -170,6 +172,18 @@ def _edge_free(qa, qb, step, margin, *scene):  # type: ignore[no-untyped-def]
     return True
 
 
+class Constraint(Protocol):
+    """A further condition on the joints of a path."""
+
+    def holds(self, q: FloatArray) -> bool:
+        """Whether joints (n,) meet it."""
+        ...
+
+    def holds_along(self, qa: FloatArray, qb: FloatArray) -> bool:
+        """Whether a straight joint motion meets it, its end included (not its start)."""
+        ...
+
+
 class CollisionModel:
     """One arm, and all that it must not touch. It does not change; make a new one when the surroundings do.
 
@@ -188,6 +202,7 @@ class CollisionModel:
     ) -> None:
         self.kinematics = kinematics
         self.coarse_step, self.fine_step = parameters.coarse_step, parameters.fine_step
+        self._constraint: Constraint | None = None
         self._names = [box.name for box in boxes]
         links, parts, local, pairs = _body_spheres(kinematics, body)
         distance = grid or DistanceGrid(np.full((1, 1, 1), FREE_DISTANCE, np.float32), np.zeros(3), 1e-3)
@@ -198,7 +213,7 @@ class CollisionModel:
             links,
             local,
             pairs,
-            np.array([[*b.center, *(0.5 * s for s in b.size)] for b in boxes], float).reshape(-1, 6),
+            box_table(boxes),
             np.ascontiguousarray(np.empty((0, 4)) if other_arm is None else other_arm, float),
             np.ascontiguousarray(distance.distance),
             distance.lower,
@@ -218,13 +233,22 @@ class CollisionModel:
             bounding_spheres(other, other_starts),
         )
 
+    def constrained(self, constraint: Constraint) -> "CollisionModel":
+        """The same model in which joints are free only where they meet the constraint, too."""
+        model = copy(self)
+        model._constraint = constraint
+        return model
+
     def free(self, q: FloatArray, margin: float) -> bool:
         """Whether the arm at joints (n,) lies within its limits and keeps `margin` metres from everything."""
         inside = bool(np.all((q >= self.kinematics.lower) & (q <= self.kinematics.upper)))
-        return inside and bool(_free(np.asarray(q, float), margin, *self._free_arguments))
+        free = inside and bool(_free(np.asarray(q, float), margin, *self._free_arguments))
+        return free and (self._constraint is None or self._constraint.holds(q))
 
     def edge_free(self, qa: FloatArray, qb: FloatArray, margin: float, *, fine: bool = False) -> bool:
         """Whether the straight joint motion is free, its end included (not its start), checked coarsely or finely."""
+        if self._constraint is not None and not self._constraint.holds_along(qa, qb):
+            return False
         return self._edge_free(qa, qb, margin, self.fine_step if fine else self.coarse_step)
 
     def path_free(self, path: FloatArray, margin: float) -> bool:
@@ -254,6 +278,11 @@ class CollisionModel:
 
     def _edge_free(self, qa: FloatArray, qb: FloatArray, margin: float, step: float) -> bool:
         return bool(_edge_free(np.asarray(qa, float), np.asarray(qb, float), step, margin, *self._free_arguments))
+
+
+def box_table(boxes: Sequence[Box]) -> FloatArray:
+    """Boxes (n, 6) as compiled functions take them: centre and half edges, m."""
+    return np.array([[*b.center, *(0.5 * s for s in b.size)] for b in boxes], float).reshape(-1, 6)
 
 
 def _body_spheres(

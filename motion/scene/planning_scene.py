@@ -20,7 +20,7 @@ from regrasp.motion.robots.ik_parameters import InverseKinematicsParameters
 from regrasp.motion.robots.kinematics import ArmKinematics
 from regrasp.motion.robots.spheres import sphere_distances
 from regrasp.motion.scene.collision import ArmBody, CollisionModel, CollisionParameters
-from regrasp.motion.scene.distance_grid import DistanceGrid
+from regrasp.motion.scene.distance_grid import FREE_DISTANCE, DistanceGrid
 
 NO_POINTS = np.empty((0, 3))
 
@@ -114,16 +114,28 @@ class PlanningScene:
             near |= np.linalg.norm(seen - kin.base[:3, 3], axis=1) < kin.reach + beyond
         return seen[near]
 
+    @counts_as("planning")
+    def grid_beside(self, course: FloatArray, radius: float, optimistic: bool = False) -> DistanceGrid:
+        """The distances to all points further than `radius` m from a `course` (n, 3) m: no obstacle is there."""
+        spheres = np.column_stack([course, np.zeros(len(course))])
+        return self._grid_of(_points_beyond(self._map(optimistic), spheres, radius), optimistic)
+
+    def _map(self, optimistic: bool) -> FloatArray:
+        guesses = [] if optimistic else [self._unseen]
+        return np.vstack([self._points, self._more, *guesses, *(felt for _, felt in self._felt)])
+
+    def _grid_of(self, points: FloatArray, optimistic: bool) -> DistanceGrid:
+        border = self._scene_parameters.grid_border
+        if not len(points):
+            return DistanceGrid(np.full((1, 1, 1), FREE_DISTANCE, np.float32), np.zeros(3), 1e-3)
+        lower, upper = points.min(axis=0) - border, points.max(axis=0) + border
+        return DistanceGrid.from_points(points, lower, upper, self._spacing, least=not optimistic)
+
     def _grid(self, optimistic: bool = False) -> DistanceGrid | None:
         """The least distances to all points, or the likely ones to those that were seen; None where there are none."""
         if optimistic not in self._grids:
-            guesses = [] if optimistic else [self._unseen]
-            points = np.vstack([self._points, self._more, *guesses, *(felt for _, felt in self._felt)])
-            grid, border = None, self._scene_parameters.grid_border
-            if len(points):
-                lower, upper = points.min(axis=0) - border, points.max(axis=0) + border
-                grid = DistanceGrid.from_points(points, lower, upper, self._spacing, least=not optimistic)
-            self._grids[optimistic] = grid
+            points = self._map(optimistic)
+            self._grids[optimistic] = self._grid_of(points, optimistic) if len(points) else None
         return self._grids[optimistic]
 
     @counts_as("planning")
