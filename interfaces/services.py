@@ -28,8 +28,8 @@ class MotionService(Protocol):
         """Bring an arm along a free path to one of the goals (k, n), `margin` m from everything."""
         ...
 
-    def sleep(self, arm: str) -> Request[None]:
-        """Bring an arm to its sleep pose."""
+    def sleep(self, arm: str, *, pulling: bool = False) -> Request[None]:
+        """Bring an arm to its sleep pose; `pulling`: it may pull something elastic along."""
         ...
 
     def straight(

@@ -81,17 +81,26 @@ class Motion(PlanningScene):
         for arm in self.arms:
             self.model(arm).free(self.joints(arm), 0.0)
 
-    def move(self, arm: str, goals: FloatArray, *, margin: float | None = None, tight: bool = True) -> MotionRequest:
+    def move(
+        self,
+        arm: str,
+        goals: FloatArray,
+        *,
+        margin: float | None = None,
+        tight: bool = True,
+        contact: ContactLimits | None = None,
+    ) -> MotionRequest:
         """Plan a path to one of the goals (k, n) and follow it, `margin` m from everything (default: as set).
 
-        `tight`: with a smaller margin where nothing else is found.
+        `tight`: with a smaller margin where nothing else is found. `contact`: what counts as a touch (default: of an
+        arm that moves freely).
         """
         goals = rows("the goals' joints", goals, len(self.kinematics[arm]))
         _check_margin(margin)
 
         def steps(optimistic: bool) -> Iterator[None]:
             path = self._plan(self.start_model(arm, optimistic=optimistic), self.joints(arm), goals, margin, tight)
-            yield from self.execution.follow(arm, path, self._pace(optimistic))
+            yield from self.execution.follow(arm, path, self._pace(optimistic), contact)
 
         return self.execution.request(arm, self._tries(arm, steps))
 
@@ -134,9 +143,13 @@ class Motion(PlanningScene):
 
         return self.execution.request(arm, self._tries(arm, steps))
 
-    def sleep(self, arm: str) -> MotionRequest:
-        """Bring an arm to its sleep pose, out of the cameras' and the other arms' way."""
-        return self.move(arm, np.array([self.known.arm(arm).sleep]))
+    def sleep(self, arm: str, *, pulling: bool = False) -> MotionRequest:
+        """Bring an arm to its sleep pose, out of the cameras' and the other arms' way.
+
+        `pulling`: it may pull something elastic along, which is no touch.
+        """
+        contact = self._guard.carrying if pulling else None
+        return self.move(arm, np.array([self.known.arm(arm).sleep]), contact=contact)
 
     def straight(
         self, arm: str, goal: RigidTransform, *, speed: float | None = None, pressing: bool = False

@@ -48,9 +48,12 @@ class CableLeaf(StepsLeaf):
         """Points (n, 3) m in the world that the overview saw from second `since` on; None until a picture comes."""
         return self.services.perception.surface(self.overview, since)
 
-    def go_to_sleep(self, arm: str) -> LeafSteps:
-        """Bring an arm to its sleep pose, out of the cameras' and the other arm's way."""
-        yield from self.ask(self.services.motion.sleep(arm))
+    def go_to_sleep(self, arm: str, *, pulling: bool = False) -> LeafSteps:
+        """Bring an arm to its sleep pose, out of the cameras' and the other arm's way.
+
+        `pulling`: the cable may have caught on it.
+        """
+        yield from self.ask(self.services.motion.sleep(arm, pulling=pulling))
 
 
 class HandLeaf(CableLeaf):

@@ -41,7 +41,8 @@ class MakeRoom(HandLeaf):
         """See the class."""
         self.clear(FOUND)
         self.services.motion.open_jaw(self.hand)
-        for step in chain(self.wait(self.parameters.leave_time), self.draw_back(), self.go_to_sleep(self.hand)):
+        to_sleep = self.go_to_sleep(self.hand, pulling=True)
+        for step in chain(self.wait(self.parameters.leave_time), self.draw_back(), to_sleep):
             self.services.perception.look(self.overview)  # the search starts where the end was seen last
             yield step
 

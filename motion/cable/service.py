@@ -3,6 +3,7 @@
 from collections.abc import Callable, Collection, Generator, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import TypeVar
 
 import numpy as np
@@ -206,7 +207,7 @@ class CableMotion(SearchMotion):
             finite_pose("a pose of the tool or the connector", pose)
         share("the speed", speed)
 
-        def steps(optimistic: bool, tethered: bool) -> Iterator[None]:
+        def steps(optimistic: bool, max_bend: float | None) -> Iterator[None]:
             spheres = self.held_spheres(held)
             model = self.start_model(arm, held=spheres, optimistic=optimistic)
             q, kin = self.joints(arm), self.kinematics[arm]
@@ -215,8 +216,8 @@ class CableMotion(SearchMotion):
             paths = (path for path in candidates if can_continue(kin, path[-1], onward, carry.step))
             widest = self.known.arm(arm).robot.gripper.opening
             wide = self.model(arm, held=spheres, opening=widest, optimistic=optimistic)
-            if tethered:
-                tether = self._tether(arm, held, q, optimistic)
+            if max_bend is not None:
+                tether = self._tether(arm, held, q, max_bend, optimistic)
                 model, wide = model.constrained(tether), wide.constrained(tether)
             path = first_free((wide, model), clearances.near_margins, paths)
             if path is None:
@@ -226,15 +227,16 @@ class CableMotion(SearchMotion):
             yield from self.execution.follow(arm, path, min(speed, self._pace(optimistic)), self._carrying(held))
 
         def tries() -> Iterator[None]:
-            try:
-                yield from self._tries(arm, lambda optimistic: steps(optimistic, True))
-            except PlanningError as error:
-                if error.code not in NO_WAY or isinstance(error, TouchError):
-                    raise
-                self._on_anomaly(
-                    f"no way on which the cable keeps clear, {error}: the {arm} arm goes without regard to it"
-                )
-                yield from self._tries(arm, lambda optimistic: steps(optimistic, False))
+            for max_bend in self.parameters.tether.bends:
+                try:
+                    yield from self._tries(arm, partial(steps, max_bend=max_bend))
+                except PlanningError as error:
+                    if error.code not in NO_WAY or isinstance(error, TouchError):
+                        raise
+                    self._on_anomaly(f"{error}, with the cable bent by at most {max_bend:g}/m")
+                else:
+                    return
+            yield from self._tries(arm, partial(steps, max_bend=None))
 
         return self.execution.request(arm, tries())
 
@@ -276,14 +278,17 @@ class CableMotion(SearchMotion):
         return self.release(self.hand, gap)
 
     def draw_back(self) -> Request[str]:
-        """Draw the hand straight back as far as is free. The answer is '', or why no distance was."""
+        """Draw the hand straight back as far as is free. The answer is '', or why no distance was.
+
+        What it held may still hang in the jaw: that it pulls is no touch.
+        """
 
         def steps() -> Generator[None, None, str]:
             why = ""
             for distance in self.parameters.retreats:
                 back = self.tool(self.hand).rotation.apply([-distance, 0.0, 0.0])
                 try:
-                    yield from self._done(self.shift(self.hand, back))
+                    yield from self._done(self.shift(self.hand, back, contact=self._guard.carrying))
                 except PlanningError as error:
                     why = str(error)
                 else:
@@ -307,11 +312,11 @@ class CableMotion(SearchMotion):
         """`shift`, checked, with what the arm holds (tool_from_connector)."""
         return self.shift(arm, displacement, held=self.held_spheres(held), contact=self._carrying(held))
 
-    def _tether(self, arm: str, held: RigidTransform, q: FloatArray, optimistic: bool) -> Tether:
+    def _tether(self, arm: str, held: RigidTransform, q: FloatArray, max_bend: float, optimistic: bool) -> Tether:
         """The cable of what is held (tool_from_connector) as a constraint on a path that begins at joints `q` (n,)."""
         tether, kin = self.parameters.tether, self.kinematics[arm]
         grid = self.grid_beside(cable_course(self.known, kin.tool(q) * held), tether.seen_free, optimistic)
-        return Tether(self.known, held, q, kin, self.known.solids(), grid, tether)
+        return Tether(self.known, held, q, kin, self.known.solids(), grid, max_bend, tether)
 
     def _carrying(self, held: RigidTransform) -> ContactLimits:
         """What counts as a touch while the cable pulls at what is held (tool_from_connector)."""

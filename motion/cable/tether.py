@@ -21,6 +21,11 @@ from regrasp.motion.scene.distance_grid import FREE_DISTANCE, DistanceGrid
 class TetherParameters:
     """How the cable limits where a hand may take its end."""
 
+    # 1/m, curvature of the cable at the connector, the first with which a way is found. With 7 it turns the connector
+    # in the jaw with 0.3 N m without gravity and 0.8 with the stiff cable of the Earth tests; from about twice that it
+    # turns there, and forces the jaw open.
+    bends: tuple[float, ...] = (7.0, np.inf)
+
     # m by which the cable's course (`cable_course`) may be longer than the cable; the course is a guess by so much
     stretch: float = 0.008
     clearance: float = 0.004  # m between the cable's middle line and seen surfaces; its radius
@@ -30,13 +35,16 @@ class TetherParameters:
     # m from either end where the cable may touch: it comes out of a socket's block, and the hand is at the other
     near_ends: float = 0.06
     slack: float = 0.003  # m by which a path may make worse what is not kept where it begins; choice
+    bend_slack: float = 0.5  # 1/m, the same of the curvature
 
 
 @nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
-def _state(q, base, joints, end, anchor, direction, points, near_ends, boxes, distance, lower, h):  # type: ignore[no-untyped-def]
-    """(length, clearance) m of the cable at joints (n,): that of its course, and its least distance to anything.
+def _state(  # type: ignore[no-untyped-def]
+    q, base, joints, end, anchor, direction, full, points, near_ends, boxes, distance, lower, h
+):
+    """(length, clearance, bend) of the cable at joints (n,): m of its course and to anything, 1/m at the connector.
 
-    `end` (4, 4) is last_link_from_cable_end, x along the cable.
+    `end` (4, 4) is last_link_from_cable_end, x along the cable, whose length is `full` m.
     """
     last = multiply(link_frames_in(base, joints, q)[-1], end)
     p, d = last[:3, 3], last[:3, 0]
@@ -59,16 +67,20 @@ def _state(q, base, joints, end, anchor, direction, points, near_ends, boxes, di
         clearance = min(clearance, grid_distance(here, distance, lower, h))
         for b in range(boxes.shape[0]):
             clearance = min(clearance, box_distance(here, boxes[b]))
-    return length, clearance
+    onward = 6.0 * (anchor - p) + chord * (2.0 * direction + 4.0 * d)  # second derivative of the curve at the connector
+    bend = np.sqrt((np.cross(d, onward) ** 2).sum()) / (chord * chord)
+    # A rod with both ends clamped that is too long by s bulges by a = 2 sqrt(s L) / pi, and its ends bend by
+    # 2 pi^2 a / L^2 (first buckling mode).
+    return length, clearance, bend + 4.0 * np.pi * np.sqrt(max(0.0, full - length) / full**3)
 
 
 @nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
-def _edge_kept(qa, qb, step, longest, nearest, *cable):  # type: ignore[no-untyped-def]
-    """Whether the cable is no longer than `longest` and no nearer than `nearest` to anything along an edge."""
+def _edge_kept(qa, qb, step, longest, nearest, most, *cable):  # type: ignore[no-untyped-def]
+    """Whether the cable is at most so long, at least so far from anything and bends at most so much along an edge."""
     count = max(1, int(np.ceil(np.abs(qb - qa).max() / step)))
     for k in range(count, 0, -1):
-        length, clearance = _state(qa + (qb - qa) * (k / count), *cable)
-        if length > longest or clearance < nearest:
+        length, clearance, bend = _state(qa + (qb - qa) * (k / count), *cable)
+        if length > longest or clearance < nearest or bend > most:
             return False
     return True
 
@@ -77,7 +89,8 @@ class Tether:
     """Implements `regrasp.motion.scene.collision.Constraint`: the cable reaches, and does not sweep through things.
 
     The cable's course is that of `cable_course`: a cubic Hermite curve, the shape of a rod under small deflections. It
-    bears no pull, so that its course must not be longer than the cable. What is not kept at the start must not become
+    bears no pull, so that its course must not be longer than the cable. Where it is bent too much it turns the
+    connector in the jaw: a course shorter than the cable buckles it. What is not kept at the start must not become
     worse.
     """
 
@@ -89,11 +102,12 @@ class Tether:
         kinematics: ArmKinematics,
         boxes: Sequence[Box],
         grid: DistanceGrid,
+        max_bend: float = np.inf,
         parameters: TetherParameters = TetherParameters(),
     ) -> None:
         """The arm holds the connector at `held` (tool_from_connector); its joints at the start are `start` (n,).
 
-        The cable keeps clear of the `boxes`, and of what `grid` says.
+        The cable keeps clear of the `boxes`, and of what `grid` says, and bends by at most `max_bend` 1/m.
         """
         tool_from_end = held * RigidTransform.from_translation([-0.5 * known.cable.connector.length, 0.0, 0.0])
         anchor, direction = known.cable.anchor
@@ -103,6 +117,7 @@ class Tether:
             np.ascontiguousarray(kinematics.last_from_tool @ tool_from_end.as_matrix()),
             anchor,
             np.asarray(direction, float),
+            known.cable.length,
             parameters.points,
             parameters.near_ends,
             box_table(boxes),
@@ -111,16 +126,17 @@ class Tether:
             float(grid.h),
         )
         self._step = parameters.step
-        length, clearance = _state(np.asarray(start, float), *self._arguments)
+        length, clearance, bend = _state(np.asarray(start, float), *self._arguments)
+        self._most = max(max_bend, bend + parameters.bend_slack)
         self._longest = max(known.cable.length + parameters.stretch, length + parameters.slack)
         self._nearest = min(parameters.clearance, clearance - parameters.slack)
 
     def holds(self, q: FloatArray) -> bool:
         """Whether the cable reaches and is free at joints (n,)."""
-        length, clearance = _state(np.asarray(q, float), *self._arguments)
-        return bool(length <= self._longest and clearance >= self._nearest)
+        length, clearance, bend = _state(np.asarray(q, float), *self._arguments)
+        return bool(length <= self._longest and clearance >= self._nearest and bend <= self._most)
 
     def holds_along(self, qa: FloatArray, qb: FloatArray) -> bool:
         """Whether the cable reaches and is free on a straight joint motion, its end included (not its start)."""
         ends = np.asarray(qa, float), np.asarray(qb, float)
-        return bool(_edge_kept(*ends, self._step, self._longest, self._nearest, *self._arguments))
+        return bool(_edge_kept(*ends, self._step, self._longest, self._nearest, self._most, *self._arguments))

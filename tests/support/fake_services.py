@@ -110,7 +110,7 @@ class FakeMotion:
         self.moves.append((arm, goals))
         return self.work(arm)
 
-    def sleep(self, arm: str) -> Request[None]:
+    def sleep(self, arm: str, *, pulling: bool = False) -> Request[None]:
         return self.move(arm, np.array([self.known.arm(arm).sleep]))
 
     def shift(
