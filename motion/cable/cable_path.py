@@ -60,19 +60,24 @@ def natural_paths(
     Seen along the cable's straight course a path is direct, or rises first and then goes across, or rises nearer to the
     panel.
     """
-    begin, end = _deflection(known, start), _deflection(known, goal)
+    begin, end = deflection(known, start), deflection(known, goal)
     for detour in parameters.detours:
         via = 0.5 * (begin + end) if detour is None else np.array([begin[0] + detour, begin[1], end[2]])
-        yield _natural_path(known, start, goal, via, parameters.poses)
+        yield natural_path(known, start, goal, np.array([via, end]), parameters.poses)
 
 
-def _natural_path(known: CableKnown, start: FloatArray, goal: FloatArray, via: FloatArray, count: int) -> FloatArray:
-    """`count` poses from `start` to `goal` along the cable's natural shapes, with deflection `via` (3,) m half-way.
+def natural_path(
+    known: CableKnown, start: FloatArray, goal: FloatArray, route: FloatArray, count: int = CablePathParameters().poses
+) -> FloatArray:
+    """`count` poses (n, 4, 4) or more from `start` to `goal`, world_from_connector, along the cable's natural shapes.
+
+    The cable's end is bent by the deflections of the `route` (k, 3) m, at even steps from the start (left out) on.
 
     The start's offset from its natural pose fades early, and the goal's comes late: a cable that hangs straight buckles
     with far more force than a bent one that is pressed by the same length.
     """
-    begin, end = _deflection(known, start), _deflection(known, goal)
+    begin, end = deflection(known, start), deflection(known, goal)
+    count = max(count, 2 * len(route))
     ends = natural_poses(known, np.array([begin, end]))
     first, last = multiply(inverse(ends[0]), start), multiply(inverse(ends[1]), goal)
     turn = rotation_vector(multiply(inverse(first), last)[:3, :3])
@@ -82,11 +87,13 @@ def _natural_path(known: CableKnown, start: FloatArray, goal: FloatArray, via: F
     offsets[:, :3, :3] = [first[:3, :3] @ rotation_matrix(part * turn) for part in s]
     offsets[:, :3, 3] = (1 - share) ** 3 * first[:3, 3] + share**3 * last[:3, 3]
     offsets[:, 3, 3] = 1.0
-    deflections = np.where(share < 0.5, begin + 2 * share * (via - begin), via + (2 * share - 1) * (end - via))
+    corners = np.vstack([begin, route])
+    at = np.linspace(0.0, 1.0, len(corners))
+    deflections = np.column_stack([np.interp(s, at, corners[:, axis]) for axis in range(3)])
     return np.asarray(natural_poses(known, deflections) @ offsets)
 
 
-def _deflection(known: CableKnown, connector: FloatArray) -> FloatArray:
+def deflection(known: CableKnown, connector: FloatArray) -> FloatArray:
     """How far (3,) m the end of the cable at the connector's pose (4, 4) lies off the straight course."""
     anchor, course = known.cable.anchor
     end = connector[:3, 3] - 0.5 * known.cable.connector.length * connector[:3, 0] - anchor

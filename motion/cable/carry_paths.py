@@ -1,6 +1,6 @@
 """Joint paths that carry a held connector to a goal, the preferred first."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import chain, product
 
@@ -9,7 +9,8 @@ from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cable.cell import CableKnown
-from regrasp.motion.cable.cable_path import CablePathParameters, natural_paths
+from regrasp.motion.cable.cable_path import CablePathParameters, deflection, natural_path, natural_paths, natural_poses
+from regrasp.motion.cable.natural_routes import NaturalRouteParameters, NaturalRoutes
 from regrasp.motion.planning.straight import straight_lines
 from regrasp.motion.robots.kinematics import ArmKinematics
 from regrasp.motion.robots.poses import inverse, multiply, poses_between
@@ -25,6 +26,8 @@ class CarryPathParameters:
     # Paths by search where no other is free, the shortest of which is taken: a long way round winds the cable about the
     # arm. Of eight the shortest took half the way of the first, where the first jammed the arm.
     searched: int = 8
+    routed: int = 3  # goals, the first, to which routes are searched on the grid of natural shapes; choice
+    routes: NaturalRouteParameters = field(default_factory=NaturalRouteParameters)
     cable: CablePathParameters = field(default_factory=CablePathParameters)
 
 
@@ -34,11 +37,15 @@ def carry_paths(
     q: FloatArray,
     goals: Sequence[RigidTransform],
     held: RigidTransform,
+    routes: NaturalRoutes,
+    arm_free: Callable[[FloatArray], bool],
     parameters: CarryPathParameters = CarryPathParameters(),
 ) -> Iterator[FloatArray]:
     """Joint paths (k, 6) rad from `q` (6,) to the goals (world_from_tool); `held` is tool_from_connector.
 
-    First along the natural shapes of the cable, then straight or in a flat arch. Whether a path is free is not checked.
+    First along the natural shapes of the cable: directly, in a plain detour, or by the `routes`. Then straight or in a
+    flat arch. `arm_free`: whether the arm is free with its tool at a pose (4, 4). Whether a path is free is not
+    checked.
     """
     tool, tool_from_connector, ends = kin.tool_matrix(q), held.as_matrix(), [goal.as_matrix() for goal in goals]
     connector_from_tool, connector = inverse(tool_from_connector), multiply(tool, tool_from_connector)
@@ -47,8 +54,13 @@ def carry_paths(
         for end in ends
         for path in natural_paths(known, connector, multiply(end, tool_from_connector), parameters.cable)
     )
+    routed = (
+        path @ connector_from_tool
+        for end in ends[: parameters.routed]
+        for path in _routed(known, connector, multiply(end, tool_from_connector), connector_from_tool, routes, arm_free)
+    )
     direct = (_arch(tool, end, lift) for end in ends for lift in parameters.lifts)
-    for poses in chain(natural, direct):
+    for poses in chain(natural, routed, direct):
         path = straight_lines(kin, q, poses, parameters.step)
         if path is not None:
             yield path
@@ -74,6 +86,29 @@ def first_free(
             if model.path_free(path[1:], margin):
                 return path
     return None
+
+
+def _routed(
+    known: CableKnown,
+    start: FloatArray,
+    goal: FloatArray,
+    connector_from_tool: FloatArray,
+    routes: NaturalRoutes,
+    arm_free: Callable[[FloatArray], bool],
+) -> Iterator[FloatArray]:
+    """Paths (n, 4, 4) of the connector from `start` to `goal` (4, 4) by the routes."""
+    begin, end = deflection(known, start), deflection(known, goal)
+    turned = []
+    for natural, pose in zip(natural_poses(known, np.array([begin, end])), (start, goal), strict=True):
+        turn = np.eye(4)
+        turn[:3, :3] = natural[:3, :3].T @ pose[:3, :3]
+        turned.append(turn @ connector_from_tool)
+
+    def connector_free(pose: FloatArray) -> bool:
+        return any(arm_free(pose @ tool) for tool in turned)
+
+    for route in routes.routes(begin, end, connector_free):
+        yield natural_path(known, start, goal, route)
 
 
 def _arch(start: FloatArray, goal: FloatArray, lift: float) -> list[FloatArray]:

@@ -21,6 +21,7 @@ from regrasp.motion.cable.cable_reach import CableReachParameters
 from regrasp.motion.cable.cable_shape import cable_course, connector_points
 from regrasp.motion.cable.carry_paths import CarryPathParameters, carry_paths, first_free
 from regrasp.motion.cable.held import connector_spheres
+from regrasp.motion.cable.natural_routes import NaturalRoutes
 from regrasp.motion.cable.plugging import PluggingParameters
 from regrasp.motion.cable.search import SearchMotion, SearchMotionParameters
 from regrasp.motion.cable.seating import SeatingParameters, poses_before, seated_pose
@@ -212,12 +213,17 @@ class CableMotion(SearchMotion):
             model = self.start_model(arm, held=spheres, optimistic=optimistic)
             q, kin = self.joints(arm), self.kinematics[arm]
             clearances, carry = self.parameters.clearances, self.parameters.carry
-            candidates = carry_paths(self.known, kin, q, goals, held, carry)
+            tether = self._tether(arm, held, q, np.inf if max_bend is None else max_bend, optimistic)
+
+            def arm_free(world_from_tool: FloatArray) -> bool:
+                return any(model.free(end, clearances.near_margins[-1]) for end in kin.ik(world_from_tool, q))
+
+            routes = NaturalRoutes(self.known, tether.clearance, carry.routes)
+            candidates = carry_paths(self.known, kin, q, goals, held, routes, arm_free, carry)
             paths = (path for path in candidates if can_continue(kin, path[-1], onward, carry.step))
             widest = self.known.arm(arm).robot.gripper.opening
             wide = self.model(arm, held=spheres, opening=widest, optimistic=optimistic)
             if max_bend is not None:
-                tether = self._tether(arm, held, q, max_bend, optimistic)
                 model, wide = model.constrained(tether), wide.constrained(tether)
             path = first_free((wide, model), clearances.near_margins, paths)
             if path is None:

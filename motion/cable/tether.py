@@ -26,8 +26,8 @@ class TetherParameters:
     # turns there, and forces the jaw open.
     bends: tuple[float, ...] = (7.0, np.inf)
 
-    # m by which the cable's course (`cable_course`) may be longer than the cable; the course is a guess by so much
-    stretch: float = 0.008
+    # m by which the cable's course (`cable_course`) may be longer than the cable; it bears no pull, and its course is a guess by so much
+    stretch: float = 0.003
     clearance: float = 0.004  # m between the cable's middle line and seen surfaces; its radius
     step: float = 0.03  # rad of the joint that moves most, between two checks; choice
     seen_free: float = 0.02  # m round the cable where it lies at the start: there no obstacle is, whatever was mapped
@@ -39,15 +39,14 @@ class TetherParameters:
 
 
 @nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
-def _state(  # type: ignore[no-untyped-def]
-    q, base, joints, end, anchor, direction, full, points, near_ends, boxes, distance, lower, h
+def _course(  # type: ignore[no-untyped-def]
+    end, anchor, direction, full, points, near_ends, boxes, distance, lower, h
 ):
-    """(length, clearance, bend) of the cable at joints (n,): m of its course and to anything, 1/m at the connector.
+    """(length, clearance, bend) of the cable: m of its course and to anything, 1/m at the connector.
 
-    `end` (4, 4) is last_link_from_cable_end, x along the cable, whose length is `full` m.
+    `end` (4, 4) is that of the cable in the world, x along the cable, whose length is `full` m.
     """
-    last = multiply(link_frames_in(base, joints, q)[-1], end)
-    p, d = last[:3, 3], last[:3, 0]
+    p, d = end[:3, 3], end[:3, 0]
     chord = np.sqrt(((p - anchor) ** 2).sum())
     length, clearance, before = 0.0, FREE_DISTANCE, anchor
     for i in range(1, points + 1):
@@ -72,6 +71,12 @@ def _state(  # type: ignore[no-untyped-def]
     # A rod with both ends clamped that is too long by s bulges by a = 2 sqrt(s L) / pi, and its ends bend by
     # 2 pi^2 a / L^2 (first buckling mode).
     return length, clearance, bend + 4.0 * np.pi * np.sqrt(max(0.0, full - length) / full**3)
+
+
+@nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
+def _state(q, base, joints, end, *cable):  # type: ignore[no-untyped-def]
+    """`_course` at joints (n,), where `end` (4, 4) is last_link_from_cable_end."""
+    return _course(multiply(link_frames_in(base, joints, q)[-1], end), *cable)
 
 
 @nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
@@ -109,12 +114,13 @@ class Tether:
 
         The cable keeps clear of the `boxes`, and of what `grid` says, and bends by at most `max_bend` 1/m.
         """
-        tool_from_end = held * RigidTransform.from_translation([-0.5 * known.cable.connector.length, 0.0, 0.0])
+        self._connector_from_end = np.eye(4)
+        self._connector_from_end[0, 3] = -0.5 * known.cable.connector.length
         anchor, direction = known.cable.anchor
         self._arguments = (
             kinematics.base,
             kinematics.joints,
-            np.ascontiguousarray(kinematics.last_from_tool @ tool_from_end.as_matrix()),
+            np.ascontiguousarray(kinematics.last_from_tool @ held.as_matrix() @ self._connector_from_end),
             anchor,
             np.asarray(direction, float),
             known.cable.length,
@@ -130,6 +136,10 @@ class Tether:
         self._most = max(max_bend, bend + parameters.bend_slack)
         self._longest = max(known.cable.length + parameters.stretch, length + parameters.slack)
         self._nearest = min(parameters.clearance, clearance - parameters.slack)
+
+    def clearance(self, world_from_connector: FloatArray) -> float:
+        """How far (m) the cable's middle line is from anything where the connector is at a pose (4, 4)."""
+        return float(_course(world_from_connector @ self._connector_from_end, *self._arguments[3:])[1])
 
     def holds(self, q: FloatArray) -> bool:
         """Whether the cable reaches and is free at joints (n,)."""
