@@ -6,6 +6,7 @@ refused with a ValueError at once; what an arm cannot do, with a PlanningError b
 """
 
 from collections.abc import Callable, Collection, Generator, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -350,9 +351,17 @@ class Motion(PlanningScene):
         without: Collection[Box],
         optimistic: bool = False,
     ) -> list[FloatArray]:
-        """Joint paths (k, n) from standoff to grasp; `model` counts away from what is grasped."""
-        near = self.model(arm, without=without, opening=self.parameters.execution.jaw.open_gap, optimistic=optimistic)
+        """Joint paths (k, n) from standoff to grasp; `model` counts away from what is grasped.
+
+        They touch the boxes `without` only if there are no others.
+        """
         clearances, pick = self.parameters.clearances, self.parameters.pick
+        gap = self.parameters.execution.jaw.open_gap
+        if without:
+            near = self.model(arm, opening=gap, optimistic=optimistic)
+            with suppress(PlanningError):
+                return find_approaches(model, near, self.joints(arm), candidates, clearances, pick)
+        near = self.model(arm, without=without, opening=gap, optimistic=optimistic)
         return find_approaches(model, near, self.joints(arm), candidates, clearances, pick)
 
     def _plan(

@@ -66,6 +66,19 @@ def natural_paths(
         yield natural_path(known, start, goal, np.array([via, end]), parameters.poses)
 
 
+def lifted(known: CableKnown, start: FloatArray, way: FloatArray, step: float = 0.01) -> FloatArray:
+    """Poses (n, 4, 4) of a held connector, world_from_connector, that take it from `start` (4, 4) by `way` (3,) m.
+
+    They keep what its pose differs from the cable's natural one. Of the way only that across the cable's straight
+    course counts. The start comes first.
+    """
+    begin, (_, course) = deflection(known, start), known.cable.anchor
+    across = way - (way @ course) * course
+    shares = np.linspace(0.0, 1.0, 1 + int(np.ceil(float(np.linalg.norm(across)) / step)))[:, None]
+    poses = natural_poses(known, begin + shares * across)
+    return np.asarray(poses @ inverse(poses[0]) @ start)
+
+
 def natural_path(
     known: CableKnown, start: FloatArray, goal: FloatArray, route: FloatArray, count: int = CablePathParameters().poses
 ) -> FloatArray:

@@ -9,7 +9,14 @@ from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cable.cell import CableKnown
-from regrasp.motion.cable.cable_path import CablePathParameters, deflection, natural_path, natural_paths, natural_poses
+from regrasp.motion.cable.cable_path import (
+    CablePathParameters,
+    deflection,
+    lifted,
+    natural_path,
+    natural_paths,
+    natural_poses,
+)
 from regrasp.motion.cable.natural_routes import NaturalRouteParameters, NaturalRoutes
 from regrasp.motion.planning.straight import straight_lines
 from regrasp.motion.robots.kinematics import ArmKinematics
@@ -26,6 +33,8 @@ class CarryPathParameters:
     # Paths by search where no other is free, the shortest of which is taken: a long way round winds the cable about the
     # arm. Of eight the shortest took half the way of the first, where the first jammed the arm.
     searched: int = 8
+    # m by which the connector is first taken back the way that the hand came, without turning it; choice
+    lifted: tuple[float, ...] = (0.0, 0.03, 0.06)
     routed: int = 3  # goals, the first, to which routes are searched on the grid of natural shapes; choice
     routes: NaturalRouteParameters = field(default_factory=NaturalRouteParameters)
     cable: CablePathParameters = field(default_factory=CablePathParameters)
@@ -43,21 +52,25 @@ def carry_paths(
 ) -> Iterator[FloatArray]:
     """Joint paths (k, 6) rad from `q` (6,) to the goals (world_from_tool); `held` is tool_from_connector.
 
-    First along the natural shapes of the cable: directly, in a plain detour, or by the `routes`. Then straight or in a
-    flat arch. `arm_free`: whether the arm is free with its tool at a pose (4, 4). Whether a path is free is not
-    checked.
+    First along the natural shapes of the cable, at once or when the connector is lifted: directly, in a plain detour,
+    or by the `routes`. Then straight or in a flat arch. `arm_free`: whether the arm is free with its tool at a pose
+    (4, 4). Whether a path is free is not checked.
     """
     tool, tool_from_connector, ends = kin.tool_matrix(q), held.as_matrix(), [goal.as_matrix() for goal in goals]
     connector_from_tool, connector = inverse(tool_from_connector), multiply(tool, tool_from_connector)
+    goals_of = [multiply(end, tool_from_connector) for end in ends]
+    starts = [lifted(known, connector, -distance * tool[:3, 0]) for distance in parameters.lifted]
     natural = (
-        path @ connector_from_tool
-        for end in ends
-        for path in natural_paths(known, connector, multiply(end, tool_from_connector), parameters.cable)
+        np.concatenate([lift, path]) @ connector_from_tool
+        for lift in starts
+        for goal in goals_of
+        for path in natural_paths(known, lift[-1], goal, parameters.cable)
     )
     routed = (
-        path @ connector_from_tool
-        for end in ends[: parameters.routed]
-        for path in _routed(known, connector, multiply(end, tool_from_connector), connector_from_tool, routes, arm_free)
+        np.concatenate([lift, path]) @ connector_from_tool
+        for lift in starts
+        for goal in goals_of[: parameters.routed]
+        for path in _routed(known, lift[-1], goal, connector_from_tool, routes, arm_free)
     )
     direct = (_arch(tool, end, lift) for end in ends for lift in parameters.lifts)
     for poses in chain(natural, routed, direct):

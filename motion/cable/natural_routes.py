@@ -91,7 +91,8 @@ class NaturalRoutes:
             lengths.append(np.full(both.sum(), length))
         size = self._count**2
         edges = coo_array((np.concatenate(lengths), (np.concatenate(rows), np.concatenate(columns))), (size, size))
-        _, came_from = dijkstra(edges.tocsr(), directed=False, indices=first, return_predecessors=True)
+        _, before = dijkstra(edges.tocsr(), directed=False, indices=[first], return_predecessors=True)
+        came_from = before[0]
         route = [last]
         while route[-1] != first:
             if came_from[route[-1]] < 0:

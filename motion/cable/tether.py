@@ -26,7 +26,8 @@ class TetherParameters:
     # turns there, and forces the jaw open.
     bends: tuple[float, ...] = (7.0, np.inf)
 
-    # m by which the cable's course (`cable_course`) may be longer than the cable; it bears no pull, and its course is a guess by so much
+    # m by which the cable's course (`cable_course`) may be longer than the cable, which bears no pull; the course is a
+    # guess by so much
     stretch: float = 0.003
     clearance: float = 0.004  # m between the cable's middle line and seen surfaces; its radius
     step: float = 0.03  # rad of the joint that moves most, between two checks; choice

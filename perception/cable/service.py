@@ -24,6 +24,7 @@ from regrasp.interfaces.request import Request
 from regrasp.interfaces.services import Obstacles
 from regrasp.interfaces.wall_time import counts_as
 from regrasp.perception.cable.in_hand import InHandParameters, connector_axis, connector_in_hand
+from regrasp.perception.cable.reach import within_reach
 from regrasp.perception.cable.watching import FrameRule, watched
 from regrasp.perception.mapping.occupancy import Spared, Spheres
 from regrasp.perception.pose.fusion import fuse
@@ -48,6 +49,7 @@ class CablePerceptionParameters(PerceptionParameters):
     stowed_radius: float = 0.04
     # m round the connector's axis; voxels in it that were never seen, only taken for occupied, do not count; choice
     clear_radius: float = 0.05
+    reach_error: float = 0.025  # m beyond the cable's length where its end may be seen: cameras err by 20 mm
     stillness: StillnessParameters = field(default_factory=_stillness_of_a_cable)
     track: TrackParameters = field(default_factory=TrackParameters)
     in_hand: InHandParameters = field(default_factory=InHandParameters)
@@ -97,6 +99,8 @@ class CablePerception(Perception):
             return self._results[camera][1]
         near = self.track.position(self._clock.now())
         result = self._technique.estimate(newest, self.pose_of(newest), axis=self._axis, near=near)
+        if isinstance(result, Estimate):
+            result = within_reach(result, self._known, self.parameters.reach_error)
         self._results[camera] = (newest.number, result)
         self.track.feed(result)
         return result
