@@ -215,6 +215,24 @@ def test_points_where_an_arm_is_or_sleeps_are_no_obstacles(rig: Rig) -> None:
     assert rig.motion.sees(eye, far[None])
 
 
+def test_space_that_no_camera_saw_is_entered_slowly_and_only_where_there_is_no_other_way(rig: Rig) -> None:
+    rig.arms["right"].at = ASIDE
+    rig.run(rig.motion.move("right", READY[None]))
+    quick = rig.arms["right"].followed[-1][1].duration
+    rig.run(rig.motion.move("right", ASIDE[None]))
+    place = rig.motion.kinematics["right"].tool(READY).translation
+    rig.motion.set_obstacles(np.empty((0, 3)), 0.01, unseen=cube(place))
+    rig.run(rig.motion.move("right", READY[None]))
+    assert rig.motion.joints("right") == pytest.approx(READY)
+    assert rig.arms["right"].followed[-1][1].duration > 2 * quick
+    rig.run(rig.motion.move("right", ASIDE[None]))
+
+    rig.motion.set_obstacles(cube(place), 0.01)
+    with pytest.raises(PlanningError) as caught:
+        rig.run(rig.motion.move("right", READY[None]))
+    assert caught.value.code is CauseCode.NO_COLLISION_FREE_GOAL
+
+
 def test_a_motion_can_begin_with_a_hand_beside_a_seen_surface(rig: Rig) -> None:
     rig.motion.set_obstacles(cube(rig.motion.kinematics["right"].tool(READY).translation, 0.04), 0.01)
     rig.arms["right"].at = READY  # it came in by feel, the margin to the voxels is gone
