@@ -2,6 +2,7 @@
 
 from collections.abc import Generator, Iterator
 from dataclasses import dataclass
+from itertools import chain
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from regrasp.behaviors.cable.keys import FOUND, VAIN_SEARCHES, Found
@@ -30,10 +31,10 @@ class SpiralSearchParameters:
 class SpiralSearch(LookLeaf):
     """Moves the wrist camera from viewpoint to viewpoint until it sees the connector, at most `time_limit` seconds.
 
-    The search starts where the connector was last seen. When that is not known, or a search from there has failed, it
-    starts at the back panel's middle. A viewpoint that cannot be reached, not even a little nearer or further, is
-    skipped and logged. After a weak detection, too little to tell whether it is the connector, the camera looks there
-    next. When the search fails the arm goes back to sleep.
+    It looks first where the cable hangs by itself. Then the spiral starts where the connector was last seen. When that
+    is not known, or a search from there has failed, it starts at the back panel's middle. A viewpoint that cannot be
+    reached, not even a little nearer or further, is skipped and logged. After a weak detection, too little to tell
+    whether it is the connector, the camera looks there next. When the search fails the arm goes back to sleep.
     """
 
     READS: ClassVar[Keys] = (VAIN_SEARCHES,)
@@ -121,5 +122,7 @@ class SpiralSearch(LookLeaf):
         from_last = last is not None and self.read(VAIN_SEARCHES) % 2 == 0
         position = last.position if last is not None and from_last else None
         start, viewpoints = self.services.motion.search_views(position)
-        self.say("search", start=start.round(3).tolist(), last_seen=from_last)
-        return viewpoints
+        rest = self.services.motion.rest_views()
+        self.say("search", start=start.round(3).tolist(), last_seen=from_last, rest_views=len(rest))
+        # They count down from -1: the spiral's numbers are the thesis's.
+        return chain((Viewpoint(-1 - n, -1, n, pose) for n, pose in enumerate(rest)), viewpoints)

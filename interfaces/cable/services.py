@@ -99,6 +99,10 @@ class CableMotionService(MotionService, Protocol):
         """Where a search begins, (3,) m in the world, and its viewpoints; None: the connector was never seen."""
         ...
 
+    def rest_views(self) -> "list[RigidTransform]":
+        """Viewpoints (world_from_camera) that show the connector where its cable hangs by itself, the best first."""
+        ...
+
     def view(self, world_from_camera: "RigidTransform") -> View:
         """The viewpoint, or one near, if the camera can be brought there. Raises PlanningError if not."""
         ...

@@ -1,6 +1,7 @@
 """What the leaves ask of the arm that carries the camera that looks for a lost end."""
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -11,8 +12,10 @@ from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.cable.motion import View, Viewpoint
 from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.cell import FixedMount
+from regrasp.interfaces.scene import EARTH_GRAVITY
 from regrasp.interfaces.wall_time import counts_as
 from regrasp.motion.arguments import finite_pose, vector
+from regrasp.motion.cable.cable_path import natural_poses
 from regrasp.motion.cable.viewing import ViewingParameters, approached, outline, views_of
 from regrasp.motion.cable.viewpoints import closer_views, spiral
 from regrasp.motion.failure import PlanningError
@@ -52,6 +55,24 @@ class SearchMotion(Motion):
         assert isinstance(overview.mount, FixedMount)  # the cell's check
         return start, spiral(start, overview.mount.world_from_camera, overview.intrinsics, viewing.spiral)
 
+    @counts_as("planning")
+    def rest_views(self) -> list[RigidTransform]:
+        """Viewpoints (world_from_camera) that show the connector where its cable hangs by itself, the best first.
+
+        There a lost end comes to rest unless something holds it. The cable's stiffness is not known: with gravity it
+        is taken to sag by the parameters' `sag`.
+        """
+        viewing = self.parameters.viewing
+        gravity = self.arms[self.search_arm].gravity()
+        _, course = self.known.cable.anchor
+        sag = viewing.sag * gravity / EARTH_GRAVITY
+        place = RigidTransform.from_matrix(natural_poses(self.known, (sag - (sag @ course) * course)[None])[0])
+        views: list[View] = []
+        with suppress(PlanningError):
+            while len(views) < viewing.rest_looks:
+                views.append(self.best_view(place, [view.sight for view in views]))
+        return [view.world_from_camera for view in views]
+
     def view(self, world_from_camera: RigidTransform) -> View:
         """The viewpoint, or one a little nearer or further, to which the camera that searches can be brought.
 
@@ -70,17 +91,21 @@ class SearchMotion(Motion):
     def best_view(self, world_from_connector: RigidTransform, taken: Sequence[FloatArray] = ()) -> View:
         """The best viewpoint that shows the whole connector, from another side than the lines of sight `taken` (3,).
 
+        One whose line of sight leads through unseen space is taken only where there is no other.
+
         Raises PlanningError when there is none.
         """
         finite_pose("the connector's pose", world_from_connector)
-        viewing, model = self.parameters.viewing, self.model(self.search_arm)
+        viewing = self.parameters.viewing
         points = outline(world_from_connector, self.known.cable.connector.length)
-        for pose in closer_views(world_from_connector, viewing.close_views):
-            sight = pose.rotation.apply([0.0, 0.0, 1.0])
-            if any(float(sight @ other) > viewing.max_cosine for other in taken):
-                continue
-            if self.sees(pose, points) and len(goals := self._view_goals(pose, model)):
-                return View(pose, goals)
+        for optimistic in (False, True):
+            model = self.model(self.search_arm, optimistic=optimistic)
+            for pose in closer_views(world_from_connector, viewing.close_views):
+                sight = pose.rotation.apply([0.0, 0.0, 1.0])
+                if any(float(sight @ other) > viewing.max_cosine for other in taken):
+                    continue
+                if self.sees(pose, points, optimistic) and len(goals := self._view_goals(pose, model)):
+                    return View(pose, goals)
         raise PlanningError(CauseCode.OUT_OF_REACH, "no free place from which the whole connector shows")
 
     def go_to_view(self, view: View) -> MotionRequest:
@@ -89,11 +114,12 @@ class SearchMotion(Motion):
 
     @counts_as("planning")
     def _first_view(self, views: Sequence[RigidTransform]) -> View:
-        model = self.model(self.search_arm)
-        for pose in approached(views, self.parameters.viewing.approaches):
-            goals = self._view_goals(pose, model)
-            if len(goals):
-                return View(pose, goals)
+        for optimistic in (False, True):
+            model = self.model(self.search_arm, optimistic=optimistic)
+            for pose in approached(views, self.parameters.viewing.approaches):
+                goals = self._view_goals(pose, model)
+                if len(goals):
+                    return View(pose, goals)
         raise PlanningError(CauseCode.OUT_OF_REACH, "no free place to look from")
 
     def _view_goals(self, world_from_camera: RigidTransform, model: CollisionModel) -> FloatArray:

@@ -24,6 +24,10 @@ class ViewingParameters:
     max_cosine: float = 0.77  # of the angle between lines of sight from different sides: at least 40 degrees
     # m along the line of sight, positive is nearer: tried in turn where a viewpoint is out of reach or not free; choice
     approaches: tuple[float, ...] = (0.0, 0.05, -0.05, 0.10, -0.10, 0.15)
+    # m by which the loose end of the cable hangs below its straight course on Earth; with 0.7 to 1.4 times the cell's
+    # stiffness 0.14 to 0.07
+    sag: float = 0.10
+    rest_looks: int = 2  # from different sides, at where the cable hangs by itself, before a search; choice
     start_at: str = "back_panel"  # the box at whose middle a search begins that knows no better place
     spiral: SpiralParameters = field(default_factory=_spiral_of_the_left_arm)
     close_views: CloseViewParameters = field(default_factory=CloseViewParameters)

@@ -226,8 +226,8 @@ class PlanningScene:
         return CollisionModel(self.kinematics[arm], boxes, body, other, grid, self._scene_parameters.collision)
 
     @counts_as("planning")
-    def sees(self, world_from_camera: RigidTransform, points: FloatArray) -> bool:
-        """Whether nothing known or seen stands between a camera and any of the points (n, 3) m."""
+    def sees(self, world_from_camera: RigidTransform, points: FloatArray, optimistic: bool = False) -> bool:
+        """Whether nothing known or mapped stands between a camera and any of the points (n, 3) m; see `model`."""
         eye = world_from_camera.translation
         first, last = self._scene_parameters.sight_range
         shares = np.linspace(first, last, self._scene_parameters.sight_samples)[:, None, None]
@@ -235,7 +235,7 @@ class PlanningScene:
         for box in self._boxes:
             if np.any(np.all(np.abs(rays - box.center) < 0.5 * np.array(box.size), axis=1)):
                 return False
-        grid = self._grid()
+        grid = self._grid(optimistic)
         return grid is None or bool(np.min(grid.at(rays)) > 0.0)
 
 

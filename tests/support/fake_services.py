@@ -100,6 +100,7 @@ class FakeMotion:
         self.cancelled: list[str] = []
         self.plugged: list[tuple[str, RigidTransform]] = []  # sockets, and how the hand held the connector
         self.stopped = 0
+        self.rest: list[RigidTransform] = []
         self.reachable: Callable[[RigidTransform], bool] = lambda pose: True
 
     def work(self, arm: str) -> Request[None]:
@@ -228,6 +229,9 @@ class FakeMotion:
         start, overview = np.array(panel.center) if last_seen is None else last_seen, self.known.camera("rear")
         assert isinstance(overview.mount, FixedMount)
         return start, spiral(start, overview.mount.world_from_camera, overview.intrinsics, VIEWING.spiral)
+
+    def rest_views(self) -> list[RigidTransform]:
+        return self.rest
 
     def view(self, world_from_camera: RigidTransform) -> View:
         return self._first_view([world_from_camera])

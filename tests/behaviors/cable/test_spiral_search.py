@@ -68,7 +68,12 @@ def test_an_end_never_seen_is_sought_from_the_panel_s_middle(known: CableKnown, 
     stage.run(stage.tree(search(300)), 0.1)
     panel = next(box for box in known.boxes if box.name == "back_panel")
     assert stage.log.of("search") == [
-        {"node": stage.log.of("search")[0]["node"], "start": np.round(panel.center, 3).tolist(), "last_seen": False}
+        {
+            "node": stage.log.of("search")[0]["node"],
+            "start": np.round(panel.center, 3).tolist(),
+            "last_seen": False,
+            "rest_views": 0,
+        }
     ]
 
 

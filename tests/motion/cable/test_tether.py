@@ -79,4 +79,4 @@ def test_what_touches_the_cable_at_the_start_does_not_forbid_every_way(known: Ca
     lies_on = cable_course(known, natural_pose(known, BENT))[20:30]
     tether = bent.tether(grid_of(lies_on))
     assert tether.holds(bent.start)
-    assert tether.holds(bent.at(natural_pose(known, BENT + [0.0, 0.0, 0.05])))
+    assert tether.holds(bent.at(natural_pose(known, BENT + np.array([0.0, 0.0, 0.05]))))
