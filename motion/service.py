@@ -320,9 +320,10 @@ class Motion(PlanningScene):
     def _check_shift(self, model: CollisionModel, path: FloatArray, length: float) -> None:
         """Raises PlanningError MOTION_BLOCKED with the nearest thing unless a path of `length` m is free.
 
-        Free is no nearer to anything than where the path begins, or the greatest near margin.
+        Free is hardly nearer to anything than where the path begins, or the greatest near margin.
         """
-        if model.path_free(path[1:], min(model.clearance(path[0]), self.parameters.clearances.near_margins[0])):
+        clearances = self.parameters.clearances
+        if model.path_free(path[1:], min(model.clearance(path[0]) - clearances.nearer, clearances.near_margins[0])):
             return
         distance, what = min(model.nearest(q) for q in path[1:])
         message = f"{length:.2f} m straight on the arm is {-1e3 * distance:.0f} mm in {what}"

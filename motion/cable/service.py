@@ -141,7 +141,7 @@ class CableMotion(SearchMotion):
         candidates = pick_candidates(world_from_connector, connector, 0.0, widest, self.parameters.pick)
         model = self.model(self.hand, opening=jaw.open_gap)
         try:
-            self._approaches(self.hand, model, candidates, self.known.cable.clip.bracket)
+            self._approaches(self.hand, model, candidates, self._bracket_near(world_from_connector))
         except PlanningError:
             return False
         finally:
@@ -353,6 +353,12 @@ class CableMotion(SearchMotion):
     def _model_without_clip(self) -> CollisionModel:
         return self.model(self.hand, without=self.known.cable.clip.bracket)
 
+    def _bracket_near(self, world_from_connector: RigidTransform) -> Collection[Box]:
+        """The clip's bracket, which a hand may touch that takes the connector out of the clip, or no box elsewhere."""
+        clip = self.known.cable.clip
+        off = float(np.linalg.norm(world_from_connector.translation - np.array(clip.seat)))
+        return clip.bracket if off < self.parameters.pick.jaw_reach else ()
+
     def _pick_connector(
         self,
         world_from_connector: RigidTransform,
@@ -371,7 +377,7 @@ class CableMotion(SearchMotion):
             self.known.cable.connector,
             shallow=shallow,
             clear_of=cable,
-            without=self.known.cable.clip.bracket,
+            without=self._bracket_near(world_from_connector),
             point_cloud=point_cloud,
             last=missed if self._missed else None,
         )

@@ -35,6 +35,7 @@ class PlannerParameters:
     fine_slack: float = 0.003
     shortcuts: int = 80  # tries to shorten a path; choice
     past_limit: float = 0.05  # rad or m that a start may be read past a joint's limit: encoders are off by less
+    start_overlap: float = 0.015  # m by which a start may seem to touch: the arm's spheres stand out of its meshes
     escape_step: float = 0.02  # rad of a step away from something near; choice: the step of a coarse check
     escape_steps: int = 100  # at most; choice
     escape_directions: int = 32  # random ones a step, besides the joints' own; choice
@@ -50,8 +51,8 @@ def plan(
 ) -> FloatArray:
     """Joint path (k, n) from `start` (n,) to one of `goals` (m, n), `margin` metres from everything.
 
-    A start that is nearer than `margin` but does not touch (after a grasp beside a panel) is first led away: the path
-    begins with small steps along which the clearance only grows. One that is read a little past a joint's limit is
+    A start that is nearer than `margin` (after a grasp beside a panel) is first led away: the path begins with small
+    steps along which the clearance only grows. One that is read a little past a joint's limit is
     first led back.
 
     Raises PlanningError: MOTION_BLOCKED if the start touches something or lies past a limit, OUT_OF_REACH without goals
@@ -220,7 +221,7 @@ def _escape(
     q = start
     steps = [q]
     clearance, what = model.nearest(q)
-    if clearance < 0:
+    if clearance < -parameters.start_overlap:
         message = f"the arm touches {what}, {-clearance * 1e3:.0f} mm deep"
         raise PlanningError(CauseCode.MOTION_BLOCKED, message)
     while not model.free(q, margin):

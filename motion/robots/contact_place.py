@@ -46,7 +46,12 @@ def contact_place(
     forces = np.linalg.solve(normal, (weighted @ (weights * touch.efforts))[..., None])[..., 0]
     errors = weights * touch.efforts - np.einsum("sij,si->sj", weighted, forces)
     costs = (errors**2).sum(axis=1) + np.einsum("si,ij,sj->s", forces, regular, forces)
-    costs[np.einsum("sij,j,si->s", jacobians, touch.velocities, forces) >= 0.0] = np.inf
+    power = np.einsum("sij,j,si->s", jacobians, touch.velocities, forces)
+    if (power < 0.0).any():
+        costs[power >= 0.0] = np.inf
+    else:  # no force explains it: what moves fastest touched, on the side to which it moves
+        speeds = np.einsum("sij,j->si", jacobians, touch.velocities)
+        costs, forces = -np.linalg.norm(speeds, axis=1), -speeds
     best = int(np.argmin(costs))
     inward = -forces[best] / max(float(np.linalg.norm(forces[best])), 1e-12)
     return spheres[best, :3] + spheres[best, 3] * inward, inward

@@ -39,6 +39,7 @@ class Clearances:
 
     margin: float = 0.015  # between the arm's spheres and anything while it moves freely; choice
     tight_margin: float = 0.005  # the same where nothing is found with `margin`; choice
+    nearer: float = 0.003  # by which a straight way out may come nearer to something than where it begins; choice
     # On straight centimetres near things: the first that leaves a path; choice.
     near_margins: tuple[float, ...] = (0.020, 0.014, 0.008, 0.004, 0.0)
 

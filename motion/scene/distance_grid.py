@@ -25,12 +25,15 @@ class DistanceGrid:
     def from_occupied(
         cls, occupied: NDArray[np.bool_], lower: NDArray[np.float64], h: float, *, least: bool = True
     ) -> "DistanceGrid":
-        """Grid of an occupancy array (nx, ny, nz). Not the `least` distances are those between voxels' centres."""
+        """Grid of an occupancy array (nx, ny, nz).
+
+        Not the `least` distances are those to the far sides of occupied voxels.
+        """
         if not occupied.any():
             return cls(np.full(occupied.shape, FREE_DISTANCE, np.float32), np.asarray(lower, float), h)
         centres = np.asarray(distance_transform_edt(~occupied)) * h
         # A point may lie half a voxel's diagonal off the centre that the transform measured from.
-        off = 0.5 * np.sqrt(3.0) * h if least else 0.0
+        off = 0.5 * np.sqrt(3.0) * h if least else -0.5 * h
         return cls((centres - off).astype(np.float32), np.asarray(lower, float), h)
 
     @classmethod

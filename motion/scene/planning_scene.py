@@ -209,7 +209,7 @@ class PlanningScene:
         `held` (m, 4) m are spheres in the tool frame that stand for what the hand carries. Without `others` the other
         arms and the seen surfaces do not count; the boxes `without` may be touched. The jaw stands as the fingers read,
         or `opening` m wide. `optimistic`: the space that no camera has seen
-        counts as free, and seen surfaces are taken to be where their voxels' centres are.
+        counts as free, and seen surfaces are taken to be at the far sides of their voxels.
         """
         bodies = [
             self.model(name, others=False).spheres(self.joints(name)) for name in self.arms if others and name != arm
