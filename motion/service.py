@@ -210,14 +210,14 @@ class Motion(PlanningScene):
         clear_of: FloatArray | None = None,
         without: Collection[Box] = (),
         point_cloud: PointCloudSource | None = None,
-        last: Callable[[Grasp], bool] | None = None,
+        order: Callable[[Grasp], int] | None = None,
     ) -> MotionRequest:
         """Open the jaw and bring it round a cylinder; the jaw stays open.
 
         The cylinder lies `shallow` metres nearer to the finger tips than the pads' middle. The arm keeps clear of the
         points `clear_of` (n, 3) m, except where the jaw takes hold: pushing a cable moves the connector. On the last
         straight way it may touch the boxes `without`. Before that it is corrected by the `point_cloud` that a camera
-        sees of it. Grasps of which `last` is true are tried after all others.
+        sees of it. Grasps with a lower `order` are tried before all others.
         """
         finite_pose("the cylinder's pose", world_from_cylinder)
         near_points = None if clear_of is None else rows("the points to keep clear of", clear_of, 3)
@@ -228,8 +228,8 @@ class Motion(PlanningScene):
             model = self.start_model(arm, opening=jaw.open_gap, optimistic=optimistic)
             widest = self.known.arm(arm).robot.gripper.opening
             candidates = pick_candidates(world_from_cylinder, cylinder, shallow, widest, self.parameters.pick)
-            if last is not None:
-                candidates.sort(key=last)
+            if order is not None:
+                candidates.sort(key=order)
             try:
                 approaches = self._approaches(arm, model, candidates, without, optimistic)
             except PlanningError as error:

@@ -23,12 +23,14 @@ class CablePathParameters:
     poses: int = 24  # of one path; choice: they lie at most 6 cm apart
     # m in x from the start, one path a value: there the connector rises first, round an obstacle; None: directly
     detours: tuple[float | None, ...] = (None, 0.0, 0.05, 0.10)
+    # m by which the cable is taken to be shorter than it is: it bears no pull, and a camera errs by some mm along it
+    reserve: float = 0.005
 
 
-def natural_poses(known: CableKnown, deflections: FloatArray) -> FloatArray:
+def natural_poses(known: CableKnown, deflections: FloatArray, reserve: float = 0.0) -> FloatArray:
     r"""world_from_connector (n, 4, 4) at the end of a cable that a force bends by `deflections` (n, 3) m.
 
-    They are measured from the cable's straight course.
+    They are measured from the cable's straight course. The cable counts as `reserve` m shorter than it is.
 
     Cantilever with a load at its end (Euler-Bernoulli beam, second order in the slope). For a deflection d at the
     distance D along the straight course, the slope at the end and the cable's length L are
@@ -36,7 +38,7 @@ def natural_poses(known: CableKnown, deflections: FloatArray) -> FloatArray:
     .. math:: \theta = 1.5 \, d / D, \qquad L = D + 0.6 \, d^2 / D
     """
     anchor, course = known.cable.anchor
-    length = known.cable.length
+    length = known.cable.length - reserve
     # Beyond L^2 / 2.4 no D solves the second equation.
     d2 = np.minimum((deflections**2).sum(axis=1), 0.4 * length**2)
     along = 0.5 * (length + np.sqrt(length**2 - 2.4 * d2))[:, None]
@@ -63,10 +65,16 @@ def natural_paths(
     begin, end = deflection(known, start), deflection(known, goal)
     for detour in parameters.detours:
         via = 0.5 * (begin + end) if detour is None else np.array([begin[0] + detour, begin[1], end[2]])
-        yield natural_path(known, start, goal, np.array([via, end]), parameters.poses)
+        yield natural_path(known, start, goal, np.array([via, end]), parameters)
 
 
-def lifted(known: CableKnown, start: FloatArray, way: FloatArray, step: float = 0.01) -> FloatArray:
+def lifted(
+    known: CableKnown,
+    start: FloatArray,
+    way: FloatArray,
+    step: float = 0.01,
+    parameters: CablePathParameters = CablePathParameters(),
+) -> FloatArray:
     """Poses (n, 4, 4) of a held connector, world_from_connector, that take it from `start` (4, 4) by `way` (3,) m.
 
     They keep what its pose differs from the cable's natural one. Of the way only that across the cable's straight
@@ -76,22 +84,29 @@ def lifted(known: CableKnown, start: FloatArray, way: FloatArray, step: float = 
     across = way - (way @ course) * course
     shares = np.linspace(0.0, 1.0, 1 + int(np.ceil(float(np.linalg.norm(across)) / step)))[:, None]
     poses = natural_poses(known, begin + shares * across)
-    return np.asarray(poses @ inverse(poses[0]) @ start)
+    lifted_poses = np.asarray(poses @ inverse(poses[0]) @ start)
+    lifted_poses[:, :3, 3] -= shares * parameters.reserve * course
+    return lifted_poses
 
 
 def natural_path(
-    known: CableKnown, start: FloatArray, goal: FloatArray, route: FloatArray, count: int = CablePathParameters().poses
+    known: CableKnown,
+    start: FloatArray,
+    goal: FloatArray,
+    route: FloatArray,
+    parameters: CablePathParameters = CablePathParameters(),
 ) -> FloatArray:
-    """`count` poses (n, 4, 4) or more from `start` to `goal`, world_from_connector, along the cable's natural shapes.
+    """Poses (n, 4, 4) from `start` to `goal`, world_from_connector, along the cable's natural shapes.
 
-    The cable's end is bent by the deflections of the `route` (k, 3) m, at even steps from the start (left out) on.
+    They are as many as the parameters say, or more. The cable's end is bent by the deflections of the `route` (k, 3) m,
+    at even steps from the start (left out) on.
 
     The start's offset from its natural pose fades early, and the goal's comes late: a cable that hangs straight buckles
     with far more force than a bent one that is pressed by the same length.
     """
     begin, end = deflection(known, start), deflection(known, goal)
-    count = max(count, 2 * len(route))
-    ends = natural_poses(known, np.array([begin, end]))
+    count = max(parameters.poses, 2 * len(route))
+    ends = natural_poses(known, np.array([begin, end]), parameters.reserve)
     first, last = multiply(inverse(ends[0]), start), multiply(inverse(ends[1]), goal)
     turn = rotation_vector(multiply(inverse(first), last)[:3, :3])
     s = np.linspace(0.0, 1.0, count + 1)[1:]
@@ -103,7 +118,7 @@ def natural_path(
     corners = np.vstack([begin, route])
     at = np.linspace(0.0, 1.0, len(corners))
     deflections = np.column_stack([np.interp(s, at, corners[:, axis]) for axis in range(3)])
-    return np.asarray(natural_poses(known, deflections) @ offsets)
+    return np.asarray(natural_poses(known, deflections, parameters.reserve) @ offsets)
 
 
 def deflection(known: CableKnown, connector: FloatArray) -> FloatArray:

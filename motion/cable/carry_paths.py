@@ -59,7 +59,9 @@ def carry_paths(
     tool, tool_from_connector, ends = kin.tool_matrix(q), held.as_matrix(), [goal.as_matrix() for goal in goals]
     connector_from_tool, connector = inverse(tool_from_connector), multiply(tool, tool_from_connector)
     goals_of = [multiply(end, tool_from_connector) for end in ends]
-    starts = [lifted(known, connector, -distance * tool[:3, 0]) for distance in parameters.lifted]
+    starts = [
+        lifted(known, connector, -distance * tool[:3, 0], parameters=parameters.cable) for distance in parameters.lifted
+    ]
     natural = (
         np.concatenate([lift, path]) @ connector_from_tool
         for lift in starts
@@ -70,7 +72,7 @@ def carry_paths(
         np.concatenate([lift, path]) @ connector_from_tool
         for lift in starts
         for goal in goals_of[: parameters.routed]
-        for path in _routed(known, lift[-1], goal, connector_from_tool, routes, arm_free)
+        for path in _routed(known, lift[-1], goal, connector_from_tool, routes, arm_free, parameters.cable)
     )
     direct = (_arch(tool, end, lift) for end in ends for lift in parameters.lifts)
     for poses in chain(natural, routed, direct):
@@ -108,6 +110,7 @@ def _routed(
     connector_from_tool: FloatArray,
     routes: NaturalRoutes,
     arm_free: Callable[[FloatArray], bool],
+    parameters: CablePathParameters,
 ) -> Iterator[FloatArray]:
     """Paths (n, 4, 4) of the connector from `start` to `goal` (4, 4) by the routes."""
     begin, end = deflection(known, start), deflection(known, goal)
@@ -121,7 +124,7 @@ def _routed(
         return any(arm_free(pose @ tool) for tool in turned)
 
     for route in routes.routes(begin, end, connector_free):
-        yield natural_path(known, start, goal, route)
+        yield natural_path(known, start, goal, route, parameters)
 
 
 def _arch(start: FloatArray, goal: FloatArray, lift: float) -> list[FloatArray]:

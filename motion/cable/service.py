@@ -118,8 +118,13 @@ class CableMotion(SearchMotion):
         return super().shift(arm, displacement, checked=checked, without=without, held=held, contact=contact)
 
     def pick_plug(self, plug: RigidTransform, *, point_cloud: PointCloudSource | None = None) -> MotionRequest:
-        """`pick` the connector where it is plugged in, world_from_connector: a panel is near."""
-        return self._pick_connector(plug, self.parameters.unplug.shallow, None, point_cloud)
+        """`pick` the connector where it is plugged in, world_from_connector: a panel is near.
+
+        Preferably so that the hand is free where it has drawn the plug out.
+        """
+        finite_pose("the plug's pose", plug)
+        room = self._room_to_draw_out(plug)
+        return self._pick_connector(plug, self.parameters.unplug.shallow, None, point_cloud, room)
 
     def pick_loose(
         self,
@@ -353,6 +358,23 @@ class CableMotion(SearchMotion):
     def _model_without_clip(self) -> CollisionModel:
         return self.model(self.hand, without=self.known.cable.clip.bracket)
 
+    def _room_to_draw_out(self, plug: RigidTransform) -> Callable[[Grasp], int]:
+        """How a hand fares that draws out the plug (world_from_connector), by its grasp.
+
+        0: it is free then, 1: it may be, 2: it meets something.
+        """
+        kin, out = self.kinematics[self.hand], np.eye(4)
+        out[:3, 3] = -self.parameters.unplug.draw_out * plug.rotation.apply([1.0, 0.0, 0.0])
+        gap, margin = 2 * self.known.cable.connector.radius, self.parameters.clearances.tight_margin
+        models = [self.model(self.hand, opening=gap, optimistic=optimistic) for optimistic in (False, True)]
+
+        def room(grasp: Grasp) -> int:
+            ends = kin.ik(out @ grasp.pose)
+            free = (any(model.free(q, margin) for q in ends) for model in models)
+            return next((n for n, is_free in enumerate(free) if is_free), len(models))
+
+        return room
+
     def _bracket_near(self, world_from_connector: RigidTransform) -> Collection[Box]:
         """The clip's bracket, which a hand may touch that takes the connector out of the clip, or no box elsewhere."""
         clip = self.known.cable.clip
@@ -365,6 +387,7 @@ class CableMotion(SearchMotion):
         shallow: float,
         cable: FloatArray | None,
         point_cloud: PointCloudSource | None,
+        order: Callable[[Grasp], int] | None = None,
     ) -> MotionRequest:
         connector_from_world, near = world_from_connector.inv().as_matrix(), self.parameters.same_grasp
 
@@ -379,7 +402,7 @@ class CableMotion(SearchMotion):
             clear_of=cable,
             without=self._bracket_near(world_from_connector),
             point_cloud=point_cloud,
-            last=missed if self._missed else None,
+            order=missed if self._missed else order,
         )
 
     def _together(self, arm: str, steps: Generator[None, None, T] | Iterator[None]) -> Request[T]:

@@ -29,13 +29,16 @@ class TetherParameters:
     # m by which the cable's course (`cable_course`) may be longer than the cable, which bears no pull; the course is a
     # guess by so much
     stretch: float = 0.003
+    seen_error: float = (
+        0.02  # m that the length of a loose cable's course seems off where the connector is seen; choice
+    )
     clearance: float = 0.004  # m between the cable's middle line and seen surfaces; its radius
     step: float = 0.03  # rad of the joint that moves most, between two checks; choice
     seen_free: float = 0.02  # m round the cable where it lies at the start: there no obstacle is, whatever was mapped
     points: int = 20  # that are checked along the cable; choice: 3 cm apart
     # m from either end where the cable may touch: it comes out of a socket's block, and the hand is at the other
     near_ends: float = 0.06
-    slack: float = 0.003  # m by which a path may make worse what is not kept where it begins; choice
+    slack: float = 0.001  # m by which a path may make worse what is not kept where it begins; choice
     bend_slack: float = 0.5  # 1/m, the same of the curvature
 
 
@@ -135,7 +138,10 @@ class Tether:
         self._step = parameters.step
         length, clearance, bend = _state(np.asarray(start, float), *self._arguments)
         self._most = max(max_bend, bend + parameters.bend_slack)
-        self._longest = max(known.cable.length + parameters.stretch, length + parameters.slack)
+        # A cable that hangs loose is as long as its course: what is seen otherwise is an error of the sight.
+        loose = abs(length - known.cable.length) < parameters.seen_error
+        longest = known.cable.length + parameters.stretch
+        self._longest = length + parameters.slack if loose else max(longest, length + parameters.slack)
         self._nearest = min(parameters.clearance, clearance - parameters.slack)
 
     def clearance(self, world_from_connector: FloatArray) -> float:

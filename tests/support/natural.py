@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.cable.cell import CableKnown
-from regrasp.motion.cable.cable_path import natural_paths, natural_poses
+from regrasp.motion.cable.cable_path import CablePathParameters, natural_paths, natural_poses
 
 
 def natural_pose(known: CableKnown, deflection: np.ndarray) -> RigidTransform:
@@ -15,6 +15,6 @@ def natural_pose(known: CableKnown, deflection: np.ndarray) -> RigidTransform:
 
 
 def natural_ways(known: CableKnown, start: RigidTransform, goal: RigidTransform) -> Iterator[list[RigidTransform]]:
-    """Paths from start to goal, as in `natural_paths`."""
-    for path in natural_paths(known, start.as_matrix(), goal.as_matrix()):
+    """Paths from start to goal, as in `natural_paths`, of a cable that counts as long as it is."""
+    for path in natural_paths(known, start.as_matrix(), goal.as_matrix(), CablePathParameters(reserve=0.0)):
         yield list(RigidTransform.from_matrix(path))
