@@ -149,7 +149,7 @@ class Motion(PlanningScene):
 
         `pulling`: it may pull something elastic along, which is no touch.
         """
-        contact = self._guard.carrying if pulling else None
+        contact = self._guard.pulling if pulling else None
         return self.move(arm, np.array([self.known.arm(arm).sleep]), contact=contact)
 
     def straight(

@@ -27,10 +27,14 @@ class ContactLimits:
 
 @dataclass(frozen=True)
 class ContactGuardParameters:
-    """What counts as a touch of an arm that moves freely, that pulls an elastic thing along, and that presses."""
+    """What counts as a touch of an arm: one that moves freely, holds or pulls an elastic thing, or presses."""
 
     free: ContactLimits = ContactLimits(0.12)  # choice
-    carrying: ContactLimits = ContactLimits(0.4)  # choice: a bent cable turns the wrist with half a newton metre
+    # The end of a cable that keeps to its natural shapes changes the efforts by 0.12 of the wrist's and 0.04 of the
+    # other joints'; choice.
+    carrying: ContactLimits = ContactLimits(0.2)
+    # One that is bent, pressed together, or caught in the jaw changes them by up to half; choice
+    pulling: ContactLimits = ContactLimits(0.7)
     # A plug that is gripped askew jams in its socket up to what the drives can do: this stops at a blow only; choice
     pressing: ContactLimits = ContactLimits(2.0)
 
