@@ -60,6 +60,7 @@ class CableMotionParameters(SearchMotionParameters):
 
     # Two grasps nearer than so many m and rad are one: what closed on nothing is tried again after all others; choice
     same_grasp: tuple[float, float] = (0.015, 0.35)
+    slip_time: float = 1.0  # s that a slip has to be noticed after a touch; by the pads' gap it takes 0.3
     connector_padding: float = 1.2  # radii of the spheres that cover a carried connector, in its own radii; choice
     # m straight back from where something was held; the first that is free; choice
     retreats: tuple[float, ...] = (0.10, 0.08, 0.06, 0.05, 0.04, 0.03)
@@ -188,9 +189,13 @@ class CableMotion(SearchMotion):
             yield from self._done(self.shift(self.hand, -values.draw_out * axis, checked=False))
             for share_of_way in values.retreat_shares:
                 away = np.array([-share_of_way * values.retreat, 0.0, 0.0])
-                with suppress(PlanningError):
+                try:
                     yield from self._done(self._shift_held(self.hand, away, held))
+                except TouchError:
                     return
+                except PlanningError:
+                    continue
+                return
 
         return self._together(self.hand, steps())
 
@@ -235,7 +240,13 @@ class CableMotion(SearchMotion):
                 solutions = [end for goal in goals for end in kin.ik(goal, q)]
                 ends = [end for end in solutions if can_continue(kin, end, onward, carry.step)]
                 path = yield from self._shortest_plan(model, q, np.array(ends).reshape(-1, len(kin)), carry.searched)
-            yield from self.execution.follow(arm, path, min(speed, self._pace(optimistic)), self._carrying(held))
+            natural = max_bend is not None and np.isfinite(max_bend)
+            limits = self._along_cable(self._guard.carrying if natural else self._guard.pulling, held)
+            try:
+                yield from self.execution.follow(arm, path, min(speed, self._pace(optimistic)), limits)
+            except TouchError:
+                yield from self._while_open(arm)
+                raise
 
         def tries() -> Iterator[None]:
             for max_bend in self.parameters.tether.bends:
@@ -299,7 +310,7 @@ class CableMotion(SearchMotion):
             for distance in self.parameters.retreats:
                 back = self.tool(self.hand).rotation.apply([-distance, 0.0, 0.0])
                 try:
-                    yield from self._done(self.shift(self.hand, back, contact=self._guard.carrying))
+                    yield from self._done(self.shift(self.hand, back, contact=self._guard.pulling))
                 except PlanningError as error:
                     why = str(error)
                 else:
@@ -321,7 +332,8 @@ class CableMotion(SearchMotion):
 
     def _shift_held(self, arm: str, displacement: FloatArray, held: RigidTransform) -> MotionRequest:
         """`shift`, checked, with what the arm holds (tool_from_connector)."""
-        return self.shift(arm, displacement, held=self.held_spheres(held), contact=self._carrying(held))
+        limits = self._along_cable(self._guard.pulling, held)
+        return self.shift(arm, displacement, held=self.held_spheres(held), contact=limits)
 
     def _tether(self, arm: str, held: RigidTransform, q: FloatArray, max_bend: float, optimistic: bool) -> Tether:
         """The cable of what is held (tool_from_connector) as a constraint on a path that begins at joints `q` (n,)."""
@@ -329,10 +341,19 @@ class CableMotion(SearchMotion):
         grid = self.grid_beside(cable_course(self.known, kin.tool(q) * held), tether.seen_free, optimistic)
         return Tether(self.known, held, q, kin, self.known.solids(), grid, max_bend, tether)
 
-    def _carrying(self, held: RigidTransform) -> ContactLimits:
-        """What counts as a touch while the cable pulls at what is held (tool_from_connector)."""
-        pull = np.concatenate([held.translation, held.rotation.apply([1.0, 0.0, 0.0])])
-        return replace(self._guard.carrying, pull=pull)
+    def _along_cable(self, limits: ContactLimits, held: RigidTransform) -> ContactLimits:
+        """The limits, with the cable free to pull along itself at what is held (tool_from_connector)."""
+        return replace(limits, pull=np.concatenate([held.translation, held.rotation.apply([1.0, 0.0, 0.0])]))
+
+    def _while_open(self, arm: str) -> Iterator[None]:
+        """Wait for a short while if the jaw stands wider than the connector: what it lost felt like a touch.
+
+        Whoever watches for slips then ends the motion, and nothing wrong is mapped.
+        """
+        end, holds = self._clock.now() + self.parameters.slip_time, 2 * self.known.cable.connector.radius
+        slack = self.parameters.execution.jaw.slack
+        while self.grippers[arm].reading().gap > holds + slack and self._clock.now() < end - 1e-9:
+            yield
 
     def held_spheres(self, held: RigidTransform) -> FloatArray:
         """Spheres (n, 4) m in the tool frame that stand for a held connector (tool_from_connector); see `model`."""
