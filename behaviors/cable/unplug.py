@@ -20,7 +20,8 @@ class UnplugParameters:
 class Unplug(HandLeaf):
     """Grips the connector in the `socket` of that name, draws it out along its axis, and away from the panel.
 
-    A hand that closes on nothing tries again, with another grasp where there is one.
+    A hand that closes on nothing tries again, with another grasp where there is one. Every other try goes by the
+    encoders alone: where things stand beside the arm, what a camera sees of it misleads.
     """
 
     WRITES: ClassVar[Keys] = (HELD,)
@@ -40,7 +41,8 @@ class Unplug(HandLeaf):
         plug = cable.socket(self.get_input("socket")).world_from_plug(cable.connector.length)
         for left in range(self.parameters.tries - 1, -1, -1):
             try:
-                yield from self.ask(motion.pick_plug(plug, point_cloud=self.overview_points))
+                by_sight = (self.parameters.tries - left) % 2 == 1
+                yield from self.ask(motion.pick_plug(plug, point_cloud=self.overview_points if by_sight else None))
                 yield from self.grip_or_leave(plug)
                 break
             except GraspEmptyError as error:

@@ -186,7 +186,12 @@ class CableMotion(SearchMotion):
 
         def steps() -> Iterator[None]:
             axis, held = plug.rotation.apply([1.0, 0.0, 0.0]), self.tool(self.hand).inv() * plug
-            yield from self._done(self.shift(self.hand, -values.draw_out * axis, checked=False))
+            try:
+                yield from self._done(self.shift(self.hand, -values.draw_out * axis, checked=False))
+            except PlanningError as error:
+                if error.code is not CauseCode.MOTION_BLOCKED:
+                    raise
+                self._on_anomaly(f"the plug is drawn out only in part: {error}")
             for share_of_way in values.retreat_shares:
                 away = np.array([-share_of_way * values.retreat, 0.0, 0.0])
                 try:
