@@ -2,8 +2,7 @@
 
 from collections.abc import Callable, Collection, Generator, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
-from functools import partial
+from dataclasses import dataclass, field
 from typing import TypeVar
 
 import numpy as np
@@ -16,27 +15,22 @@ from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.cell import Box
 from regrasp.interfaces.devices import Arm, Clock, Gripper
 from regrasp.interfaces.request import Request
-from regrasp.motion.arguments import finite_pose, share
+from regrasp.motion.arguments import finite_pose
 from regrasp.motion.cable.cable_reach import CableReachParameters
 from regrasp.motion.cable.cable_shape import cable_course, connector_points
-from regrasp.motion.cable.carry_paths import CarryPathParameters, carry_paths, first_free
-from regrasp.motion.cable.held import connector_spheres
-from regrasp.motion.cable.natural_routes import NaturalRoutes
+from regrasp.motion.cable.carrying import CarryMotion, CarryMotionParameters
 from regrasp.motion.cable.plugging import PluggingParameters
-from regrasp.motion.cable.search import SearchMotion, SearchMotionParameters
 from regrasp.motion.cable.seating import SeatingParameters, poses_before, seated_pose
-from regrasp.motion.cable.tether import Tether, TetherParameters
 from regrasp.motion.failure import GraspEmptyError, PlanningError, TouchError
 from regrasp.motion.grasping.approach import pick_candidates
 from regrasp.motion.grasping.gap_test import GripWatch
 from regrasp.motion.grasping.grasps import Grasp
-from regrasp.motion.planning.straight import can_continue
 from regrasp.motion.request import MotionRequest
 from regrasp.motion.robots.contact_guard import ContactLimits
 from regrasp.motion.robots.poses import angle_between
 from regrasp.motion.scene.collision import CollisionModel
 from regrasp.motion.scene.planning_scene import NO_POINTS
-from regrasp.motion.service import NO_WAY, PointCloudSource
+from regrasp.motion.service import PointCloudSource
 
 T = TypeVar("T")
 
@@ -55,24 +49,20 @@ class UnplugParameters:
 
 
 @dataclass(frozen=True)
-class CableMotionParameters(SearchMotionParameters):
+class CableMotionParameters(CarryMotionParameters):
     """Those of every task, and of what is done with the cable."""
 
     # Two grasps nearer than so many m and rad are one: what closed on nothing is tried again after all others; choice
     same_grasp: tuple[float, float] = (0.015, 0.35)
-    slip_time: float = 1.0  # s that a slip has to be noticed after a touch; by the pads' gap it takes 0.3
-    connector_padding: float = 1.2  # radii of the spheres that cover a carried connector, in its own radii; choice
     # m straight back from where something was held; the first that is free; choice
     retreats: tuple[float, ...] = (0.10, 0.08, 0.06, 0.05, 0.04, 0.03)
     unplug: UnplugParameters = field(default_factory=UnplugParameters)
-    carry: CarryPathParameters = field(default_factory=CarryPathParameters)
-    tether: TetherParameters = field(default_factory=TetherParameters)
     seating: SeatingParameters = field(default_factory=SeatingParameters)
     cable_reach: CableReachParameters = field(default_factory=CableReachParameters)
     plugging: PluggingParameters = field(default_factory=PluggingParameters)
 
 
-class CableMotion(SearchMotion):
+class CableMotion(CarryMotion):
     """Requests to the arm that handles the cable, the hand, and to the one that carries the camera that searches."""
 
     parameters: CableMotionParameters
@@ -204,69 +194,6 @@ class CableMotion(SearchMotion):
 
         return self._together(self.hand, steps())
 
-    def carry(
-        self,
-        arm: str,
-        goals: Sequence[RigidTransform],
-        held: RigidTransform,
-        *,
-        onward: Sequence[RigidTransform] = (),
-        speed: float,
-    ) -> MotionRequest:
-        """Bring what `arm` holds (tool_from_connector) to one of the goals (world_from_tool), the first preferred.
-
-        Along the shapes that the cable takes by itself where that is free, else straight or in a flat arch, else along
-        any free path. Where possible there is room for a jaw that opens on the way, as after a slip. From the goal the
-        tool must also reach the poses `onward` (goal_from_tool) in straight lines.
-        """
-        for pose in (*goals, held, *onward):
-            finite_pose("a pose of the tool or the connector", pose)
-        share("the speed", speed)
-
-        def steps(optimistic: bool, max_bend: float | None) -> Iterator[None]:
-            spheres = self.held_spheres(held)
-            model = self.start_model(arm, held=spheres, optimistic=optimistic)
-            q, kin = self.joints(arm), self.kinematics[arm]
-            clearances, carry = self.parameters.clearances, self.parameters.carry
-            tether = self._tether(arm, held, q, np.inf if max_bend is None else max_bend, optimistic)
-
-            def arm_free(world_from_tool: FloatArray) -> bool:
-                return any(model.free(end, clearances.near_margins[-1]) for end in kin.ik(world_from_tool, q))
-
-            routes = NaturalRoutes(self.known, tether.clearance, carry.routes)
-            candidates = carry_paths(self.known, kin, q, goals, held, routes, arm_free, carry)
-            paths = (path for path in candidates if can_continue(kin, path[-1], onward, carry.step))
-            widest = self.known.arm(arm).robot.gripper.opening
-            wide = self.model(arm, held=spheres, opening=widest, optimistic=optimistic)
-            if max_bend is not None:
-                model, wide = model.constrained(tether), wide.constrained(tether)
-            path = first_free((wide, model), clearances.near_margins, paths)
-            if path is None:
-                solutions = [end for goal in goals for end in kin.ik(goal, q)]
-                ends = [end for end in solutions if can_continue(kin, end, onward, carry.step)]
-                path = yield from self._shortest_plan(model, q, np.array(ends).reshape(-1, len(kin)), carry.searched)
-            natural = max_bend is not None and np.isfinite(max_bend)
-            limits = self._along_cable(self._guard.carrying if natural else self._guard.pulling, held)
-            try:
-                yield from self.execution.follow(arm, path, min(speed, self._pace(optimistic)), limits)
-            except TouchError:
-                yield from self._while_open(arm)
-                raise
-
-        def tries() -> Iterator[None]:
-            for max_bend in self.parameters.tether.bends:
-                try:
-                    yield from self._tries(arm, partial(steps, max_bend=max_bend))
-                except PlanningError as error:
-                    if error.code not in NO_WAY or isinstance(error, TouchError):
-                        raise
-                    self._on_anomaly(f"{error}, with the cable bent by at most {max_bend:g}/m")
-                else:
-                    return
-            yield from self._tries(arm, partial(steps, max_bend=None))
-
-        return self.execution.request(arm, tries())
-
     def carry_to_clip(self, held: RigidTransform) -> MotionRequest:
         """Bring the held connector (tool_from_connector) before the clip, from where the hand can go in and back out.
 
@@ -335,52 +262,6 @@ class CableMotion(SearchMotion):
         yield from self._done(self.sleep(self.hand))
         self.keep_clear(NO_POINTS)
 
-    def _shift_held(self, arm: str, displacement: FloatArray, held: RigidTransform) -> MotionRequest:
-        """`shift`, checked, with what the arm holds (tool_from_connector)."""
-        limits = self._along_cable(self._guard.pulling, held)
-        return self.shift(arm, displacement, held=self.held_spheres(held), contact=limits)
-
-    def _tether(self, arm: str, held: RigidTransform, q: FloatArray, max_bend: float, optimistic: bool) -> Tether:
-        """The cable of what is held (tool_from_connector) as a constraint on a path that begins at joints `q` (n,)."""
-        tether, kin = self.parameters.tether, self.kinematics[arm]
-        grid = self.grid_beside(cable_course(self.known, kin.tool(q) * held), tether.seen_free, optimistic)
-        return Tether(self.known, held, q, kin, self.known.solids(), grid, max_bend, tether)
-
-    def _along_cable(self, limits: ContactLimits, held: RigidTransform) -> ContactLimits:
-        """The limits, with the cable free to pull along itself at what is held (tool_from_connector)."""
-        return replace(limits, pull=np.concatenate([held.translation, held.rotation.apply([1.0, 0.0, 0.0])]))
-
-    def _while_open(self, arm: str) -> Iterator[None]:
-        """Wait for a short while if the jaw stands wider than the connector: what it lost felt like a touch.
-
-        Whoever watches for slips then ends the motion, and nothing wrong is mapped.
-        """
-        end, holds = self._clock.now() + self.parameters.slip_time, 2 * self.known.cable.connector.radius
-        slack = self.parameters.execution.jaw.slack
-        while self.grippers[arm].reading().gap > holds + slack and self._clock.now() < end - 1e-9:
-            yield
-
-    def held_spheres(self, held: RigidTransform) -> FloatArray:
-        """Spheres (n, 4) m in the tool frame that stand for a held connector (tool_from_connector); see `model`."""
-        return connector_spheres(held, self.known.cable.connector, self.parameters.connector_padding)
-
-    def _shortest_plan(
-        self, model: CollisionModel, start: FloatArray, goals: FloatArray, count: int
-    ) -> Generator[None, None, FloatArray]:
-        """Steps that plan `count` times, one a tick, and return the path (k, n) on which the links move least.
-
-        Raises PlanningError: the first plan fails.
-        """
-        shortest = self._plan(model, start, goals)
-        levers = model.kinematics.chain.levers
-        for _ in range(count - 1):
-            if len(shortest) == 2:  # straight from start to goal
-                break
-            yield
-            with suppress(PlanningError):
-                shortest = min(shortest, self._plan(model, start, goals), key=lambda path: _length(path, levers))
-        return shortest
-
     def _model_without_clip(self) -> CollisionModel:
         return self.model(self.hand, without=self.known.cable.clip.bracket)
 
@@ -431,22 +312,7 @@ class CableMotion(SearchMotion):
             order=missed if self._missed else order,
         )
 
-    def _together(self, arm: str, steps: Generator[None, None, T] | Iterator[None]) -> Request[T]:
-        """Steps that do other requests to `arm`, as one. Each of those fails if the arm is out of order."""
-        return Request(steps, lambda: self.execution.halt(arm))
-
-    def _done(self, request: Request[T]) -> Generator[None, None, T]:
-        """Steps that do a request and return its answer."""
-        while not request.poll():
-            yield
-        return request.answer
-
 
 def _alike(pose: FloatArray, other: FloatArray, distance: float, angle: float) -> bool:
     """Whether two poses (4, 4) are nearer than so many m and rad."""
     return bool(np.linalg.norm(pose[:3, 3] - other[:3, 3]) < distance) and angle_between(pose, other) < angle
-
-
-def _length(path: FloatArray, levers: FloatArray) -> float:
-    """How far (m) the links move along a joint path (k, n), by the joints' `levers` (n,) m."""
-    return float(np.linalg.norm(np.diff(path, axis=0) * levers, axis=1).sum())
