@@ -77,7 +77,7 @@ class MotionService(Protocol):
         """world_from_tool as read."""
         ...
 
-    def set_obstacles(self, points: FloatArray, spacing: float, unseen: FloatArray) -> None:
+    def set_obstacles(self, points: FloatArray, spacing: float, unseen: FloatArray | None = None) -> None:
         """Keep clear of these voxels from now on, see `Obstacles`; an unseen one is entered where no other way is."""
         ...
 

@@ -82,28 +82,12 @@ class Motion(PlanningScene):
         for arm in self.arms:
             self.model(arm).free(self.joints(arm), 0.0)
 
-    def move(
-        self,
-        arm: str,
-        goals: FloatArray,
-        *,
-        margin: float | None = None,
-        tight: bool = True,
-        contact: ContactLimits | None = None,
-    ) -> MotionRequest:
+    def move(self, arm: str, goals: FloatArray, *, margin: float | None = None, tight: bool = True) -> MotionRequest:
         """Plan a path to one of the goals (k, n) and follow it, `margin` m from everything (default: as set).
 
-        `tight`: with a smaller margin where nothing else is found. `contact`: what counts as a touch (default: of an
-        arm that moves freely).
+        `tight`: with a smaller margin where nothing else is found.
         """
-        goals = rows("the goals' joints", goals, len(self.kinematics[arm]))
-        _check_margin(margin)
-
-        def steps(optimistic: bool) -> Iterator[None]:
-            path = self._plan(self.start_model(arm, optimistic=optimistic), self.joints(arm), goals, margin, tight)
-            yield from self.execution.follow(arm, path, self._pace(optimistic), contact)
-
-        return self.execution.request(arm, self._tries(arm, steps))
+        return self._move(arm, goals, margin, tight)
 
     def move_tool(
         self,
@@ -150,7 +134,7 @@ class Motion(PlanningScene):
         `pulling`: it may pull something elastic along, which is no touch.
         """
         contact = self._guard.pulling if pulling else None
-        return self.move(arm, np.array([self.known.arm(arm).sleep]), contact=contact)
+        return self._move(arm, np.array([self.known.arm(arm).sleep]), contact=contact)
 
     def straight(
         self, arm: str, goal: RigidTransform, *, speed: float | None = None, pressing: bool = False
@@ -175,15 +159,89 @@ class Motion(PlanningScene):
         *,
         checked: bool = True,
         without: Collection[Box] = (),
-        held: FloatArray | None = None,
-        contact: ContactLimits | None = None,
     ) -> MotionRequest:
         """Move the tool straight by `displacement` (3,) m in the world, without turning it.
 
-        `checked`: only if the arm, with the spheres `held` (see `model`), meets nothing but the boxes `without`. A
-        motion that begins in a box cannot be checked; there the arm may press or pull. `contact`: what counts as a
-        touch (default: of an arm that moves freely).
+        `checked`: only if the arm meets nothing but the boxes `without`. A motion that begins in a box cannot be
+        checked; there the arm may press or pull.
         """
+        return self._shift(arm, displacement, checked, without)
+
+    def pick(
+        self,
+        arm: str,
+        world_from_cylinder: RigidTransform,
+        cylinder: Cylinder,
+        *,
+        shallow: float = 0.0,
+        clear_of: FloatArray | None = None,
+        without: Collection[Box] = (),
+        point_cloud: PointCloudSource | None = None,
+    ) -> MotionRequest:
+        """Open the jaw and bring it round a cylinder; the jaw stays open.
+
+        The cylinder lies `shallow` metres nearer to the finger tips than the pads' middle. The arm keeps clear of the
+        points `clear_of` (n, 3) m, except where the jaw takes hold: pushing a cable moves the connector. On the last
+        straight way it may touch the boxes `without`. Before that it is corrected by the `point_cloud` that a camera
+        sees of it.
+        """
+        return self._pick(arm, world_from_cylinder, cylinder, shallow, clear_of, without, point_cloud)
+
+    def close(self, arm: str, thickness: float) -> Request[float]:
+        """Close the jaw on a thing of `thickness` m; the answer is the gap (m) between the pads that hold it.
+
+        It fails with GraspEmptyError when it closes on nothing, with GRIPPER_FAILED when it does not move. When it is
+        cancelled the jaw keeps its force.
+        """
+        positive("the thickness", thickness)
+        return Request(self.execution.close_jaw(arm, thickness))
+
+    def open_jaw(self, arm: str) -> None:
+        """Tell the jaw to open, without waiting for it."""
+        self.grippers[arm].open(self.parameters.execution.jaw.open_gap)
+
+    def release(self, arm: str, gap: float) -> MotionRequest:
+        """Open the jaw; done once it stands `gap` m open."""
+        not_negative("the gap", gap)
+        return self.execution.request(arm, self.execution.open_jaw(arm, gap))
+
+    def stop(self) -> None:
+        """Stop all arms."""
+        for arm in self.arms:
+            self.execution.halt(arm)
+
+    def give_up(self, arm: str, code: str, message: str) -> PlanningError:
+        """Disable an arm or its jaw: every later request to it fails with this cause. Returns the error to raise."""
+        return self.execution.give_up(arm, code, message)
+
+    def _move(
+        self,
+        arm: str,
+        goals: FloatArray,
+        margin: float | None = None,
+        tight: bool = True,
+        contact: ContactLimits | None = None,
+    ) -> MotionRequest:
+        """`move`; `contact` says what counts as a touch (default: of an arm that moves freely)."""
+        goals = rows("the goals' joints", goals, len(self.kinematics[arm]))
+        _check_margin(margin)
+
+        def steps(optimistic: bool) -> Iterator[None]:
+            path = self._plan(self.start_model(arm, optimistic=optimistic), self.joints(arm), goals, margin, tight)
+            yield from self.execution.follow(arm, path, self._pace(optimistic), contact)
+
+        return self.execution.request(arm, self._tries(arm, steps))
+
+    def _shift(
+        self,
+        arm: str,
+        displacement: Sequence[float] | FloatArray,
+        checked: bool = True,
+        without: Collection[Box] = (),
+        held: FloatArray | None = None,
+        contact: ContactLimits | None = None,
+    ) -> MotionRequest:
+        """`shift`, checked with the spheres `held` (see `model`); `contact` as in `_move`."""
         way = vector("the displacement", displacement)
 
         def steps() -> Iterator[None]:
@@ -200,25 +258,18 @@ class Motion(PlanningScene):
 
         return self.execution.request(arm, steps())
 
-    def pick(
+    def _pick(
         self,
         arm: str,
         world_from_cylinder: RigidTransform,
         cylinder: Cylinder,
-        *,
-        shallow: float = 0.0,
-        clear_of: FloatArray | None = None,
-        without: Collection[Box] = (),
-        point_cloud: PointCloudSource | None = None,
+        shallow: float,
+        clear_of: FloatArray | None,
+        without: Collection[Box],
+        point_cloud: PointCloudSource | None,
         order: Callable[[Grasp], int] | None = None,
     ) -> MotionRequest:
-        """Open the jaw and bring it round a cylinder; the jaw stays open.
-
-        The cylinder lies `shallow` metres nearer to the finger tips than the pads' middle. The arm keeps clear of the
-        points `clear_of` (n, 3) m, except where the jaw takes hold: pushing a cable moves the connector. On the last
-        straight way it may touch the boxes `without`. Before that it is corrected by the `point_cloud` that a camera
-        sees of it. Grasps with a lower `order` are tried before all others.
-        """
+        """`pick`; grasps with a lower `order` are tried before all others."""
         finite_pose("the cylinder's pose", world_from_cylinder)
         near_points = None if clear_of is None else rows("the points to keep clear of", clear_of, 3)
 
@@ -250,33 +301,6 @@ class Motion(PlanningScene):
             self.keep_clear(NO_POINTS)
 
         return self.execution.request(arm, self._tries(arm, steps))
-
-    def close(self, arm: str, thickness: float) -> Request[float]:
-        """Close the jaw on a thing of `thickness` m; the answer is the gap (m) between the pads that hold it.
-
-        It fails with GraspEmptyError when it closes on nothing, with GRIPPER_FAILED when it does not move. When it is
-        cancelled the jaw keeps its force.
-        """
-        positive("the thickness", thickness)
-        return Request(self.execution.close_jaw(arm, thickness))
-
-    def open_jaw(self, arm: str) -> None:
-        """Tell the jaw to open, without waiting for it."""
-        self.grippers[arm].open(self.parameters.execution.jaw.open_gap)
-
-    def release(self, arm: str, gap: float) -> MotionRequest:
-        """Open the jaw; done once it stands `gap` m open."""
-        not_negative("the gap", gap)
-        return self.execution.request(arm, self.execution.open_jaw(arm, gap))
-
-    def stop(self) -> None:
-        """Stop all arms."""
-        for arm in self.arms:
-            self.execution.halt(arm)
-
-    def give_up(self, arm: str, code: str, message: str) -> PlanningError:
-        """Disable an arm or its jaw: every later request to it fails with this cause. Returns the error to raise."""
-        return self.execution.give_up(arm, code, message)
 
     def _tries(self, arm: str, steps: Callable[[bool], Iterator[None]]) -> Iterator[None]:
         """The steps, from the beginning after each touch, with what was felt on the map. Raises the last TouchError.

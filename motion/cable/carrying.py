@@ -109,7 +109,7 @@ class CarryMotion(SearchMotion):
     def _shift_held(self, arm: str, displacement: FloatArray, held: RigidTransform) -> MotionRequest:
         """`shift`, checked, with what the arm holds (tool_from_connector)."""
         limits = self._along_cable(self._guard.pulling, held)
-        return self.shift(arm, displacement, held=self.held_spheres(held), contact=limits)
+        return self._shift(arm, displacement, held=self.held_spheres(held), contact=limits)
 
     def _tether(self, arm: str, held: RigidTransform, q: FloatArray, max_bend: float, optimistic: bool) -> Tether:
         """The cable of what is held (tool_from_connector) as a constraint on a path that begins at joints `q` (n,)."""

@@ -94,11 +94,10 @@ class CableMotion(CarryMotion):
             with suppress(PlanningError):
                 self._approaches(arm, self.model(arm), candidates, cable.clip.bracket)
 
-    def shift(
+    def _shift(
         self,
         arm: str,
         displacement: Sequence[float] | FloatArray,
-        *,
         checked: bool = True,
         without: Collection[Box] = (),
         held: FloatArray | None = None,
@@ -106,7 +105,7 @@ class CableMotion(CarryMotion):
     ) -> MotionRequest:
         """As in every task; the clip's bracket may be touched, too."""
         without = [*without, *self.known.cable.clip.bracket]
-        return super().shift(arm, displacement, checked=checked, without=without, held=held, contact=contact)
+        return super()._shift(arm, displacement, checked, without, held, contact)
 
     def pick_plug(self, plug: RigidTransform, *, point_cloud: PointCloudSource | None = None) -> MotionRequest:
         """`pick` the connector where it is plugged in, world_from_connector: a panel is near.
@@ -242,7 +241,7 @@ class CableMotion(CarryMotion):
             for distance in self.parameters.retreats:
                 back = self.tool(self.hand).rotation.apply([-distance, 0.0, 0.0])
                 try:
-                    yield from self._done(self.shift(self.hand, back, contact=self._guard.pulling))
+                    yield from self._done(self._shift(self.hand, back, contact=self._guard.pulling))
                 except PlanningError as error:
                     why = str(error)
                 else:
@@ -301,15 +300,15 @@ class CableMotion(CarryMotion):
         def missed(grasp: Grasp) -> bool:
             return any(_alike(connector_from_world @ grasp.pose, other, *near) for other in self._missed)
 
-        return self.pick(
+        return self._pick(
             self.hand,
             world_from_connector,
             self.known.cable.connector,
-            shallow=shallow,
-            clear_of=cable,
-            without=self._bracket_near(world_from_connector),
-            point_cloud=point_cloud,
-            order=missed if self._missed else order,
+            shallow,
+            cable,
+            self._bracket_near(world_from_connector),
+            point_cloud,
+            missed if self._missed else order,
         )
 
 

@@ -68,7 +68,7 @@ class PlanningScene:
         self._spacing = 0.01  # m, until the first voxels come
 
     @counts_as("planning")
-    def set_obstacles(self, points: FloatArray, spacing: float, unseen: FloatArray = NO_POINTS) -> None:
+    def set_obstacles(self, points: FloatArray, spacing: float, unseen: FloatArray | None = None) -> None:
         """Keep clear of occupied voxels from now on: centres (n, 3) m in the world, and the edge `spacing` m.
 
         `unseen` (m, 3) m are voxels that no camera has seen, behind seen surfaces: an arm enters them only where it
@@ -77,7 +77,7 @@ class PlanningScene:
         """
         margin = self._scene_parameters.arm_margin
         self._points, self._spacing = self._within_reach(points), positive("the spacing", spacing)
-        self._unseen = self._within_reach(unseen)
+        self._unseen = self._within_reach(NO_POINTS if unseen is None else unseen)
         now = max((arm.reading().stamp for arm in self.arms.values()), default=0.0)
         self._felt = [(at, felt) for at, felt in self._felt if at > now - self._scene_parameters.felt_time]
         for spec in self.known.arms:

@@ -149,7 +149,7 @@ class FakeMotion:
     def tool(self, arm: str) -> RigidTransform:
         return self.hand
 
-    def set_obstacles(self, points: Vector, spacing: float, unseen: Vector) -> None:
+    def set_obstacles(self, points: Vector, spacing: float, unseen: Vector | None = None) -> None:
         pass
 
     def keep_clear(self, points: Vector) -> None:

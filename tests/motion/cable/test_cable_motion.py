@@ -98,7 +98,7 @@ def test_a_carry_leaves_out_a_goal_in_the_panel(rig: Rig) -> None:
 def test_where_no_direct_way_is_free_a_carry_takes_the_shortest_of_the_searched_ones(
     rig: Rig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("regrasp.motion.cable.service.first_free", lambda *_: None)
+    monkeypatch.setattr("regrasp.motion.cable.carrying.first_free", lambda *_: None)
     rig.arms["right"].at = ASIDE
     goal = moved(rig, 0.0, 0.10, 0.0)
     bends = iter([0.8, 0.5, 0.2, 0.6])
