@@ -55,7 +55,8 @@ class CarryMotion(SearchMotion):
         """Bring what `arm` holds (tool_from_connector) to one of the goals (world_from_tool), the first preferred.
 
         Along the shapes that the cable takes by itself where that is free, else straight or in a flat arch, else along
-        any free path. Where possible there is room for a jaw that opens on the way, as after a slip. From the goal the
+        any free path. On all of them the cable reaches, sweeps through nothing and bends little (`Tether`); only where
+        there is none it may bend more, and at last it does not count. Where possible there is room for a jaw that opens on the way, as after a slip. From the goal the
         tool must also reach the poses `onward` (goal_from_tool) in straight lines.
         """
         for pose in (*goals, held, *onward):

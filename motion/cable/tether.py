@@ -25,13 +25,10 @@ class TetherParameters:
     # in the jaw with 0.3 N m without gravity and 0.8 with the stiff cable of the Earth tests; from about twice that it
     # turns there, and forces the jaw open.
     bends: tuple[float, ...] = (7.0, np.inf)
-
     # m by which the cable's course (`cable_course`) may be longer than the cable, which bears no pull; the course is a
     # guess by so much
     stretch: float = 0.003
-    seen_error: float = (
-        0.02  # m that the length of a loose cable's course seems off where the connector is seen; choice
-    )
+    seen_error: float = 0.02  # m by which the course of a loose cable may seem longer or shorter than it is; choice
     clearance: float = 0.004  # m between the cable's middle line and seen surfaces; its radius
     step: float = 0.03  # rad of the joint that moves most, between two checks; choice
     seen_free: float = 0.02  # m round the cable where it lies at the start: there no obstacle is, whatever was mapped
