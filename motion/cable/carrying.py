@@ -56,8 +56,9 @@ class CarryMotion(SearchMotion):
 
         Along the shapes that the cable takes by itself where that is free, else straight or in a flat arch, else along
         any free path. On all of them the cable reaches, sweeps through nothing and bends little (`Tether`); only where
-        there is none it may bend more, and at last it does not count. Where possible there is room for a jaw that opens on the way, as after a slip. From the goal the
-        tool must also reach the poses `onward` (goal_from_tool) in straight lines.
+        there is none it may bend more, and at last it does not count. Where possible there is room for a jaw that opens
+        on the way, as after a slip. From the goal the tool must also reach the poses `onward` (goal_from_tool) in
+        straight lines.
         """
         for pose in (*goals, held, *onward):
             finite_pose("a pose of the tool or the connector", pose)
