@@ -128,7 +128,7 @@ class Execution:
         An arm that falls behind is stopped and led on, slower each time. One that touches something stops at once and
         goes a little way back; `contact` says what counts as a touch (default: of an arm that moves freely). Raises
         TouchError then, PlanningError ARM_FAILED when it never follows or its encoder readings are implausible, and
-        MOTION_BLOCKED when it ends off its goal.
+        MOTION_BLOCKED when it ends off its goal, or never follows while something elastic holds it back.
         """
         yield from self._follow(arm, self._from_command(arm, path), speed, contact or self.parameters.guard.free)
 
@@ -154,7 +154,10 @@ class Execution:
             yield from self._pause(self.parameters.retry_pause)
             path = np.vstack([self._joints(arm), path])
         else:
-            raise self.give_up(arm, CauseCode.ARM_FAILED, f"{trouble}, {self.parameters.attempts} times")
+            message = f"{trouble}, {self.parameters.attempts} times"
+            if contact.elastic:
+                raise PlanningError(CauseCode.MOTION_BLOCKED, message)
+            raise self.give_up(arm, CauseCode.ARM_FAILED, message)
         self._commanded[arm] = path[-1]
         yield from self._arrive(arm, path[-1])
         self._watches[arm].leave(self._joints(arm))

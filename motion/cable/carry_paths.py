@@ -1,6 +1,6 @@
 """Joint paths that carry a held connector to a goal, the preferred first."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import chain, product
 
@@ -21,7 +21,7 @@ from regrasp.motion.cable.natural_routes import NaturalRouteParameters, NaturalR
 from regrasp.motion.planning.straight import straight_lines
 from regrasp.motion.robots.kinematics import ArmKinematics
 from regrasp.motion.robots.poses import inverse, multiply, poses_between
-from regrasp.motion.scene.collision import CollisionModel
+from regrasp.motion.scene.collision import Clearances, CollisionModel
 
 
 @dataclass(frozen=True)
@@ -35,6 +35,10 @@ class CarryPathParameters:
     searched: int = 8
     # m by which the connector is first taken back the way that the hand came, without turning it; choice
     lifted: tuple[float, ...] = (0.0, 0.03, 0.06)
+    # m of the tool's way in which it may be as near to things as where it begins: a hand that took hold beside an
+    # obstacle first goes away from it; choice
+    leaving: float = 0.03
+    per_step: int = 16  # paths looked at in a tick; choice: 0.1 s
     routed: int = 3  # goals, the first, to which routes are searched on the grid of natural shapes; choice
     routes: NaturalRouteParameters = field(default_factory=NaturalRouteParameters)
     cable: CablePathParameters = field(default_factory=CablePathParameters)
@@ -82,11 +86,16 @@ def carry_paths(
 
 
 def first_free(
-    models: Sequence[CollisionModel], margins: Sequence[float], paths: Iterable[FloatArray]
-) -> FloatArray | None:
-    """The first path that is free in the first model by the first margin (m), else by the next; None if there is none.
+    models: Sequence[CollisionModel],
+    clearances: Clearances,
+    paths: Iterable[FloatArray],
+    parameters: CarryPathParameters = CarryPathParameters(),
+) -> Generator[None, None, FloatArray | None]:
+    """Steps that find the first path that is free in the first model by the first near margin, else by the next.
 
-    Where a path begins is not checked. Later paths are only taken from `paths` when they are needed.
+    They return None where there is none. A step looks at some paths, so that no tick waits for all of them. In the
+    first metres of the tool's way (`leaving`) a path may be as near to things as where it begins. Later paths are only
+    taken from `paths` when they are needed.
     """
     taken: list[FloatArray] = []
     source = iter(paths)
@@ -96,11 +105,22 @@ def first_free(
             taken.append(path)
             yield path
 
-    for model, margin in product(models, margins):
-        for path in chain(list(taken), take()):
-            if model.path_free(path[1:], margin):
+    for model, margin in product(models, clearances.near_margins):
+        known = len(taken)
+        for path in chain(taken[:known], take()):
+            begins = model.clearance(path[0]) - clearances.nearer
+            left = 0 if begins >= margin else _left(model.kinematics, path, parameters.leaving)
+            if model.path_free(path[left:], margin) and model.path_free(path[: left + 1], min(begins, margin)):
                 return path
+            if len(taken) > known and len(taken) % parameters.per_step == 0:
+                yield
     return None
+
+
+def _left(kin: ArmKinematics, path: FloatArray, distance: float) -> int:
+    """The first row of a joint path (k, n) where the tool is `distance` m from where it begins, or the last row."""
+    places = np.array([kin.tool_matrix(q)[:3, 3] for q in path])
+    return int(np.argmax(np.linalg.norm(places - places[0], axis=1) >= distance)) or len(path) - 1
 
 
 def _routed(

@@ -81,7 +81,7 @@ class CarryMotion(SearchMotion):
             wide = self.model(arm, held=spheres, opening=widest, optimistic=optimistic)
             if max_bend is not None:
                 model, wide = model.constrained(tether), wide.constrained(tether)
-            path = first_free((wide, model), clearances.near_margins, paths)
+            path = yield from first_free((wide, model), clearances, paths, carry)
             if path is None:
                 solutions = [end for goal in goals for end in kin.ik(goal, q)]
                 ends = [end for end in solutions if can_continue(kin, end, onward, carry.step)]

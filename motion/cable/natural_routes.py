@@ -60,17 +60,27 @@ class NaturalRoutes:
     ) -> Iterator[FloatArray]:
         """Deflections (k, 3) m from `begin` (left out) to `end`, both (3,), the route furthest from everything first.
 
-        `arm_free` says whether the arm can hold the connector at a pose (4, 4).
+        `arm_free` says whether the arm can hold the connector at a pose (4, 4); only of poses on the shortest ways
+        that is asked.
         """
         near = self._clearances >= min(self._parameters.clearances)
         near &= np.linalg.norm(self._places, axis=1) <= self._parameters.max_share * self._known.cable.length
-        near[near] = [arm_free(pose) for pose in self.poses[near]]
         first, last = self._nearest(begin), self._nearest(end)
+        asked: dict[int, bool] = {first: True, last: True}
+
+        def blocked(place: int) -> bool:
+            if place not in asked:
+                asked[place] = arm_free(self.poses[place])
+            return not asked[place]
+
         before: FloatArray | None = None
         for clearance in self._parameters.clearances:
             free = near & (self._clearances >= clearance)
             free[[first, last]] = True
             route = self._shortest(free, first, last)
+            while route is not None and (closed := [place for place in route if blocked(place)]):
+                near[closed] = free[closed] = False
+                route = self._shortest(free, first, last)
             if route is not None and (before is None or not np.array_equal(route, before)):
                 before = route
                 yield np.vstack([self._places[route[1:-1]] @ self._axes, end])

@@ -23,6 +23,7 @@ class ContactLimits:
     # Where something pulls at the hand, m, and the unit vector along which it may pull as it likes, (6,) in the tool
     # frame; None: nowhere.
     pull: FloatArray | None = None
+    elastic: bool = False  # something elastic may hold the arm back: one that falls behind is blocked, not broken
 
 
 @dataclass(frozen=True)
@@ -34,7 +35,7 @@ class ContactGuardParameters:
     # other joints'; a slow hand presses foam for half a second before that is felt; choice.
     carrying: ContactLimits = ContactLimits(0.15, adaptation=1.0)
     # One that is bent, pressed together, or caught in the jaw changes them by up to half; choice
-    pulling: ContactLimits = ContactLimits(0.7)
+    pulling: ContactLimits = ContactLimits(0.7, elastic=True)
     # A plug that is gripped askew jams in its socket up to what the drives can do: this stops at a blow only; choice
     pressing: ContactLimits = ContactLimits(2.0)
 

@@ -16,6 +16,8 @@ class ContactPlaceParameters:
 
     unexplained: float = 0.02  # share of a joint's greatest effort that may be left unexplained; choice
     usual_force: float = 30.0  # N; of two forces that explain a touch as well the smaller is the likelier one; choice
+    map_error: float = 0.02  # m that a thing which is touched may be off the map; choice
+    off_map: float = 0.10  # m; what is further from all that is mapped is as unlikely, no more; choice
     radius: float = 0.04  # m of the disc that counts as the surface which was felt; choice
     depth: float = 0.02  # m behind that surface; choice
 
@@ -25,6 +27,7 @@ def contact_place(
     spheres: FloatArray,
     links: NDArray[np.int64],
     touch: Touch,
+    clearances: FloatArray,
     parameters: ContactPlaceParameters = ContactPlaceParameters(),
 ) -> tuple[FloatArray, FloatArray]:
     r"""Where a touch was, (3,) m in the world, and the unit vector (3,) from there into the thing.
@@ -34,8 +37,9 @@ def contact_place(
 
     .. math:: f_s = \arg\min_f |W (r - J_s^T f)|^2 + |f|^2 / f_0^2
 
-    with the Jacobian of the sphere's centre, and W the inverse of the efforts that may be left unexplained. Of the
-    spheres whose force works against their motion the one with the least cost is taken: the idea of the contact
+    with the Jacobian of the sphere's centre, and W the inverse of the efforts that may be left unexplained. To this
+    cost comes the square of the sphere's distance to what is on the map, `clearances` (m,) m, by the map's error. Of
+    the spheres whose force works against their motion the one with the least cost is taken: the idea of the contact
     particle filter (Manuelli and Tedrake 2016), with spheres in place of particles.
     """
     jacobians = _sphere_jacobians(kinematics, spheres[:, :3], links, touch.joints)
@@ -46,6 +50,7 @@ def contact_place(
     forces = np.linalg.solve(normal, (weighted @ (weights * touch.efforts))[..., None])[..., 0]
     errors = weights * touch.efforts - np.einsum("sij,si->sj", weighted, forces)
     costs = (errors**2).sum(axis=1) + np.einsum("si,ij,sj->s", forces, regular, forces)
+    costs += (np.clip(clearances, 0.0, parameters.off_map) / parameters.map_error) ** 2
     power = np.einsum("sij,j,si->s", jacobians, touch.velocities, forces)
     if (power < 0.0).any():
         costs[power >= 0.0] = np.inf

@@ -110,6 +110,20 @@ def _nearest(  # type: ignore[no-untyped-def]
 
 
 @nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
+def _clearances(q, base, joints, links, local, boxes, distance, lower, h):  # type: ignore[no-untyped-def]
+    """Least distance (n,) m of each sphere to the boxes and the grid's points."""
+    world = world_spheres(base, joints, q, links, local)
+    out = np.empty(world.shape[0])
+    for n in range(world.shape[0]):
+        p = world[n, :3]
+        nearest = grid_distance(p, distance, lower, h)
+        for b in range(boxes.shape[0]):
+            nearest = min(nearest, box_distance(p, boxes[b]))
+        out[n] = nearest - world[n, 3]
+    return out
+
+
+@nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
 def _meets_box(p, reach, boxes):  # type: ignore[no-untyped-def]
     """Whether a point is nearer than `reach` to a box; most boxes are ruled out by the first axis."""
     for b in range(boxes.shape[0]):
@@ -266,6 +280,11 @@ class CollisionModel:
         distance, what = _nearest(np.asarray(q, float), *self._arguments)
         names = {_ITSELF: "itself", _GRID: "seen surface", _OTHER_ARM: "other arm"}
         return float(distance), names[what] if what < 0 else self._names[what]
+
+    def clearances(self, q: FloatArray) -> FloatArray:
+        """Least distances (n,) m of the arm's `spheres` to boxes and seen surfaces."""
+        base, joints, _, links, local, _, boxes, _, *grid = self._arguments[:-1]
+        return np.asarray(_clearances(np.asarray(q, float), base, joints, links, local, boxes, *grid))
 
     @property
     def links(self) -> NDArray[np.int64]:

@@ -101,7 +101,9 @@ class PlanningScene:
         """Keep clear of where an arm touched something, as well; the place (3,) m in the world."""
         model = self.model(arm, others=False)
         spheres, kin = model.spheres(touch.joints), self.kinematics[arm]
-        place, inward = contact_place(kin, spheres, model.links, touch, self._scene_parameters.contact)
+        place, inward = contact_place(
+            kin, spheres, model.links, touch, model.clearances(touch.joints), self._scene_parameters.contact
+        )
         self._felt.append((touch.stamp, felt_points(place, inward, self._spacing, self._scene_parameters.contact)))
         self._grids.clear()
         return place
@@ -156,7 +158,7 @@ class PlanningScene:
         distance, what = model.nearest(self.joints(arm))
         touching = self._scene_parameters.touching
         if what == "seen surface" and distance < touching:
-            spheres, reach = model.spheres(self.joints(arm)), touching + 2 * self._spacing
+            spheres, reach = model.spheres(self.joints(arm)), self._spacing
             self._points = _points_beyond(self._points, spheres, reach)
             self._unseen = _points_beyond(self._unseen, spheres, reach)
             self._more = _points_beyond(self._more, spheres, reach)

@@ -85,6 +85,17 @@ def test_an_arm_that_does_not_follow_is_led_on_slower_and_then_given_up(
     rig.run(rig.motion.move("left", READY[None]))  # the other arm is sound
 
 
+def test_an_arm_that_pulls_something_elastic_and_falls_behind_is_blocked_but_in_order(rig: Rig) -> None:
+    rig.arms["right"].at = READY
+    rig.arms["right"].stuck = 0.0
+    with pytest.raises(PlanningError, match=r"off its trajectory, limit 0.080, 3 times") as error:
+        rig.run(rig.motion.sleep("right", pulling=True))
+    assert error.value.code is CauseCode.MOTION_BLOCKED
+    rig.arms["right"].stuck = 1.0
+    rig.run(rig.motion.move("right", ASIDE[None]))
+    assert rig.motion.joints("right") == pytest.approx(ASIDE)
+
+
 def test_an_arm_that_comes_free_ends_where_planned(rig: Rig) -> None:
     rig.arms["right"].stuck = 0.3
     task = rig.motion.move("right", READY[None])
@@ -239,6 +250,16 @@ def test_a_motion_can_begin_with_a_hand_beside_a_seen_surface(rig: Rig) -> None:
     assert not rig.motion.model("right").free(READY, TIGHT_MARGIN)
     rig.run(rig.motion.move("right", ASIDE[None]))
     assert rig.motion.joints("right") == pytest.approx(ASIDE)
+
+
+def test_what_was_felt_in_the_way_is_still_there_when_the_motion_begins_again(rig: Rig) -> None:
+    rig.arms["right"].at = READY
+    rig.motion.set_obstacles(cube(rig.motion.kinematics["right"].tool(READY).apply([0.0, 0.0, -0.06]), 0.04), 0.01)
+    before = rig.motion.model("right", optimistic=True).nearest(READY)
+    assert before[0] < 0.005
+    count = len(rig.motion._points)
+    rig.motion.start_model("right")
+    assert 0 < count - len(rig.motion._points) < count / 2
 
 
 def test_nothing_is_seen_through_a_panel(rig: Rig) -> None:

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from fake_devices import Rig
@@ -7,6 +9,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.cause import CauseCode
+from regrasp.motion.cable.carry_paths import CarryPathParameters
 from regrasp.motion.failure import GraspEmptyError, PlanningError
 from regrasp.motion.service import MotionParameters
 
@@ -98,7 +101,8 @@ def test_a_carry_leaves_out_a_goal_in_the_panel(rig: Rig) -> None:
 def test_where_no_direct_way_is_free_a_carry_takes_the_shortest_of_the_searched_ones(
     rig: Rig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("regrasp.motion.cable.carrying.first_free", lambda *_: None)
+    carry = CarryPathParameters(lifts=(), lifted=())  # no path but the searched ones
+    rig.motion.parameters = replace(rig.motion.parameters, carry=carry)
     rig.arms["right"].at = ASIDE
     goal = moved(rig, 0.0, 0.10, 0.0)
     bends = iter([0.8, 0.5, 0.2, 0.6])

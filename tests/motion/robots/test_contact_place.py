@@ -1,4 +1,5 @@
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from robots import VX300S
@@ -12,6 +13,7 @@ from regrasp.motion.scene.collision import CollisionModel
 
 KIN = ArmKinematics(VX300S, RigidTransform.identity())
 MODEL = CollisionModel(KIN, [])
+NOWHERE = np.full(len(MODEL.links), np.inf)  # nothing is mapped
 HAND = np.flatnonzero(MODEL.links == len(KIN))
 
 
@@ -36,7 +38,7 @@ def test_a_push_on_the_hand_is_found_on_the_hand_and_against_its_motion(seed: in
     moving = np.array([efforts_of(q, len(q), sphere[:3], axis) @ velocities for axis in np.eye(3)])
     force = -8.0 * moving / np.linalg.norm(moving)
     touch = Touch(1.0, q, velocities, efforts_of(q, len(q), sphere[:3], force))
-    place, inward = contact_place(KIN, MODEL.spheres(q), MODEL.links, touch)
+    place, inward = contact_place(KIN, MODEL.spheres(q), MODEL.links, touch, NOWHERE)
     reach = np.linalg.norm(MODEL.spheres(q)[HAND, :3] - place, axis=1) - MODEL.spheres(q)[HAND, 3]
     assert reach.min() < 0.12  # a weak sideways push may as well be a weaker one further out
     assert inward @ -force > 0.0
@@ -49,9 +51,21 @@ def test_of_two_places_that_explain_a_touch_as_well_the_one_further_out_is_told(
     upper = np.flatnonzero(links == 3)[-1]
     force = np.array([0.0, -10.0, 0.0])
     efforts = efforts_of(q, 3, spheres[upper, :3], force)
-    place, inward = contact_place(KIN, spheres, links, Touch(1.0, q, velocities, efforts))
+    place, inward = contact_place(KIN, spheres, links, Touch(1.0, q, velocities, efforts), NOWHERE)
     assert inward[1] > 0.9  # the waist turns to the left
     assert place[0] > spheres[upper, 0]
+
+
+def test_of_two_places_that_explain_a_touch_the_one_beside_a_mapped_thing_is_told() -> None:
+    q = np.zeros(6)
+    velocities = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    spheres, links = MODEL.spheres(q), MODEL.links
+    upper = np.flatnonzero(links == 3)[-1]
+    efforts = efforts_of(q, 3, spheres[upper, :3], np.array([0.0, -10.0, 0.0]))
+    clearances = np.full(len(spheres), 0.10)
+    clearances[upper] = 0.01
+    place, _ = contact_place(KIN, spheres, links, Touch(1.0, q, velocities, efforts), clearances)
+    assert np.linalg.norm(place - spheres[upper, :3]) == pytest.approx(spheres[upper, 3])
 
 
 def test_felt_points_are_a_disc_of_the_surface_and_what_lies_behind() -> None:

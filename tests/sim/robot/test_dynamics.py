@@ -151,7 +151,13 @@ def test_an_arm_that_meets_foam_at_full_speed_stops_below_15_newtons_and_tells_w
     assert guard.touch is not None
     assert 0.0 < peak < 15.0
     model = CollisionModel(bench.kin, [])
-    place, inward = contact_place(bench.kin, model.spheres(guard.touch.joints), model.links, guard.touch)
+    place, inward = contact_place(
+        bench.kin,
+        model.spheres(guard.touch.joints),
+        model.links,
+        guard.touch,
+        model.clearances(guard.touch.joints),
+    )
     outside = np.maximum(np.abs(place - center) - half, 0.0)
     assert np.linalg.norm(outside) < 0.05
     assert inward @ [0.0, -1.0, 0.0] > 0.7  # the arm swept that way
