@@ -10,7 +10,7 @@ from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.devices import Arm, Clock, Gripper
 from regrasp.interfaces.robot.chain import Chain
 from regrasp.interfaces.trajectory import Trajectory
-from regrasp.motion.failure import GraspEmptyError, PlanningError, TouchError
+from regrasp.motion.failure import GraspEmptyError, PlanningError, StoppedShortError, TouchError
 from regrasp.motion.grasping.gap_test import GapParameters, GripWatch
 from regrasp.motion.planning.timing import JointLimits, TimingParameters, time_path
 from regrasp.motion.request import MotionRequest
@@ -128,7 +128,7 @@ class Execution:
         An arm that falls behind is stopped and led on, slower each time. One that touches something stops at once and
         goes a little way back; `contact` says what counts as a touch (default: of an arm that moves freely). Raises
         TouchError then, PlanningError ARM_FAILED when it never follows or its encoder readings are implausible, and
-        MOTION_BLOCKED when it ends off its goal, or never follows while something elastic holds it back.
+        StoppedShortError when it ends off its goal, or never follows while something elastic may hold it back.
         """
         yield from self._follow(arm, self._from_command(arm, path), speed, contact or self.parameters.guard.free)
 
@@ -136,6 +136,7 @@ class Execution:
         moved = self._watches[arm].moved_alone(self._arms[arm].reading())
         if moved is not None:
             raise self.give_up(arm, CauseCode.ARM_FAILED, moved)
+        share = self._speed_share[arm]
         for _ in range(self.parameters.attempts):
             trajectory = time_path(path, self._limits[arm], speed * self._speed_share[arm], self.parameters.timing)
             yield from self._pause(self._latency)
@@ -156,7 +157,8 @@ class Execution:
         else:
             message = f"{trouble}, {self.parameters.attempts} times"
             if contact.elastic:
-                raise PlanningError(CauseCode.MOTION_BLOCKED, message)
+                self._speed_share[arm] = share
+                raise StoppedShortError(message)
             raise self.give_up(arm, CauseCode.ARM_FAILED, message)
         self._commanded[arm] = path[-1]
         yield from self._arrive(arm, path[-1])
@@ -255,7 +257,7 @@ class Execution:
         error = self._goal_error(arm, goal)
         if error > tolerance:
             message = f"the {arm} arm stopped {error:.2f} rad short of its goal, more than {tolerance:.2f}"
-            raise PlanningError(CauseCode.MOTION_BLOCKED, message)
+            raise StoppedShortError(message)
 
     def _goal_error(self, arm: str, goal: FloatArray) -> float:
         return float(np.max(np.abs(self._joints(arm) - goal)))

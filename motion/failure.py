@@ -24,6 +24,13 @@ class TouchError(PlanningError):
         self.touch = touch
 
 
+class StoppedShortError(PlanningError):
+    """A path was found, but the arm did not come to its end."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(CauseCode.MOTION_BLOCKED, message)
+
+
 class GraspEmptyError(PlanningError):
     """The jaw closed on nothing."""
 

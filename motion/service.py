@@ -19,7 +19,7 @@ from regrasp.interfaces.devices import Arm, Clock, Gripper
 from regrasp.interfaces.request import Request
 from regrasp.motion.arguments import finite_pose, not_negative, positive, rows, share, vector
 from regrasp.motion.execution import Execution, ExecutionParameters
-from regrasp.motion.failure import PlanningError, TouchError
+from regrasp.motion.failure import PlanningError, StoppedShortError, TouchError
 from regrasp.motion.grasping.approach import Cylinder, PickParameters, find_approaches, pick_candidates, points_beyond
 from regrasp.motion.grasping.grasps import Grasp
 from regrasp.motion.planning.planner import PlannerParameters, plan
@@ -317,7 +317,7 @@ class Motion(PlanningScene):
                     raise
                 self._on_anomaly(f"felt at {place.round(3).tolist()}: the {arm} arm looks for another way")
             except PlanningError as error:
-                if error.code not in NO_WAY or optimistic:
+                if error.code not in NO_WAY or optimistic or isinstance(error, StoppedShortError):
                     raise
                 optimistic = True
             else:

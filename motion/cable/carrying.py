@@ -18,7 +18,7 @@ from regrasp.motion.cable.held import connector_spheres
 from regrasp.motion.cable.natural_routes import NaturalRoutes
 from regrasp.motion.cable.search import SearchMotion, SearchMotionParameters
 from regrasp.motion.cable.tether import Tether, TetherParameters
-from regrasp.motion.failure import PlanningError, TouchError
+from regrasp.motion.failure import PlanningError, StoppedShortError, TouchError
 from regrasp.motion.planning.straight import can_continue
 from regrasp.motion.request import MotionRequest
 from regrasp.motion.robots.contact_guard import ContactLimits
@@ -99,7 +99,7 @@ class CarryMotion(SearchMotion):
                 try:
                     yield from self._tries(arm, partial(steps, max_bend=max_bend))
                 except PlanningError as error:
-                    if error.code not in NO_WAY or isinstance(error, TouchError):
+                    if error.code not in NO_WAY or isinstance(error, (TouchError, StoppedShortError)):
                         raise
                     self._on_anomaly(f"{error}, with the cable bent by at most {max_bend:g}/m")
                 else:
