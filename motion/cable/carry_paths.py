@@ -38,7 +38,7 @@ class CarryPathParameters:
     # m of the tool's way in which it may be as near to things as where it begins: a hand that took hold beside an
     # obstacle first goes away from it; choice
     leaving: float = 0.03
-    per_step: int = 16  # paths looked at in a tick; choice: 0.1 s
+    per_step: int = 16  # paths tried in a tick; choice: 50 ms
     routed: int = 3  # goals, the first, to which routes are searched on the grid of natural shapes; choice
     routes: NaturalRouteParameters = field(default_factory=NaturalRouteParameters)
     cable: CablePathParameters = field(default_factory=CablePathParameters)
@@ -53,12 +53,12 @@ def carry_paths(
     routes: NaturalRoutes,
     arm_free: Callable[[FloatArray], bool],
     parameters: CarryPathParameters = CarryPathParameters(),
-) -> Iterator[FloatArray]:
+) -> Iterator[FloatArray | None]:
     """Joint paths (k, 6) rad from `q` (6,) to the goals (world_from_tool); `held` is tool_from_connector.
 
     First along the natural shapes of the cable, at once or when the connector is lifted: directly, in a plain detour,
     or by the `routes`. Then straight or in a flat arch. `arm_free`: whether the arm is free with its tool at a pose
-    (4, 4). Whether a path is free is not checked.
+    (4, 4). Whether a path is free is not checked. None comes after as much work as a tick should wait for.
     """
     tool, tool_from_connector, ends = kin.tool_matrix(q), held.as_matrix(), [goal.as_matrix() for goal in goals]
     connector_from_tool, connector = inverse(tool_from_connector), multiply(tool, tool_from_connector)
@@ -73,48 +73,53 @@ def carry_paths(
         for path in natural_paths(known, lift[-1], goal, parameters.cable)
     )
     routed = (
-        np.concatenate([lift, path]) @ connector_from_tool
+        None if path is None else np.concatenate([lift, path]) @ connector_from_tool
         for lift in starts
         for goal in goals_of[: parameters.routed]
-        for path in _routed(known, lift[-1], goal, connector_from_tool, routes, arm_free, parameters.cable)
+        for path in chain(
+            _routed(known, lift[-1], goal, connector_from_tool, routes, arm_free, parameters.cable), [None]
+        )
     )
     direct = (_arch(tool, end, lift) for end in ends for lift in parameters.lifts)
-    for poses in chain(natural, routed, direct):
-        path = straight_lines(kin, q, poses, parameters.step)
+    for tried, poses in enumerate(chain(natural, routed, direct), 1):
+        path = None if poses is None else straight_lines(kin, q, poses, parameters.step)
         if path is not None:
             yield path
+        if poses is None or tried % parameters.per_step == 0:
+            yield None
 
 
 def first_free(
-    models: Sequence[CollisionModel],
-    clearances: Clearances,
-    paths: Iterable[FloatArray],
-    parameters: CarryPathParameters = CarryPathParameters(),
+    models: Sequence[CollisionModel], clearances: Clearances, leaving: float, paths: Iterable[FloatArray | None]
 ) -> Generator[None, None, FloatArray | None]:
     """Steps that find the first path that is free in the first model by the first near margin, else by the next.
 
-    They return None where there is none. A step looks at some paths, so that no tick waits for all of them. In the
-    first metres of the tool's way (`leaving`) a path may be as near to things as where it begins. Later paths are only
-    taken from `paths` when they are needed.
+    They return None where there is none. In the first `leaving` m of the tool's way a path may be as near to things as
+    where it begins. Later paths are only taken from `paths` when they are needed; a step ends at each None among them,
+    and when all were tried with a margin.
     """
     taken: list[FloatArray] = []
     source = iter(paths)
-
-    def take() -> Iterator[FloatArray]:
-        for path in source:
-            taken.append(path)
-            yield path
-
     for model, margin in product(models, clearances.near_margins):
-        known = len(taken)
-        for path in chain(taken[:known], take()):
-            begins = model.clearance(path[0]) - clearances.nearer
-            left = 0 if begins >= margin else _left(model.kinematics, path, parameters.leaving)
-            if model.path_free(path[left:], margin) and model.path_free(path[: left + 1], min(begins, margin)):
+        for path in taken:
+            if _keeps(model, path, margin, clearances.nearer, leaving):
                 return path
-            if len(taken) > known and len(taken) % parameters.per_step == 0:
+        for new in source:
+            if new is None:
                 yield
+                continue
+            if _keeps(model, new, margin, clearances.nearer, leaving):
+                return new
+            taken.append(new)
+        yield
     return None
+
+
+def _keeps(model: CollisionModel, path: FloatArray, margin: float, nearer: float, leaving: float) -> bool:
+    """Whether a joint path (k, n) keeps the margin, or at first what it has where it begins, less `nearer`."""
+    begins = model.clearance(path[0]) - nearer
+    left = 0 if begins >= margin else _left(model.kinematics, path, leaving)
+    return model.path_free(path[left:], margin) and model.path_free(path[: left + 1], min(begins, margin))
 
 
 def _left(kin: ArmKinematics, path: FloatArray, distance: float) -> int:

@@ -76,12 +76,12 @@ class CarryMotion(SearchMotion):
 
             routes = NaturalRoutes(self.known, tether.clearance, carry.routes)
             candidates = carry_paths(self.known, kin, q, goals, held, routes, arm_free, carry)
-            paths = (path for path in candidates if can_continue(kin, path[-1], onward, carry.step))
+            paths = (path for path in candidates if path is None or can_continue(kin, path[-1], onward, carry.step))
             widest = self.known.arm(arm).robot.gripper.opening
             wide = self.model(arm, held=spheres, opening=widest, optimistic=optimistic)
             if max_bend is not None:
                 model, wide = model.constrained(tether), wide.constrained(tether)
-            path = yield from first_free((wide, model), clearances, paths, carry)
+            path = yield from first_free((wide, model), clearances, carry.leaving, paths)
             if path is None:
                 solutions = [end for goal in goals for end in kin.ik(goal, q)]
                 ends = [end for end in solutions if can_continue(kin, end, onward, carry.step)]

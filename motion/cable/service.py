@@ -82,9 +82,9 @@ class CableMotion(CarryMotion):
         self._missed: list[FloatArray] = []  # grasps (4, 4), connector_from_tool, that closed on nothing
 
     def warm_up(self) -> None:
-        """Look for a grasp of the plugged connector and drop it.
+        """Look for a grasp of the plugged connector, check its cable, and drop both.
 
-        The compiled functions of a pick are then loaded now, and no tick waits for it.
+        The compiled functions of a pick and of carrying are then loaded now, and no tick waits for it.
         """
         cable = self.known.cable
         plugged = cable.socket(cable.plugged_into).world_from_plug(cable.connector.length)
@@ -93,6 +93,10 @@ class CableMotion(CarryMotion):
             candidates = pick_candidates(plugged, cable.connector, 0.0, widest, self.parameters.pick)
             with suppress(PlanningError):
                 self._approaches(arm, self.model(arm), candidates, cable.clip.bracket)
+        q = self.joints(self.hand)
+        tether = self._tether(self.hand, self.tool(self.hand).inv() * plugged, q, np.inf, optimistic=False)
+        tether.clearance(plugged.as_matrix())
+        tether.holds_along(q, q)
 
     def _shift(
         self,
