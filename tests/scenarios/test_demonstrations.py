@@ -128,7 +128,7 @@ def test_two_processes_with_one_seed_write_the_same_bytes(tmp_path: Path) -> Non
 
 
 def test_the_software_renderer_carries_the_run_as_far_as_the_slip(tmp_path: Path) -> None:
-    scenario = load_scenario("no_obstacle", ["limits.sim_seconds=11"])
+    scenario = load_scenario("no_obstacle", ["limits.sim_seconds=14"])
     result = run_episode(scenario, tmp_path / "run", seed=0, renderer="software")
     assert (result.outcome, result.renderer) == ("time_limit", "software")
     [slip] = result.measured["slips"]
