@@ -267,9 +267,9 @@ class Motion(PlanningScene):
         clear_of: FloatArray | None,
         without: Collection[Box],
         point_cloud: PointCloudSource | None,
-        order: Callable[[Grasp], int] | None = None,
+        order: Callable[[list[Grasp]], list[Grasp]] = list,
     ) -> MotionRequest:
-        """`pick`; grasps with a lower `order` are tried before all others."""
+        """`pick`; of the candidates, the cheapest first, those are tried that `order` keeps, in its order."""
         finite_pose("the cylinder's pose", world_from_cylinder)
         near_points = None if clear_of is None else rows("the points to keep clear of", clear_of, 3)
 
@@ -278,9 +278,7 @@ class Motion(PlanningScene):
             self._keep_clear_but_near(near_points, world_from_cylinder.translation)
             model = self.start_model(arm, opening=jaw.open_gap, optimistic=optimistic)
             widest = self.known.arm(arm).robot.gripper.opening
-            candidates = pick_candidates(world_from_cylinder, cylinder, shallow, widest, self.parameters.pick)
-            if order is not None:
-                candidates.sort(key=order)
+            candidates = order(pick_candidates(world_from_cylinder, cylinder, shallow, widest, self.parameters.pick))
             try:
                 approaches = self._approaches(arm, model, candidates, without, optimistic)
             except PlanningError as error:
@@ -375,12 +373,13 @@ class Motion(PlanningScene):
         candidates: Sequence[Grasp],
         without: Collection[Box],
         optimistic: bool = False,
+        clearances: Clearances | None = None,
     ) -> list[FloatArray]:
         """Joint paths (k, n) from standoff to grasp; `model` counts away from what is grasped.
 
-        They touch the boxes `without` only if there are no others.
+        They touch the boxes `without` only if there are no others. `clearances`: default as set.
         """
-        clearances, pick = self.parameters.clearances, self.parameters.pick
+        clearances, pick = clearances or self.parameters.clearances, self.parameters.pick
         gap = self.parameters.execution.jaw.open_gap
         if without:
             near = self.model(arm, opening=gap, optimistic=optimistic)

@@ -32,7 +32,8 @@ class DetectSlip(Leaf):
 
     def work(self) -> Status:
         """See the class."""
-        tool = self.services.motion.tool(self.services.known.cable.hand)
+        motion = self.services.motion
+        tool = motion.tool(motion.hand)
         for evidence in (self._grip.evidence(), self.services.perception.slipped(tool)):
             if evidence is not None and evidence.detected:
                 self.clear(HELD)

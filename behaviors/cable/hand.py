@@ -31,8 +31,8 @@ class CableLeaf(StepsLeaf):
 
     @property
     def hand(self) -> str:
-        """The arm that handles the cable."""
-        return self.services.known.cable.hand
+        """The arm that handles the cable now."""
+        return self.services.motion.hand
 
     @property
     def overview(self) -> str:

@@ -12,7 +12,7 @@ from regrasp.interfaces.cause import CauseCode
 
 
 class Holding(Leaf):
-    """SUCCESS when the robot believes that its right hand holds the connector, else FAILURE."""
+    """SUCCESS when the robot believes that its hand holds the connector, else FAILURE."""
 
     READS: ClassVar[Keys] = (
         HELD,

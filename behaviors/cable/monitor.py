@@ -29,7 +29,8 @@ class Monitor(Leaf):
     def work(self) -> Status:
         """See the class."""
         perception, now, cable = self.services.perception, self.services.clock.now(), self.services.known.cable
-        perception.expect_in_hand(self.services.motion.tool(cable.hand), self.read(HELD, None))
+        motion = self.services.motion
+        perception.expect_in_hand(motion.tool(motion.hand), self.read(HELD, None))
         if now >= self._due - 1e-9:
             perception.look(cable.overview)
             self._due = now + self.get_input("period")

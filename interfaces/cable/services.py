@@ -28,6 +28,19 @@ class CableMotionService(MotionService, Protocol):
     `held` is tool_from_connector, `plug` world_from_connector.
     """
 
+    @property
+    def hand(self) -> str:
+        """The arm that handles the cable now; at first the cell's."""
+        ...
+
+    def take_with(self, arm: str) -> None:
+        """Let an arm handle the cable from now on."""
+        ...
+
+    def hands_for(self, world_from_connector: "RigidTransform") -> Request[list[str]]:
+        """The arms that can take the loose connector, the best first; the present hand where none can."""
+        ...
+
     def pick_plug(
         self, plug: "RigidTransform", *, point_cloud: Callable[[float], FloatArray | None] | None = None
     ) -> Request[None]:
@@ -44,7 +57,7 @@ class CableMotionService(MotionService, Protocol):
         ...
 
     def can_pick_loose(self, world_from_connector: "RigidTransform") -> bool:
-        """Whether a grasp of the loose connector is free, with all space that no camera has seen taken for full."""
+        """Whether an arm has a free grasp of the loose connector, with all space that no camera has seen for full."""
         ...
 
     def grip(self, world_from_connector: "RigidTransform") -> Request[Grip]:

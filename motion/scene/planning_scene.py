@@ -98,13 +98,21 @@ class PlanningScene:
 
     @counts_as("planning")
     def feel(self, arm: str, touch: Touch) -> FloatArray:
-        """Keep clear of where an arm touched something, as well; the place (3,) m in the world."""
+        """Keep clear of where an arm touched something, as well; the place (3,) m in the world.
+
+        Not of what would be in the place of a sleeping arm: from there they came.
+        """
         model = self.model(arm, others=False)
         spheres, kin = model.spheres(touch.joints), self.kinematics[arm]
         place, inward = contact_place(
             kin, spheres, model.links, touch, model.clearances(touch.joints), self._scene_parameters.contact
         )
-        self._felt.append((touch.stamp, felt_points(place, inward, self._spacing, self._scene_parameters.contact)))
+        felt = felt_points(place, inward, self._spacing, self._scene_parameters.contact)
+        for spec in self.known.arms:
+            felt = _points_beyond(
+                felt, self.model(spec.name, others=False).spheres(np.array(spec.sleep)), self._spacing
+            )
+        self._felt.append((touch.stamp, felt))
         self._grids.clear()
         return place
 

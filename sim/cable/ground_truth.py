@@ -10,7 +10,7 @@ from regrasp.sim.ground_truth import GroundTruth
 
 
 class CableTruth(GroundTruth[CableObjects]):
-    """Ground truth of one world with a cable. The hand is the arm that handles the cable, `known.cable.hand`."""
+    """Ground truth of one world with a cable. The hand is whichever arm holds the connector, else touches it."""
 
     @property
     def _objects(self) -> CableObjects:
@@ -26,15 +26,15 @@ class CableTruth(GroundTruth[CableObjects]):
 
     def held(self) -> bool:
         """Whether both pads of the hand touch the connector."""
-        return all(self._objects.pads_touching(self._hand))
+        return all(self._objects.touching()[1])
 
     def touched(self) -> bool:
         """Whether any pad of the hand touches the connector."""
-        return any(self._objects.pads_touching(self._hand))
+        return any(self._objects.touching()[1])
 
     def connector_in_hand(self) -> FloatArray:
         """The connector's centre (3,) m in the frame between the hand's pads."""
-        return self._world.arms[self._hand].in_tool(self._objects.connector_position())
+        return self._world.arms[self._objects.touching()[0]].in_tool(self._objects.connector_position())
 
     def plugged(self) -> bool:
         """Whether the connector sits in a socket, or still on its stand."""
@@ -63,7 +63,3 @@ class CableTruth(GroundTruth[CableObjects]):
         """Share, 0 to 1, of the connector's pixels, without its tag, that obstacles now occlude in that camera."""
         cable = self._objects.cable
         return self.occlusion(camera, cable.body, cable.connector_link, lambda item: item.kind == p.GEOM_BOX)
-
-    @property
-    def _hand(self) -> str:
-        return self._objects.cell.known.cable.hand

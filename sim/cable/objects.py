@@ -111,7 +111,7 @@ class CableObjects(TaskObjects):
     def update_triggers(self, now: float, triggers: TriggerState) -> None:
         """See `TaskObjects`: the share of the way that the held connector has been carried, and the phases."""
         position, plugged = np.array(self._connector.position), self.plugged()
-        pads = (False, False) if plugged else self.pads_touching(self.cell.known.cable.hand)
+        pads = (False, False) if plugged else self.touching()[1]
         speed = math.hypot(*self._connector.velocity)
         self._phase.step(now, position, speed, pads, plugged, self.clip.holds)
         held = all(pads) and not plugged
@@ -127,6 +127,17 @@ class CableObjects(TaskObjects):
         if self.socket.holds and self._stand is None:
             return self.cell.known.cable.plugged_into
         return next((name for name, mouth in self.mouths.items() if mouth.holds), None)
+
+    def touching(self) -> tuple[str, tuple[bool, bool]]:
+        """The arm that holds the connector, and whether its left and right pad touch it.
+
+        Where none holds it, an arm that touches it, else the cell's hand.
+        """
+        hand = self.cell.known.cable.hand
+        touching = {hand: self.pads_touching(hand)}
+        if not all(touching[hand]):
+            touching |= {arm: self.pads_touching(arm) for arm in self._arms if arm != hand}
+        return max(touching.items(), key=lambda item: sum(item[1]))
 
     def pads_touching(self, arm: str) -> tuple[bool, bool]:
         """Whether the left and the right pad of that arm touch the connector now."""

@@ -92,7 +92,9 @@ class FakeMotion:
         self.clock, self.known = clock, known
         self.seconds = 0.2
         self.error: Exception | None = None
-        self.hand = RigidTransform.from_translation([0.3, 0.0, 0.4])
+        self.hand = known.cable.hand
+        self.hands: list[str] = [known.cable.hand]  # that can take the connector
+        self.tool_pose = RigidTransform.from_translation([0.3, 0.0, 0.4])
         self.grippers = {arm.name: FakeGripper(clock) for arm in known.arms}
         self.execution = Execution({}, self.grippers, {}, {}, clock, 0.0)  # for its jaws
         self.moves: list[tuple[str, Vector]] = []
@@ -102,6 +104,16 @@ class FakeMotion:
         self.stopped = 0
         self.rest: list[RigidTransform] = []
         self.reachable: Callable[[RigidTransform], bool] = lambda pose: True
+
+    def take_with(self, arm: str) -> None:
+        self.hand = arm
+
+    def hands_for(self, world_from_connector: RigidTransform) -> Request[list[str]]:
+        def steps() -> Generator[None, None, list[str]]:
+            yield from self._steps()
+            return self.hands
+
+        return Request(steps())
 
     def work(self, arm: str) -> Request[None]:
         """Any motion of an arm."""
@@ -147,7 +159,7 @@ class FakeMotion:
         return np.zeros(6)
 
     def tool(self, arm: str) -> RigidTransform:
-        return self.hand
+        return self.tool_pose
 
     def set_obstacles(self, points: Vector, spacing: float, unseen: Vector | None = None) -> None:
         pass
@@ -156,42 +168,42 @@ class FakeMotion:
         pass
 
     def pick_plug(self, plug: RigidTransform, *, point_cloud: PointCloud | None = None) -> Request[None]:
-        return self.work(self.known.cable.hand)
+        return self.work(self.hand)
 
     def pick_loose(
         self, world_from_connector: RigidTransform, *, point_cloud: PointCloud | None = None
     ) -> Request[None]:
-        return self.work(self.known.cable.hand)
+        return self.work(self.hand)
 
     def can_pick_loose(self, world_from_connector: RigidTransform) -> bool:
         return True
 
     def grip(self, world_from_connector: RigidTransform) -> Request[Grip]:
         def steps() -> Generator[None, None, Grip]:
-            closing = self.close(self.known.cable.hand, 2 * self.known.cable.connector.radius)
+            closing = self.close(self.hand, 2 * self.known.cable.connector.radius)
             while not closing.poll():
                 yield
-            return Grip(closing.answer, self.hand.inv() * world_from_connector)
+            return Grip(closing.answer, self.tool_pose.inv() * world_from_connector)
 
         return Request(steps())
 
     def watch_grip(self) -> GripWatch:
-        return GripWatch(self.grippers[self.known.cable.hand], 2 * self.known.cable.connector.radius)
+        return GripWatch(self.grippers[self.hand], 2 * self.known.cable.connector.radius)
 
     def pull_out(self, plug: RigidTransform) -> Request[None]:
-        return self.work(self.known.cable.hand)
+        return self.work(self.hand)
 
     def carry_to_clip(self, held: RigidTransform) -> Request[None]:
-        return self.work(self.known.cable.hand)
+        return self.work(self.hand)
 
     def insert(self, held: RigidTransform) -> Request[None]:
-        return self.work(self.known.cable.hand)
+        return self.work(self.hand)
 
     def let_go(self) -> Request[None]:
-        return self.release(self.known.cable.hand, 0.025)
+        return self.release(self.hand, 0.025)
 
     def draw_back(self) -> Request[str]:
-        back = self.shift(self.known.cable.hand, [-0.1, 0.0, 0.0])
+        back = self.shift(self.hand, [-0.1, 0.0, 0.0])
 
         def steps() -> Generator[None, None, str]:
             try:
@@ -204,14 +216,14 @@ class FakeMotion:
         return Request(steps(), back.cancel)
 
     def leave_clip(self) -> Request[None]:
-        return self.sleep(self.known.cable.hand)
+        return self.sleep(self.hand)
 
     def check_socket(self, name: str) -> None:
         if self.error:
             raise self.error
 
     def carry_to_socket(self, held: RigidTransform, name: str) -> Request[None]:
-        return self.work(self.known.cable.hand)
+        return self.work(self.hand)
 
     def plug_in(self, held: RigidTransform, name: str) -> Request[PluggedIn]:
         def steps() -> Generator[None, None, PluggedIn]:
@@ -219,10 +231,10 @@ class FakeMotion:
             yield from self._steps()
             return PluggedIn(2, np.array([0.0025, 0.00433]), 9.8765)
 
-        return Request(steps(), lambda: self.cancelled.append(self.known.cable.hand))
+        return Request(steps(), lambda: self.cancelled.append(self.hand))
 
     def leave_socket(self, name: str) -> Request[None]:
-        return self.sleep(self.known.cable.hand)
+        return self.sleep(self.hand)
 
     def search_views(self, last_seen: Vector | None) -> tuple[Vector, Iterator[Viewpoint]]:
         panel = next(box for box in self.known.boxes if box.name == "back_panel")

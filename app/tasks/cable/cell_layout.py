@@ -209,7 +209,7 @@ def _plug(document: Document, known: CableKnown) -> Iterator[Finding]:
 def _no_grasp(known: CableKnown) -> str | None:
     """Why the hand cannot take hold of the plugged connector among the known boxes; None when it can."""
     # late: they bring the planner and the compiler
-    from regrasp.motion.cable.service import UnplugParameters
+    from regrasp.motion.cable.taking import UnplugParameters
     from regrasp.motion.execution import JawParameters
     from regrasp.motion.failure import PlanningError
     from regrasp.motion.grasping.approach import pick_candidates

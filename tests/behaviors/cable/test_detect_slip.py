@@ -21,14 +21,14 @@ def stage(known: CableKnown, tmp_path: Path) -> Stage:
 
 
 def test_a_connector_in_the_hand_and_in_sight_is_watched_on(stage: Stage) -> None:
-    stage.perception.shows = lambda _, t: seen(t, stage.motion.hand.translation)
+    stage.perception.shows = lambda _, t: seen(t, stage.motion.tool_pose.translation)
     assert stage.run(stage.tree(WATCH), 3.0) is Status.RUNNING
     assert stage.belief.held is not None
     assert not stage.belief.notices
 
 
 def test_the_finger_gap_tells_of_an_end_that_stays_near(stage: Stage) -> None:
-    stage.perception.shows = lambda _, t: seen(t, stage.motion.hand.translation)
+    stage.perception.shows = lambda _, t: seen(t, stage.motion.tool_pose.translation)
     tree = stage.tree(WATCH)
     stage.run(tree, 1.0)
     stage.motion.grippers["right"].gap = 0.003
@@ -46,25 +46,25 @@ def test_the_finger_gap_tells_of_an_end_that_stays_near(stage: Stage) -> None:
 
 
 def test_an_end_seen_far_from_the_hand_has_slipped(stage: Stage) -> None:
-    away = stage.motion.hand.translation + np.array([0.0, 0.25, 0.0])
-    stage.perception.shows = lambda _, t: seen(t, stage.motion.hand.translation if t < 1.0 else away)
+    away = stage.motion.tool_pose.translation + np.array([0.0, 0.25, 0.0])
+    stage.perception.shows = lambda _, t: seen(t, stage.motion.tool_pose.translation if t < 1.0 else away)
     assert stage.run(stage.tree(WATCH), 3.0) is Status.FAILURE
     assert [notice.by for notice in stage.belief.notices] == ["distance"]
     assert 1.0 <= stage.clock.t <= 1.3
 
 
 def test_an_end_19_cm_away_has_not_slipped_by_the_thesis_s_limit(stage: Stage) -> None:
-    near = stage.motion.hand.translation + np.array([0.0, 0.19, 0.0])
+    near = stage.motion.tool_pose.translation + np.array([0.0, 0.19, 0.0])
     stage.perception.shows = lambda _, t: seen(t, near)
     assert stage.run(stage.tree(WATCH), 3.0) is Status.RUNNING
 
 
 def test_an_end_that_the_hand_hides_has_not_slipped(stage: Stage) -> None:
-    begin = stage.motion.hand.translation
+    begin = stage.motion.tool_pose.translation
     stage.perception.shows = lambda _, t: seen(t, begin) if t < 0.5 else unseen(t)
     tree = stage.tree(WATCH)
     stage.run(tree, 1.0)
-    stage.motion.hand = RigidTransform.from_translation(
+    stage.motion.tool_pose = RigidTransform.from_translation(
         np.add(begin, [0.0, 0.5, 0.0])
     )  # far from where it was last seen
     assert stage.run(tree, 4.0) is Status.RUNNING
@@ -72,7 +72,7 @@ def test_an_end_that_the_hand_hides_has_not_slipped(stage: Stage) -> None:
 
 
 def test_a_second_watch_forgets_the_readings_of_the_first(stage: Stage) -> None:
-    stage.perception.shows = lambda _, t: seen(t, stage.motion.hand.translation)
+    stage.perception.shows = lambda _, t: seen(t, stage.motion.tool_pose.translation)
     tree = stage.tree(WATCH)
     stage.motion.grippers["right"].gap = 0.003
     assert stage.run(tree, 1.0) is Status.FAILURE

@@ -35,7 +35,7 @@ def inserted(stage: Stage, held: RigidTransform, connector: RigidTransform) -> R
 def test_what_the_camera_sees_corrects_how_it_lies_in_the_hand(stage: Stage) -> None:
     held = RigidTransform.from_components([0.0, 0.0, 0.01], Rotation.from_euler("z", 90, degrees=True))
     really = RigidTransform.from_components([0.0, 0.005, 0.01], Rotation.from_euler("z", 105, degrees=True))
-    believed = inserted(stage, held, stage.motion.hand * really)
+    believed = inserted(stage, held, stage.motion.tool_pose * really)
     assert believed.translation == pytest.approx(really.translation, abs=1e-3)
     assert (believed.rotation.inv() * really.rotation).magnitude() < 0.01
 
@@ -43,7 +43,7 @@ def test_what_the_camera_sees_corrects_how_it_lies_in_the_hand(stage: Stage) -> 
 def test_it_does_not_turn_round_in_the_jaw(stage: Stage) -> None:
     """A finger beside it may look like the cable."""
     held = RigidTransform.from_components([0.0, 0.0, 0.01], Rotation.from_euler("z", 90, degrees=True))
-    mistaken = stage.motion.hand * held * RigidTransform.from_rotation(Rotation.from_euler("z", 165, degrees=True))
+    mistaken = stage.motion.tool_pose * held * RigidTransform.from_rotation(Rotation.from_euler("z", 165, degrees=True))
     x, y, z = mistaken.translation.tolist()
     ax, ay, az = mistaken.rotation.apply([1.0, 0.0, 0.0]).tolist()
     believed = inserted(stage, held, pose_along((x, y, z), (ax, ay, az)))

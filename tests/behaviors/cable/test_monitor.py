@@ -16,7 +16,7 @@ MONITOR = '<Monitor name="monitor" period="0.2"/>'
 def stage(known: CableKnown, tmp_path: Path) -> Stage:
     stage = Stage(known, tmp_path)
     stage.belief.held = RigidTransform.from_rotation(Rotation.from_euler("z", 90, degrees=True))
-    stage.perception.shows = lambda _, t: seen(t, stage.motion.hand.translation)
+    stage.perception.shows = lambda _, t: seen(t, stage.motion.tool_pose.translation)
     return stage
 
 

@@ -82,7 +82,7 @@ class Play:
         stage = Stage(known, folder)
         self.clock, self.slip = stage.clock, slip
         self.motion = BusyMotion(stage.clock, known)
-        self.motion.hand = RigidTransform.from_translation(known.cable.clip.seat)
+        self.motion.tool_pose = RigidTransform.from_translation(known.cable.clip.seat)
         self.hand = self.motion.grippers["right"] = Hand(stage.clock)
         self.eyes = Eyes(stage.clock, known, gone)
         services = replace(stage.services, motion=self.motion, perception=self.eyes)

@@ -43,7 +43,7 @@ def test_sight_corrects_the_tip_and_only_a_great_turn(stage: Stage, turn_deg: fl
     stage.belief.held = HELD
     turned = Rotation.from_euler("z", 90 + turn_deg, degrees=True)
     really = RigidTransform.from_components([0.002, 0.004, 0.01], turned)
-    stage.perception.shows = lambda _, t: lying(t, stage.motion.hand * really)
+    stage.perception.shows = lambda _, t: lying(t, stage.motion.tool_pose * really)
     assert stage.run(stage.tree(REPLUG), 60.0) is Status.SUCCESS
     [(_, held)] = stage.motion.plugged
     tip = [0.5 * stage.known.cable.connector.length, 0.0, 0.0]

@@ -1,0 +1,311 @@
+"""How an arm takes hold of the connector: which arm, and with which of the grasps."""
+
+from collections.abc import Callable, Collection, Generator, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from functools import partial
+
+import numpy as np
+from scipy.spatial.transform import RigidTransform
+
+from regrasp.interfaces.arrays import FloatArray
+from regrasp.interfaces.cable.cell import CableKnown
+from regrasp.interfaces.cable.motion import Grip
+from regrasp.interfaces.cause import CauseCode
+from regrasp.interfaces.cell import Box
+from regrasp.interfaces.devices import Arm, Clock, Gripper
+from regrasp.interfaces.request import Request
+from regrasp.interfaces.wall_time import counts_as
+from regrasp.motion.arguments import finite_pose
+from regrasp.motion.cable.cable_shape import cable_course
+from regrasp.motion.cable.carrying import CarryMotion, CarryMotionParameters
+from regrasp.motion.cable.seating import SeatingParameters, poses_before
+from regrasp.motion.failure import GraspEmptyError, PlanningError, TouchError
+from regrasp.motion.grasping.approach import pick_candidates
+from regrasp.motion.grasping.gap_test import GripWatch
+from regrasp.motion.grasping.grasps import Grasp
+from regrasp.motion.request import MotionRequest
+from regrasp.motion.robots.poses import angle_between, inverse, multiply
+from regrasp.motion.service import PointCloudSource
+
+NO_GRASP = (CauseCode.NO_COLLISION_FREE_GOAL, CauseCode.OUT_OF_REACH)
+
+
+@dataclass(frozen=True)
+class UnplugParameters:
+    """How the plug is gripped and drawn out."""
+
+    draw_out: float = 0.05  # m along the plug's axis; the plug sits 0.015 m deep
+    # m by which the plug lies nearer to the finger tips than the pads' middle: they end 12 mm past it, and the panel is
+    # 20 mm behind the plug
+    shallow: float = 0.008
+    retreat: float = 0.06  # m away from the panel then; choice
+    # of that, the first that is free; where none is, the way to the clip begins there; choice
+    retreat_shares: tuple[float, ...] = (1.0, 0.6, 0.3)
+
+
+@dataclass(frozen=True)
+class TakingParameters(CarryMotionParameters):
+    """Those of every task, of carrying, and of taking hold."""
+
+    # Two grasps nearer than so many m and rad are one: what closed on nothing is tried again after all others; choice
+    same_grasp: tuple[float, float] = (0.015, 0.35)
+    # m of clearance in the straight way in, from which on an arm has room: one that has less leaves it to another
+    # that has; choice, of the near margins
+    roomy: float = 0.014
+    stow_rolls: int = (
+        12  # angles about the connector at which it is asked whether a grasp can stow it; every 30 degrees
+    )
+    unplug: UnplugParameters = field(default_factory=UnplugParameters)
+    seating: SeatingParameters = field(default_factory=SeatingParameters)
+
+
+class TakingMotion(CarryMotion):
+    """Takes hold of the connector with the arm that can do it best."""
+
+    parameters: TakingParameters
+
+    def __init__(
+        self,
+        known: CableKnown,
+        arms: Mapping[str, Arm],
+        grippers: Mapping[str, Gripper],
+        clock: Clock,
+        seed: int,
+        parameters: TakingParameters,
+        on_anomaly: Callable[[str], None],
+    ) -> None:
+        super().__init__(known, arms, grippers, clock, seed, parameters, on_anomaly)
+        self._hand = known.cable.hand
+        self._missed: list[FloatArray] = []  # grasps (4, 4), connector_from_tool, that closed on nothing
+
+    @property
+    def hand(self) -> str:
+        """The arm that handles the cable now; at first the cell's."""
+        return self._hand
+
+    def take_with(self, arm: str) -> None:
+        """Let an arm handle the cable from now on. Raises KeyError if there is no arm of that name."""
+        self._hand = self.known.arm(arm).name
+
+    def hands_for(self, world_from_connector: RigidTransform) -> Request[list[str]]:
+        """The arms that can take the loose connector, the best first; the present hand where none can.
+
+        Best is one that can stow it with that grasp, then one whose way in leads through seen space, then one that has
+        room there, then the cell's hand.
+        """
+        finite_pose("the connector's pose", world_from_connector)
+        first = self.known.cable.hand
+
+        def steps() -> Generator[None, None, list[str]]:
+            ease: dict[str, int] = {}
+            for arm in sorted(self.arms, key=lambda arm: arm != first):
+                found = yield from self._ease(arm, world_from_connector)
+                if found is not None:
+                    ease[arm] = found
+            return sorted(ease, key=lambda arm: ease[arm]) or [self.hand]
+
+        return Request(steps())
+
+    def pick_plug(self, plug: RigidTransform, *, point_cloud: PointCloudSource | None = None) -> MotionRequest:
+        """`pick` the connector where it is plugged in, world_from_connector: a panel is near.
+
+        Preferably so that the hand is free where it has drawn the plug out.
+        """
+        finite_pose("the plug's pose", plug)
+        room = self._room_to_draw_out(plug)
+
+        def order(candidates: list[Grasp]) -> list[Grasp]:
+            return sorted(candidates, key=room)
+
+        return self._pick_connector(plug, self.parameters.unplug.shallow, None, point_cloud, order)
+
+    def pick_loose(
+        self,
+        world_from_connector: RigidTransform,
+        *,
+        point_cloud: PointCloudSource | None = None,
+    ) -> Request[None]:
+        """`pick` the connector where it hangs at the end of its cable, of which the arm keeps clear.
+
+        With a grasp from which the clip can be reached, if there is one.
+        """
+        finite_pose("the connector's pose", world_from_connector)
+        cable = cable_course(self.known, world_from_connector)
+
+        def steps() -> Iterator[None]:
+            stows = yield from self._stowing(self.hand, world_from_connector)
+            try:
+                if any(map(stows, self._candidates(self.hand, world_from_connector))):
+                    keep = partial(_only, stows)
+                    yield from self._done(self._pick_connector(world_from_connector, 0.0, cable, point_cloud, keep))
+                    return
+            except PlanningError as error:
+                if error.code not in NO_GRASP or isinstance(error, TouchError):
+                    raise
+                self._on_anomaly(f"of the grasps from which the clip can be reached: {error}")
+            yield from self._done(self._pick_connector(world_from_connector, 0.0, cable, point_cloud, list))
+
+        return self._together(self.hand, steps())
+
+    @counts_as("planning")
+    def can_pick_loose(self, world_from_connector: RigidTransform) -> bool:
+        """Whether an arm has a free grasp of the loose connector, with all space that no camera has seen for full."""
+        finite_pose("the connector's pose", world_from_connector)
+        return any(
+            self._has_grasp(arm, world_from_connector, self._candidates(arm, world_from_connector))
+            for arm in sorted(self.arms, key=lambda arm: arm != self.hand)
+        )
+
+    def grip(self, world_from_connector: RigidTransform) -> Request[Grip]:
+        """Close the hand's jaw on the connector; the answer is what it holds then. It fails as `close` does."""
+        finite_pose("the connector's pose", world_from_connector)
+
+        def steps() -> Generator[None, None, Grip]:
+            held = self.tool(self.hand).inv() * world_from_connector
+            try:
+                gap = yield from self._done(self.close(self.hand, 2 * self.known.cable.connector.radius))
+            except GraspEmptyError:
+                self._missed.append(held.inv().as_matrix())
+                raise
+            self._missed.clear()
+            return Grip(gap, self.tool(self.hand).inv() * world_from_connector)
+
+        return Request(steps())
+
+    def watch_grip(self) -> GripWatch:
+        """Begin to watch by the hand's pads whether it holds the connector."""
+        return GripWatch(
+            self.grippers[self.hand], 2 * self.known.cable.connector.radius, self.parameters.execution.jaw.grip.gap
+        )
+
+    def _ease(self, arm: str, connector: RigidTransform) -> Generator[None, None, int | None]:
+        """How easily an arm takes the loose connector, from 0 for best; None: not at all. See `hands_for`."""
+        candidates, stows = self._candidates(arm, connector), (yield from self._stowing(arm, connector))
+        groups = [list(filter(stows, candidates)), candidates]
+        margins, roomy = self.parameters.clearances.near_margins, (self.parameters.roomy,)
+        ways = [
+            (group, optimistic, near) for group in groups for optimistic in (False, True) for near in (roomy, margins)
+        ]
+        for n, (group, optimistic, near) in enumerate(ways):
+            yield
+            if group and self._has_grasp(arm, connector, group, optimistic, near):
+                return n
+        return None
+
+    @counts_as("planning")
+    def _has_grasp(
+        self,
+        arm: str,
+        connector: RigidTransform,
+        candidates: Sequence[Grasp],
+        optimistic: bool = False,
+        near_margins: tuple[float, ...] | None = None,
+    ) -> bool:
+        """Whether one of the candidates is free for an arm, clear of the cable; `near_margins` as in `Clearances`."""
+        self._keep_clear_but_near(cable_course(self.known, connector), connector.translation)
+        clearances = self.parameters.clearances
+        if near_margins is not None:
+            clearances = replace(clearances, near_margins=near_margins)
+        model = self.model(arm, opening=self.parameters.execution.jaw.open_gap, optimistic=optimistic)
+        with suppress(PlanningError):
+            return bool(self._approaches(arm, model, candidates, self._bracket_near(connector), optimistic, clearances))
+        return False
+
+    def _candidates(self, arm: str, connector: RigidTransform) -> list[Grasp]:
+        """Grasps of the loose connector, see `pick_candidates`."""
+        widest = self.known.arm(arm).robot.gripper.opening
+        return pick_candidates(connector, self.known.cable.connector, 0.0, widest, self.parameters.pick)
+
+    def _stowing(self, arm: str, connector: RigidTransform) -> Generator[None, None, Callable[[Grasp], bool]]:
+        """Steps that find which grasps of a connector let an arm bring it into the clip.
+
+        A turn about the connector's axis makes no difference: it may lie in the clip with any roll.
+        """
+        answers: dict[tuple[float, ...], bool] = {}
+        now, from_connector = connector.as_matrix(), inverse(connector.as_matrix())
+        for grasp in self._candidates(arm, connector):
+            held = multiply(inverse(grasp.pose), now)
+            key = _without_roll(multiply(from_connector, grasp.pose))
+            if key not in answers:
+                answers[key] = self._can_stow(arm, RigidTransform.from_matrix(held))
+                yield
+        return lambda grasp: answers.get(_without_roll(multiply(from_connector, grasp.pose)), True)
+
+    @counts_as("planning")
+    def _can_stow(self, arm: str, held: RigidTransform) -> bool:
+        """Whether an arm that holds the connector so (tool_from_connector) can stand before the clip and go in."""
+        clip, gap = self.known.cable.clip, 2 * self.known.cable.connector.radius
+        models = (
+            self.model(arm, held=self.held_spheres(held), opening=gap, optimistic=True),
+            self.model(arm, without=clip.bracket, opening=gap, optimistic=True),
+        )
+        seating = replace(self.parameters.seating, rolls=self.parameters.stow_rolls)
+        q = np.array(self.known.arm(arm).sleep)
+        return bool(poses_before(models, q, clip.world_from_seat, held, seating.straight_in, seating))
+
+    def _room_to_draw_out(self, plug: RigidTransform) -> Callable[[Grasp], int]:
+        """How a hand fares that draws out the plug (world_from_connector), by its grasp.
+
+        0: it is free then, 1: it may be, 2: it meets something.
+        """
+        kin, out = self.kinematics[self.hand], np.eye(4)
+        out[:3, 3] = -self.parameters.unplug.draw_out * plug.rotation.apply([1.0, 0.0, 0.0])
+        gap, margin = 2 * self.known.cable.connector.radius, self.parameters.clearances.tight_margin
+        models = [self.model(self.hand, opening=gap, optimistic=optimistic) for optimistic in (False, True)]
+
+        def room(grasp: Grasp) -> int:
+            ends = kin.ik(out @ grasp.pose)
+            free = (any(model.free(q, margin) for q in ends) for model in models)
+            return next((n for n, is_free in enumerate(free) if is_free), len(models))
+
+        return room
+
+    def _bracket_near(self, world_from_connector: RigidTransform) -> Collection[Box]:
+        """The clip's bracket, which a hand may touch that takes the connector out of the clip, or no box elsewhere."""
+        clip = self.known.cable.clip
+        off = float(np.linalg.norm(world_from_connector.translation - np.array(clip.seat)))
+        return clip.bracket if off < self.parameters.pick.jaw_reach else ()
+
+    def _pick_connector(
+        self,
+        world_from_connector: RigidTransform,
+        shallow: float,
+        cable: FloatArray | None,
+        point_cloud: PointCloudSource | None,
+        order: Callable[[list[Grasp]], list[Grasp]],
+    ) -> MotionRequest:
+        """`pick` the connector; what has closed on nothing is tried after all other grasps, which the `order` sorts."""
+        connector_from_world, near = inverse(world_from_connector.as_matrix()), self.parameters.same_grasp
+
+        def missed(grasp: Grasp) -> bool:
+            return any(_alike(connector_from_world @ grasp.pose, other, *near) for other in self._missed)
+
+        return self._pick(
+            self.hand,
+            world_from_connector,
+            self.known.cable.connector,
+            shallow,
+            cable,
+            self._bracket_near(world_from_connector),
+            point_cloud,
+            lambda candidates: sorted(order(candidates), key=missed),
+        )
+
+
+def _only(wanted: Callable[[Grasp], bool], candidates: list[Grasp]) -> list[Grasp]:
+    return list(filter(wanted, candidates))
+
+
+def _without_roll(connector_from_tool: FloatArray) -> tuple[float, ...]:
+    """What is left of a grasp (4, 4) when a turn about the connector's axis does not count, rounded to 1e-3.
+
+    Where along the axis and how far from it the tool is, how its axes lie to it, and to the line from the axis to it.
+    """
+    axes, place = connector_from_tool[:3, :3], connector_from_tool[:3, 3]
+    return tuple(np.round([place[0], np.hypot(place[1], place[2]), *axes[0]], 3).tolist())
+
+
+def _alike(pose: FloatArray, other: FloatArray, distance: float, angle: float) -> bool:
+    """Whether two poses (4, 4) are nearer than so many m and rad."""
+    return bool(np.linalg.norm(pose[:3, 3] - other[:3, 3]) < distance) and angle_between(pose, other) < angle
