@@ -7,6 +7,9 @@ from regrasp.interfaces.cause import CauseCode
 if TYPE_CHECKING:
     from regrasp.motion.robots.contact_guard import Touch
 
+# Causes after which there may be another way: by another arm, or with another map.
+NO_WAY = (CauseCode.NO_COLLISION_FREE_GOAL, CauseCode.PLANNING_FAILED, CauseCode.MOTION_BLOCKED)
+
 
 class PlanningError(Exception):
     """No motion was found, or it could not be carried out; `code` is the cause, the message says why, with numbers."""

@@ -19,7 +19,7 @@ from regrasp.interfaces.devices import Arm, Clock, Gripper
 from regrasp.interfaces.request import Request
 from regrasp.motion.arguments import finite_pose, not_negative, positive, rows, share, vector
 from regrasp.motion.execution import Execution, ExecutionParameters
-from regrasp.motion.failure import PlanningError, StoppedShortError, TouchError
+from regrasp.motion.failure import NO_WAY, PlanningError, StoppedShortError, TouchError
 from regrasp.motion.grasping.approach import Cylinder, PickParameters, find_approaches, pick_candidates, points_beyond
 from regrasp.motion.grasping.grasps import Grasp
 from regrasp.motion.planning.planner import PlannerParameters, plan
@@ -30,8 +30,6 @@ from regrasp.motion.robots.contact_guard import ContactLimits
 from regrasp.motion.robots.dynamics import ArmDynamics
 from regrasp.motion.scene.collision import Clearances, CollisionModel
 from regrasp.motion.scene.planning_scene import NO_POINTS, PlanningScene, PlanningSceneParameters
-
-NO_WAY = (CauseCode.NO_COLLISION_FREE_GOAL, CauseCode.PLANNING_FAILED, CauseCode.MOTION_BLOCKED)
 
 # Points (n, 3) m in the world that a camera saw from that second on; None while there is no such picture.
 PointCloudSource = Callable[[float], FloatArray | None]
@@ -87,7 +85,9 @@ class Motion(PlanningScene):
 
         `tight`: with a smaller margin where nothing else is found.
         """
-        return self._move(arm, goals, margin, tight)
+        goals = rows("the goals' joints", goals, len(self.kinematics[arm]))
+        _check_margin(margin)
+        return self.execution.request(arm, self._move_steps(arm, goals, margin, tight))
 
     def move_tool(
         self,
@@ -131,10 +131,23 @@ class Motion(PlanningScene):
     def sleep(self, arm: str, *, pulling: bool = False) -> MotionRequest:
         """Bring an arm to its sleep pose, out of the cameras' and the other arms' way.
 
-        `pulling`: it may pull something elastic along, which is no touch.
+        `pulling`: it may have caught on something elastic. Where it feels a touch each time, it goes on as if it had,
+        slowly, and pulls that along.
         """
-        contact = self._guard.pulling if pulling else None
-        return self._move(arm, np.array([self.known.arm(arm).sleep]), contact=contact)
+        goals = np.array([self.known.arm(arm).sleep])
+        if not pulling:
+            return self.move(arm, goals)
+
+        def steps() -> Iterator[None]:
+            try:
+                yield from self._move_steps(arm, goals, contact=self._guard.carrying, touches=2)
+            except TouchError as error:
+                self._on_anomaly(f"{error}: something elastic may hold it")
+                self.forget_felt()
+                speed = self.parameters.approach_speed
+                yield from self._move_steps(arm, goals, contact=self._guard.pulling, speed=speed)
+
+        return self.execution.request(arm, steps())
 
     def straight(
         self, arm: str, goal: RigidTransform, *, speed: float | None = None, pressing: bool = False
@@ -214,23 +227,27 @@ class Motion(PlanningScene):
         """Disable an arm or its jaw: every later request to it fails with this cause. Returns the error to raise."""
         return self.execution.give_up(arm, code, message)
 
-    def _move(
+    def _move_steps(
         self,
         arm: str,
         goals: FloatArray,
         margin: float | None = None,
         tight: bool = True,
         contact: ContactLimits | None = None,
-    ) -> MotionRequest:
-        """`move`; `contact` says what counts as a touch (default: of an arm that moves freely)."""
-        goals = rows("the goals' joints", goals, len(self.kinematics[arm]))
-        _check_margin(margin)
+        touches: int | None = None,
+        speed: float = 1.0,
+    ) -> Iterator[None]:
+        """The steps of `move`.
+
+        `contact` says what counts as a touch (default: of an arm that moves freely), `touches` how many end it,
+        `speed` is the greatest share of the joints' speed.
+        """
 
         def steps(optimistic: bool) -> Iterator[None]:
             path = self._plan(self.start_model(arm, optimistic=optimistic), self.joints(arm), goals, margin, tight)
-            yield from self.execution.follow(arm, path, self._pace(optimistic), contact)
+            yield from self.execution.follow(arm, path, min(speed, self._pace(optimistic)), contact)
 
-        return self.execution.request(arm, self._tries(arm, steps))
+        yield from self._tries(arm, steps, touches)
 
     def _shift(
         self,
@@ -300,10 +317,13 @@ class Motion(PlanningScene):
 
         return self.execution.request(arm, self._tries(arm, steps))
 
-    def _tries(self, arm: str, steps: Callable[[bool], Iterator[None]]) -> Iterator[None]:
-        """The steps, from the beginning after each touch, with what was felt on the map. Raises the last TouchError.
+    def _tries(self, arm: str, steps: Callable[[bool], Iterator[None]], most: int | None = None) -> Iterator[None]:
+        """The steps, from the beginning after each touch, with what was felt on the map.
+
+        Raises the last TouchError after the `most` touches (default: as set).
 
         They are told whether the map is to be read optimistically (see `model`): where nothing is found otherwise.
+        Where nothing is found even so, what was felt is forgotten: it may have been a little beside.
         """
         touches, optimistic = 0, False
         while True:
@@ -311,13 +331,15 @@ class Motion(PlanningScene):
                 yield from steps(optimistic)
             except TouchError as error:
                 place, touches = self.feel(arm, error.touch), touches + 1
-                if touches == self.parameters.touches:
+                if touches == (self.parameters.touches if most is None else most):
                     raise
                 self._on_anomaly(f"felt at {place.round(3).tolist()}: the {arm} arm looks for another way")
             except PlanningError as error:
-                if error.code not in NO_WAY or optimistic or isinstance(error, StoppedShortError):
+                if error.code not in NO_WAY or isinstance(error, StoppedShortError):
                     raise
-                optimistic = True
+                if optimistic and not self.forget_felt():
+                    raise
+                optimistic = not optimistic
             else:
                 return
 

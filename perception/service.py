@@ -17,7 +17,7 @@ from regrasp.interfaces.wall_time import counts_as
 from regrasp.perception.camera.health import CameraHealth, CameraHealthParameters
 from regrasp.perception.camera.model import NEAREST_DEPTH, pixel_rays
 from regrasp.perception.camera.registration import Registration, RegistrationParameters, expected_errors, register
-from regrasp.perception.mapping.occupancy import Occupancy, OccupancyParameters, Spared, Spheres
+from regrasp.perception.mapping.occupancy import Occupancy, OccupancyParameters, Spared, Spheres, Voxel
 from regrasp.perception.tracking.stillness import Stillness, StillnessParameters
 
 
@@ -141,7 +141,7 @@ class Perception:
         """
         before = deepcopy(self.occupancy)
         self.map_obstacles(camera)
-        points, mapped = self.occupancy.occupied_points(guessed=False), before.occupied_points()
+        points, mapped = self.occupancy.occupied_points(Voxel.SURFACE), before.occupied_points()
         if len(mapped) and len(points):
             near = self.parameters.mapped_distance
             points = points[cKDTree(mapped).query(points, distance_upper_bound=near)[0] > near]
@@ -153,7 +153,7 @@ class Perception:
 
     def obstacles(self) -> Obstacles:
         """The mapped obstacles."""
-        seen = self.occupancy.occupied_points(guessed=False)
+        seen = self.occupancy.occupied_points(Voxel.INSIDE)
         return Obstacles(seen, self.occupancy.voxel_size, self.occupancy.unseen_points())
 
     def watch_stillness(self, camera: str) -> StillnessWatch:

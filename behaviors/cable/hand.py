@@ -1,5 +1,6 @@
 """Steps that several of the cable's leaves share: looking, and what the hand does."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, TypeVar
 
@@ -9,7 +10,9 @@ from regrasp.behaviors.keys import Keys
 from regrasp.behaviors.leaf import LeafFailed, LeafSteps, StepsLeaf
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cable.cause import CableCause
-from regrasp.motion.failure import GraspEmptyError
+from regrasp.interfaces.cause import CauseCode
+from regrasp.interfaces.request import Request
+from regrasp.motion.failure import NO_WAY, GraspEmptyError, PlanningError
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import RigidTransform
@@ -67,6 +70,25 @@ class HandLeaf(CableLeaf):
         if held is None:
             raise LeafFailed(CableCause.SLIPPED, "the hand holds nothing any more")
         return held
+
+    def take(self, arms: Sequence[str], pick: Callable[[], Request[None]]) -> LeafSteps:
+        """Let the first of the `arms` that finds a way bring its jaw round the connector: the hand from now on.
+
+        One that finds none goes back to sleep. Raises the last one's PlanningError.
+        """
+        motion = self.services.motion
+        for arm in arms:
+            motion.take_with(arm)
+            try:
+                yield from self.ask(pick())
+                return
+            except PlanningError as error:
+                if error.code not in (*NO_WAY, CauseCode.OUT_OF_REACH):
+                    raise
+                yield from self.go_to_sleep(arm)
+                if arm == arms[-1]:
+                    raise
+                self.say("left to the other arm", arm=arm, why=str(error))
 
     def grip(self, world_from_connector: "RigidTransform") -> LeafSteps:
         """Close the jaw; then the belief is that it holds the connector. Raises PlanningError when it does not."""

@@ -1,6 +1,7 @@
 """Take the connector out of its socket; where sockets are is known."""
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, ClassVar
 
 from regrasp.behaviors.cable.hand import HandLeaf
@@ -21,7 +22,8 @@ class Unplug(HandLeaf):
     """Grips the connector in the `socket` of that name, draws it out along its axis, and away from the panel.
 
     A hand that closes on nothing tries again, with another grasp where there is one. Every other try goes by the
-    encoders alone: where things stand beside the arm, what a camera sees of it misleads.
+    encoders alone: where things stand beside the arm, what a camera sees of it misleads. Where the cell's hand finds
+    no way, another arm tries.
     """
 
     WRITES: ClassVar[Keys] = (HELD,)
@@ -39,10 +41,12 @@ class Unplug(HandLeaf):
         """See the class."""
         cable, motion = self.services.known.cable, self.services.motion
         plug = cable.socket(self.get_input("socket")).world_from_plug(cable.connector.length)
+        arms = sorted((arm.name for arm in self.services.known.arms), key=lambda name: name != cable.hand)
         for left in range(self.parameters.tries - 1, -1, -1):
             try:
                 by_sight = (self.parameters.tries - left) % 2 == 1
-                yield from self.ask(motion.pick_plug(plug, point_cloud=self.overview_points if by_sight else None))
+                points = self.overview_points if by_sight else None
+                yield from self.take(arms, partial(motion.pick_plug, plug, point_cloud=points))
                 yield from self.grip_or_leave(plug)
                 break
             except GraspEmptyError as error:

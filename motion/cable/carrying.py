@@ -18,12 +18,11 @@ from regrasp.motion.cable.held import connector_spheres
 from regrasp.motion.cable.natural_routes import NaturalRoutes
 from regrasp.motion.cable.search import SearchMotion, SearchMotionParameters
 from regrasp.motion.cable.tether import Tether, TetherParameters
-from regrasp.motion.failure import PlanningError, StoppedShortError, TouchError
+from regrasp.motion.failure import NO_WAY, PlanningError, StoppedShortError, TouchError
 from regrasp.motion.planning.straight import can_continue
 from regrasp.motion.request import MotionRequest
 from regrasp.motion.robots.contact_guard import ContactLimits
 from regrasp.motion.scene.collision import CollisionModel
-from regrasp.motion.service import NO_WAY
 
 T = TypeVar("T")
 

@@ -102,7 +102,7 @@ class PlanningScene:
 
         Not of what would be in the place of a sleeping arm: from there they came.
         """
-        model = self.model(arm, others=False)
+        model = self.model(arm)
         spheres, kin = model.spheres(touch.joints), self.kinematics[arm]
         place, inward = contact_place(
             kin, spheres, model.links, touch, model.clearances(touch.joints), self._scene_parameters.contact
@@ -115,6 +115,12 @@ class PlanningScene:
         self._felt.append((touch.stamp, felt))
         self._grids.clear()
         return place
+
+    def forget_felt(self) -> bool:
+        """Take what was felt off the map; whether there was any. Where a touch was is known to centimetres only."""
+        felt, self._felt = self._felt, []
+        self._grids.clear()
+        return bool(felt)
 
     def _within_reach(self, points: FloatArray) -> FloatArray:
         """The points (n, 3) m as far from an arm's base as it reaches, and `beyond_reach`; the grid grows no larger."""

@@ -31,6 +31,7 @@ class OccupancyParameters:
     known_margin: float = 0.025  # m; choice: depth scale 1.5 % of 0.85 m is 13 mm, camera pose 6 mm, noise 4 mm
     robot_margin: float = 0.02  # m; choice: arms are 5 mm off, depth scale 13 mm
     assumed_depth: float = 0.08  # m; choice: how far an obstacle reaches behind its surface until a view shows it
+    least_depth: float = 0.03  # m; choice: so far every obstacle reaches behind its surface, until a view shows it
     max_depth_step: float = 0.03  # m between neighbours; more is an edge, where readings fly between the surfaces
     max_cable_brightness: int = 45  # of 255; choice: the cable's 0.06 is 15 in full light
     cable_width: float = 0.0075  # m; choice: dark pixels nearer to lighter ones are cable (7 mm), or a dark thing's rim
@@ -54,7 +55,8 @@ class Voxel(IntEnum):
     UNSEEN = 0
     FREE = 1  # a ray passed through
     BEHIND = 2  # behind a seen surface: assumed full
-    SURFACE = 3  # seen
+    INSIDE = 3  # so near behind a seen surface that it belongs to the thing
+    SURFACE = 4  # seen
 
 
 class Occupancy:
@@ -81,12 +83,12 @@ class Occupancy:
         self._color = None if spared is None else SegmentationParameters.for_color(spared.color)
         self._thickness = 0.0 if spared is None else spared.thickness
 
-    def occupied_points(self, *, guessed: bool = True) -> FloatArray:
-        """Centres (n, 3) m, world frame, of the voxels seen to be full, and with `guessed` of those assumed to be."""
-        return np.asarray(self._centers[self._state >= (Voxel.BEHIND if guessed else Voxel.SURFACE)])
+    def occupied_points(self, least: Voxel = Voxel.BEHIND) -> FloatArray:
+        """Centres (n, 3) m, world frame, of the voxels that are full, or assumed to be, from `least` on."""
+        return np.asarray(self._centers[self._state >= least])
 
     def unseen_points(self) -> FloatArray:
-        """Centres (n, 3) m, world frame, of the voxels that are only assumed to be full: behind a seen surface."""
+        """Centres (n, 3) m, world frame, of the voxels that may as well be empty: further behind a seen surface."""
         return np.asarray(self._centers[self._state == Voxel.BEHIND])
 
     def integrate(
@@ -121,8 +123,7 @@ class Occupancy:
         pixels = np.nan_to_num(np.rint(project(local, k)), nan=-1.0)
         seen = np.flatnonzero(np.all((pixels >= 0) & (pixels < [k.width, k.height]), axis=1))
         u, v = pixels[seen].astype(int).T
-        assumed_depth = self._parameters.assumed_depth if guess_behind else 0.0
-        self._update(seen, local[seen, 2], depth[v, u], free_depth[v, u], solid[v, u], assumed_depth)
+        self._update(seen, local[seen, 2], depth[v, u], free_depth[v, u], solid[v, u], guess_behind)
 
     def _update(
         self,
@@ -131,20 +132,23 @@ class Occupancy:
         reading: DepthImage,
         free_depth: DepthImage,
         solid: Mask,
-        assumed_depth: float,
+        guess_behind: bool,
     ) -> None:
         """Compare voxels `seen` (n,) at depth `z` (m) with their pixels: the `reading`, and the end of free space."""
         free = z < free_depth
         surface = solid & (np.abs(z - reading) <= self.voxel_size)
-        behind = solid & (z > reading + self.voxel_size) & (z <= reading + assumed_depth)
         state = self._state[seen]
         near_enough = z <= self._parameters.overrule_range * self._range[seen]
-        may_change = (state == Voxel.UNSEEN) | (state == Voxel.BEHIND) | near_enough
+        may_change = (state == Voxel.UNSEEN) | (state == Voxel.BEHIND) | (state == Voxel.INSIDE) | near_enough
         for shown, value in ((free, Voxel.FREE), (surface, Voxel.SURFACE)):
             chosen = seen[shown & may_change]
             self._state[chosen] = value
             self._range[chosen] = z[shown & may_change]
-        self._state[seen[behind & (state == Voxel.UNSEEN)]] = Voxel.BEHIND
+        if guess_behind:
+            values = self._parameters
+            for depth, value in ((values.assumed_depth, Voxel.BEHIND), (values.least_depth, Voxel.INSIDE)):
+                behind = solid & (z > reading + self.voxel_size) & (z <= reading + depth)
+                self._state[seen[behind & (state <= Voxel.BEHIND) & (state != Voxel.FREE)]] = value
 
     def _spared(self, rgb: ColorImage) -> NDArray[np.uint8]:
         """255 where the colour is that of the spared thing, else 0; (H, W)."""
