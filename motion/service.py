@@ -23,12 +23,14 @@ from regrasp.motion.failure import PlanningError, StoppedShortError, TouchError
 from regrasp.motion.grasping.approach import Cylinder, PickParameters, find_approaches, pick_candidates, points_beyond
 from regrasp.motion.grasping.grasps import Grasp
 from regrasp.motion.planning.planner import PlannerParameters, plan
+from regrasp.motion.planning.separation import SeparationParameters, SpeedBySeparation
 from regrasp.motion.planning.straight import can_continue, straight_line
 from regrasp.motion.request import MotionRequest
 from regrasp.motion.robots.arm_offsets import JointOffsetParameters, joint_offsets
 from regrasp.motion.robots.contact_guard import ContactLimits
 from regrasp.motion.robots.dynamics import ArmDynamics
 from regrasp.motion.scene.collision import Clearances, CollisionModel
+from regrasp.motion.scene.distance_grid import NO_SURFACES
 from regrasp.motion.scene.planning_scene import NO_POINTS, PlanningScene, PlanningSceneParameters
 
 NO_WAY = (CauseCode.NO_COLLISION_FREE_GOAL, CauseCode.PLANNING_FAILED, CauseCode.MOTION_BLOCKED)
@@ -43,12 +45,14 @@ class MotionParameters:
 
     approach_speed: float = 0.3  # share of the joints' speed on straight paths near things; choice
     optimistic_speed: float = 0.3  # share of the joints' speed on a path that may touch something; choice
+    pulling_speed: float = 0.5  # share at most of one that pulls an elastic thing, and feels little else; choice
     touches: int = 6  # that end a motion; after each before it the arm goes on by another way; choice
     camera_timeout: float = 1.0  # s that a camera has to show the arm; a sound one needs 0.2
     clearances: Clearances = field(default_factory=Clearances)
     execution: ExecutionParameters = field(default_factory=ExecutionParameters)
     pick: PickParameters = field(default_factory=PickParameters)
     planner: PlannerParameters = field(default_factory=PlannerParameters)
+    separation: SeparationParameters = field(default_factory=SeparationParameters)
     joint_offsets: JointOffsetParameters = field(default_factory=JointOffsetParameters)
     scene: PlanningSceneParameters = field(default_factory=PlanningSceneParameters)
 
@@ -78,9 +82,11 @@ class Motion(PlanningScene):
         self._clock, self._seed = clock, seed
 
     def warm_up(self) -> None:
-        """Load the compiled functions of a collision check now, so that no tick waits for it."""
+        """Load the compiled functions of collision checks and of the timing now, so that no tick waits for it."""
         for arm in self.arms:
-            self.model(arm).free(self.joints(arm), 0.0)
+            model, q = self.model(arm), self.joints(arm)
+            model.free(q, 0.0)
+            model.along(q[None], q[None], NO_SURFACES)
 
     def move(self, arm: str, goals: FloatArray, *, margin: float | None = None, tight: bool = True) -> MotionRequest:
         """Plan a path to one of the goals (k, n) and follow it, `margin` m from everything (default: as set).
@@ -124,14 +130,14 @@ class Motion(PlanningScene):
                 if kin.robot.rail is None:
                     raise
                 path = path_to(kin.ik(world_from_tool))
-            yield from self.execution.follow(arm, path, self._pace(optimistic))
+            yield from self._follow(arm, path, self._pace(optimistic), model)
 
         return self.execution.request(arm, self._tries(arm, steps))
 
     def sleep(self, arm: str, *, pulling: bool = False) -> MotionRequest:
         """Bring an arm to its sleep pose, out of the cameras' and the other arms' way.
 
-        `pulling`: it may pull something elastic along, which is no touch.
+        `pulling`: it may pull something elastic along, which is no touch; it then goes more slowly.
         """
         contact = self._guard.pulling if pulling else None
         return self._move(arm, np.array([self.known.arm(arm).sleep]), contact=contact)
@@ -148,7 +154,8 @@ class Motion(PlanningScene):
 
         def steps() -> Iterator[None]:
             path = straight_line(self.kinematics[arm], self.joints(arm), goal)
-            yield from self.execution.follow(arm, path, of_limits, self._guard.pressing if pressing else None)
+            contact = self._guard.pressing if pressing else None
+            yield from self._follow(arm, path, of_limits, self.model(arm), contact)
 
         return self.execution.request(arm, steps())
 
@@ -227,8 +234,9 @@ class Motion(PlanningScene):
         _check_margin(margin)
 
         def steps(optimistic: bool) -> Iterator[None]:
-            path = self._plan(self.start_model(arm, optimistic=optimistic), self.joints(arm), goals, margin, tight)
-            yield from self.execution.follow(arm, path, self._pace(optimistic), contact)
+            model = self.start_model(arm, optimistic=optimistic)
+            path = self._plan(model, self.joints(arm), goals, margin, tight)
+            yield from self._follow(arm, path, self._pace(optimistic), model, contact)
 
         return self.execution.request(arm, self._tries(arm, steps))
 
@@ -253,8 +261,10 @@ class Motion(PlanningScene):
                 # Where it stands no camera sees: at this speed it may go back through what it hides.
                 model = self.start_model(arm, held=held, without=without, optimistic=True)
                 self._check_shift(model, path, float(np.linalg.norm(way)))
+            else:
+                model = self.model(arm, held=held)
             limits = contact if checked else self._guard.pressing
-            yield from self.execution.follow(arm, path, self.parameters.approach_speed, limits)
+            yield from self._follow(arm, path, self.parameters.approach_speed, model, limits)
 
         return self.execution.request(arm, steps())
 
@@ -291,16 +301,30 @@ class Motion(PlanningScene):
             self.grippers[arm].open(jaw.open_gap)
             path = self._plan(model, q, np.array([approach[0] for approach in approaches]))
             approach = min(approaches, key=lambda approach: float(np.abs(approach[0] - path[-1]).max()))
-            yield from self.execution.follow(arm, path, self._pace(optimistic))
+            yield from self._follow(arm, path, self._pace(optimistic), model)
             yield from self.execution.open_jaw(arm, jaw.open_gap - jaw.slack)
             offsets = yield from self._measure_offsets(arm, point_cloud)
             # With offsets the arm goes first to where it should stand now.
             approach = approach - offsets if offsets.any() else approach[1:]
             approach = np.vstack([self.joints(arm), approach])
-            yield from self.execution.follow(arm, approach, self.parameters.approach_speed)
+            yield from self._follow(arm, approach, self.parameters.approach_speed, model)
             self.keep_clear(NO_POINTS)
 
         return self.execution.request(arm, self._tries(arm, steps))
+
+    def _follow(
+        self, arm: str, path: FloatArray, speed: float, model: CollisionModel, contact: ContactLimits | None = None
+    ) -> Iterator[None]:
+        """`Execution.follow`, slowly where the arm, as it is in `model`, comes near to what was seen or felt.
+
+        Also near to space that no camera has seen, however the map was read for the path. An arm that pulls something
+        elastic goes no faster than `pulling_speed`.
+        """
+        if contact is not None and contact.elastic:
+            speed = min(speed, self.parameters.pulling_speed)
+        surfaces = self._grid()
+        allowed = None if surfaces is None else SpeedBySeparation(model, surfaces, self.parameters.separation)
+        yield from self.execution.follow(arm, path, speed, contact, allowed)
 
     def _tries(self, arm: str, steps: Callable[[bool], Iterator[None]]) -> Iterator[None]:
         """The steps, from the beginning after each touch, with what was felt on the map. Raises the last TouchError.
