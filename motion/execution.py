@@ -12,7 +12,7 @@ from regrasp.interfaces.robot.chain import Chain
 from regrasp.interfaces.trajectory import Trajectory
 from regrasp.motion.failure import GraspEmptyError, PlanningError, StoppedShortError, TouchError
 from regrasp.motion.grasping.gap_test import GapParameters, GripWatch
-from regrasp.motion.planning.timing import JointLimits, TimingParameters, time_path
+from regrasp.motion.planning.timing import JointLimits, PathSpeed, TimingParameters, time_path
 from regrasp.motion.request import MotionRequest
 from regrasp.motion.robots.arm_watch import ArmWatch, ArmWatchParameters, remaining_waypoints
 from regrasp.motion.robots.contact_guard import (
@@ -122,23 +122,36 @@ class Execution:
         self._out_of_order[arm] = PlanningError(code, message)
         return self._out_of_order[arm]
 
-    def follow(self, arm: str, path: FloatArray, speed: float, contact: ContactLimits | None = None) -> Iterator[None]:
+    def follow(
+        self,
+        arm: str,
+        path: FloatArray,
+        speed: float,
+        contact: ContactLimits | None = None,
+        allowed: PathSpeed | None = None,
+    ) -> Iterator[None]:
         """Steps that bring an arm along a joint path (k, n), at `speed` in (0, 1] of the joints' limits.
+
+        Slower where less is `allowed`.
 
         An arm that falls behind is stopped and led on, slower each time. One that touches something stops at once and
         goes a little way back; `contact` says what counts as a touch (default: of an arm that moves freely). Raises
         TouchError then, PlanningError ARM_FAILED when it never follows or its encoder readings are implausible, and
         StoppedShortError when it ends off its goal, or never follows while something elastic may hold it back.
         """
-        yield from self._follow(arm, self._from_command(arm, path), speed, contact or self.parameters.guard.free)
+        limits = contact or self.parameters.guard.free
+        yield from self._follow(arm, self._from_command(arm, path), speed, limits, allowed)
 
-    def _follow(self, arm: str, path: FloatArray, speed: float, contact: ContactLimits) -> Iterator[None]:
+    def _follow(
+        self, arm: str, path: FloatArray, speed: float, contact: ContactLimits, allowed: PathSpeed | None = None
+    ) -> Iterator[None]:
         moved = self._watches[arm].moved_alone(self._arms[arm].reading())
         if moved is not None:
             raise self.give_up(arm, CauseCode.ARM_FAILED, moved)
         share = self._speed_share[arm]
         for _ in range(self.parameters.attempts):
-            trajectory = time_path(path, self._limits[arm], speed * self._speed_share[arm], self.parameters.timing)
+            of_limits, timing = speed * self._speed_share[arm], self.parameters.timing
+            trajectory = time_path(path, self._limits[arm], of_limits, timing, allowed)
             yield from self._pause(self._latency)
             guard = self._guard(arm, contact)
             trouble, elapsed = yield from self._run(arm, trajectory, guard)

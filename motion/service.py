@@ -23,12 +23,14 @@ from regrasp.motion.failure import NO_WAY, PlanningError, StoppedShortError, Tou
 from regrasp.motion.grasping.approach import Cylinder, PickParameters, find_approaches, pick_candidates, points_beyond
 from regrasp.motion.grasping.grasps import Grasp
 from regrasp.motion.planning.planner import PlannerParameters, plan
+from regrasp.motion.planning.separation import SeparationParameters, SpeedBySeparation
 from regrasp.motion.planning.straight import can_continue, straight_line
 from regrasp.motion.request import MotionRequest
 from regrasp.motion.robots.arm_offsets import JointOffsetParameters, joint_offsets
 from regrasp.motion.robots.contact_guard import ContactLimits
 from regrasp.motion.robots.dynamics import ArmDynamics
 from regrasp.motion.scene.collision import Clearances, CollisionModel
+from regrasp.motion.scene.distance_grid import NO_SURFACES
 from regrasp.motion.scene.planning_scene import NO_POINTS, PlanningScene, PlanningSceneParameters
 
 # Points (n, 3) m in the world that a camera saw from that second on; None while there is no such picture.
@@ -41,12 +43,14 @@ class MotionParameters:
 
     approach_speed: float = 0.3  # share of the joints' speed on straight paths near things; choice
     optimistic_speed: float = 0.3  # share of the joints' speed on a path that may touch something; choice
+    pulling_speed: float = 0.5  # share at most of one that pulls an elastic thing, and feels little else; choice
     touches: int = 6  # that end a motion; after each before it the arm goes on by another way; choice
     camera_timeout: float = 1.0  # s that a camera has to show the arm; a sound one needs 0.2
     clearances: Clearances = field(default_factory=Clearances)
     execution: ExecutionParameters = field(default_factory=ExecutionParameters)
     pick: PickParameters = field(default_factory=PickParameters)
     planner: PlannerParameters = field(default_factory=PlannerParameters)
+    separation: SeparationParameters = field(default_factory=SeparationParameters)
     joint_offsets: JointOffsetParameters = field(default_factory=JointOffsetParameters)
     scene: PlanningSceneParameters = field(default_factory=PlanningSceneParameters)
 
@@ -76,9 +80,11 @@ class Motion(PlanningScene):
         self._clock, self._seed = clock, seed
 
     def warm_up(self) -> None:
-        """Load the compiled functions of a collision check now, so that no tick waits for it."""
+        """Load the compiled functions of collision checks and of the timing now, so that no tick waits for it."""
         for arm in self.arms:
-            self.model(arm).free(self.joints(arm), 0.0)
+            model, q = self.model(arm), self.joints(arm)
+            model.free(q, 0.0)
+            model.along(q[None], q[None], NO_SURFACES)
 
     def move(self, arm: str, goals: FloatArray, *, margin: float | None = None, tight: bool = True) -> MotionRequest:
         """Plan a path to one of the goals (k, n) and follow it, `margin` m from everything (default: as set).
@@ -124,7 +130,7 @@ class Motion(PlanningScene):
                 if kin.robot.rail is None:
                     raise
                 path = path_to(kin.ik(world_from_tool))
-            yield from self.execution.follow(arm, path, self._pace(optimistic))
+            yield from self._follow(arm, path, self._pace(optimistic), model)
 
         return self.execution.request(arm, self._tries(arm, steps))
 
@@ -144,8 +150,7 @@ class Motion(PlanningScene):
             except TouchError as error:
                 self._on_anomaly(f"{error}: something elastic may hold it")
                 self.forget_felt()
-                speed = self.parameters.approach_speed
-                yield from self._move_steps(arm, goals, contact=self._guard.pulling, speed=speed)
+                yield from self._move_steps(arm, goals, contact=self._guard.pulling)
 
         return self.execution.request(arm, steps())
 
@@ -161,7 +166,8 @@ class Motion(PlanningScene):
 
         def steps() -> Iterator[None]:
             path = straight_line(self.kinematics[arm], self.joints(arm), goal)
-            yield from self.execution.follow(arm, path, of_limits, self._guard.pressing if pressing else None)
+            contact = self._guard.pressing if pressing else None
+            yield from self._follow(arm, path, of_limits, self.model(arm), contact)
 
         return self.execution.request(arm, steps())
 
@@ -235,17 +241,16 @@ class Motion(PlanningScene):
         tight: bool = True,
         contact: ContactLimits | None = None,
         touches: int | None = None,
-        speed: float = 1.0,
     ) -> Iterator[None]:
         """The steps of `move`.
 
-        `contact` says what counts as a touch (default: of an arm that moves freely), `touches` how many end it,
-        `speed` is the greatest share of the joints' speed.
+        `contact` says what counts as a touch (default: of an arm that moves freely), `touches` how many end it.
         """
 
         def steps(optimistic: bool) -> Iterator[None]:
-            path = self._plan(self.start_model(arm, optimistic=optimistic), self.joints(arm), goals, margin, tight)
-            yield from self.execution.follow(arm, path, min(speed, self._pace(optimistic)), contact)
+            model = self.start_model(arm, optimistic=optimistic)
+            path = self._plan(model, self.joints(arm), goals, margin, tight)
+            yield from self._follow(arm, path, self._pace(optimistic), model, contact)
 
         yield from self._tries(arm, steps, touches)
 
@@ -270,8 +275,10 @@ class Motion(PlanningScene):
                 # Where it stands no camera sees: at this speed it may go back through what it hides.
                 model = self.start_model(arm, held=held, without=without, optimistic=True)
                 self._check_shift(model, path, float(np.linalg.norm(way)))
+            else:
+                model = self.model(arm, held=held)
             limits = contact if checked else self._guard.pressing
-            yield from self.execution.follow(arm, path, self.parameters.approach_speed, limits)
+            yield from self._follow(arm, path, self.parameters.approach_speed, model, limits)
 
         return self.execution.request(arm, steps())
 
@@ -306,16 +313,30 @@ class Motion(PlanningScene):
             self.grippers[arm].open(jaw.open_gap)
             path = self._plan(model, q, np.array([approach[0] for approach in approaches]))
             approach = min(approaches, key=lambda approach: float(np.abs(approach[0] - path[-1]).max()))
-            yield from self.execution.follow(arm, path, self._pace(optimistic))
+            yield from self._follow(arm, path, self._pace(optimistic), model)
             yield from self.execution.open_jaw(arm, jaw.open_gap - jaw.slack)
             offsets = yield from self._measure_offsets(arm, point_cloud)
             # With offsets the arm goes first to where it should stand now.
             approach = approach - offsets if offsets.any() else approach[1:]
             approach = np.vstack([self.joints(arm), approach])
-            yield from self.execution.follow(arm, approach, self.parameters.approach_speed)
+            yield from self._follow(arm, approach, self.parameters.approach_speed, model)
             self.keep_clear(NO_POINTS)
 
         return self.execution.request(arm, self._tries(arm, steps))
+
+    def _follow(
+        self, arm: str, path: FloatArray, speed: float, model: CollisionModel, contact: ContactLimits | None = None
+    ) -> Iterator[None]:
+        """`Execution.follow`, slowly where the arm, as it is in `model`, comes near to what was seen or felt.
+
+        Also near to space that no camera has seen, however the map was read for the path. An arm that pulls something
+        elastic goes no faster than `pulling_speed`.
+        """
+        if contact is not None and contact.elastic:
+            speed = min(speed, self.parameters.pulling_speed)
+        surfaces = self.all_seen()
+        allowed = None if surfaces is None else SpeedBySeparation(model, surfaces, self.parameters.separation)
+        yield from self.execution.follow(arm, path, speed, contact, allowed)
 
     def _tries(self, arm: str, steps: Callable[[bool], Iterator[None]], most: int | None = None) -> Iterator[None]:
         """The steps, from the beginning after each touch, with what was felt on the map.

@@ -88,7 +88,7 @@ class CarryMotion(SearchMotion):
             natural = max_bend is not None and np.isfinite(max_bend)
             limits = self._along_cable(self._guard.carrying if natural else self._guard.pulling, held)
             try:
-                yield from self.execution.follow(arm, path, min(speed, self._pace(optimistic)), limits)
+                yield from self._follow(arm, path, min(speed, self._pace(optimistic)), model, limits)
             except TouchError:
                 yield from self._while_open(arm)
                 raise

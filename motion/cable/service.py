@@ -61,6 +61,7 @@ class CableMotion(TakingMotion):
 
         The compiled functions of a pick and of carrying are then loaded now, and no tick waits for it.
         """
+        super().warm_up()
         cable = self.known.cable
         plugged = cable.socket(cable.plugged_into).world_from_plug(cable.connector.length)
         for arm in self.arms:

@@ -2,9 +2,11 @@
 
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Protocol
 
 import numpy as np
 from scipy.interpolate import BPoly
+from scipy.ndimage import minimum_filter1d
 
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.trajectory import Trajectory
@@ -34,16 +36,33 @@ class JointLimits:
         return np.asarray(np.minimum(self.speeds, self.accelerations * seconds))
 
 
+class PathSpeed(Protocol):
+    """How fast an arm may go along a path, by where it is."""
+
+    def __call__(self, path: FloatArray, slopes: FloatArray) -> FloatArray:
+        """The greatest rates (k,) 1/s of the path's parameter; infinity where any is right.
+
+        `path` (k, n) are the joints at k values of the parameter, `slopes` (k, n) their derivatives by it.
+        """
+        ...
+
+
 def time_path(
-    path: FloatArray, limits: JointLimits, speed: float = 1.0, parameters: TimingParameters = TimingParameters()
+    path: FloatArray,
+    limits: JointLimits,
+    speed: float = 1.0,
+    parameters: TimingParameters = TimingParameters(),
+    allowed: PathSpeed | None = None,
 ) -> Trajectory:
     r"""Trajectory along the joint path (k, n), at rest at both ends; it cuts corners by at most `corner` / 2 rad.
 
-    `speed` in (0, 1] slows the whole motion down in proportion. Raises RuntimeError where no timing is found.
+    `speed` in (0, 1] slows the whole motion down in proportion. Only where that is too fast do the rates that are
+    `allowed` slow it down further. Raises RuntimeError where no timing is found.
 
     Along the blended path :math:`q(s)` it finds the fastest :math:`s(t)` (TOPP-RA, Pham and Pham 2018) with
 
-    .. math:: |q'(s) \dot s| \le v_{max}, \quad |q'(s) \ddot s + q''(s) \dot s^2| \le a_{max}
+    .. math:: |q'(s) \dot s| \le v_{max}, \quad |q'(s) \ddot s + q''(s) \dot s^2| \le a_{max},
+        \quad \dot s \le \dot s_{max}(q, q')
     """
     path = np.asarray(path, float).reshape(-1, len(limits.speeds))
     fastest = limits.braking_within(parameters.stop_time)
@@ -53,7 +72,9 @@ def time_path(
     curve = _blended(path, parameters.corner)
     velocity = parameters.limit_share * fastest
     acceleration = parameters.limit_share * limits.accelerations
-    timed = time_optimal(curve, _grid(curve.x, parameters.grid_step), velocity, acceleration)
+    grid = _grid(curve.x, parameters.grid_step)
+    rates = None if allowed is None else _rates(curve, grid, allowed, speed)
+    timed = time_optimal(curve, grid, velocity, acceleration, rates)
     if timed is None:
         raise RuntimeError(f"toppra found no timing for a path of {len(path)} waypoints")
     count = max(2, int(np.ceil(timed.duration / (speed * parameters.sample))) + 1)
@@ -62,6 +83,15 @@ def time_path(
     velocities[[0, -1]] = 0.0
     stretch = max(1.0, _overshoot(t, positions, velocities, fastest, limits.accelerations)) / speed
     return Trajectory(t * stretch, positions, velocities / stretch)
+
+
+def _rates(curve: BPoly, grid: FloatArray, allowed: PathSpeed, speed: float) -> FloatArray | None:
+    """The rates (k,) 1/s that are allowed at the grid points before `speed` stretches time; None where all are.
+
+    What holds at a grid point holds up to the next ones on either side: surfaces are not met at grid points only.
+    """
+    rates = allowed(curve(grid), curve.derivative()(grid)) / speed
+    return minimum_filter1d(rates, 3, mode="nearest") if np.isfinite(rates).any() else None
 
 
 def _blended(path: FloatArray, max_cut: float) -> BPoly:

@@ -40,20 +40,39 @@ with _empty_pyplot():
 
 toppra.setup_logging("ERROR")
 
+_ANY_RATE = 1e3  # 1/s of the path's parameter, rad: more than any joint turns; toppra's solver takes no infinity
 
-def time_optimal(curve: BPoly, grid: FloatArray, velocity: FloatArray, acceleration: FloatArray) -> Any:
+
+def time_optimal(
+    curve: BPoly, grid: FloatArray, velocity: FloatArray, acceleration: FloatArray, rates: FloatArray | None = None
+) -> Any:
     """toppra's trajectory along a curve in joint space, at rest at both ends; None where it finds none.
 
-    `grid` (n,) are values of the curve's parameter; `velocity` (n,) and `acceleration` (n,) are limits.
+    `grid` (k,) are values of the curve's parameter; `velocity` (n,) and `acceleration` (n,) are limits, and so are
+    `rates` (k,), if given: of the parameter, 1/s.
     """
     constraints = [
         toppra.constraint.JointVelocityConstraint(np.column_stack([-velocity, velocity])),
         toppra.constraint.JointAccelerationConstraint(np.column_stack([-acceleration, acceleration])),
     ]
+    if rates is not None:
+        constraints.append(_RateConstraint(rates))
     algorithm = toppra.algorithm.TOPPRA(
         constraints, _Path(curve), gridpoints=grid, parametrizer="ParametrizeConstAccel"
     )
     return algorithm.compute_trajectory(0, 0)
+
+
+class _RateConstraint(toppra.constraint.LinearConstraint):  # type: ignore[misc,unused-ignore]
+    """Limits (k,) 1/s on the rate of the path's parameter at the grid points."""
+
+    def __init__(self, rates: FloatArray) -> None:
+        super().__init__()
+        self._squares = np.minimum(rates, _ANY_RATE) ** 2
+
+    def compute_constraint_params(self, path: Any, gridpoints: FloatArray) -> tuple[FloatArray | None, ...]:
+        """What toppra asks of a constraint; of seven terms only the bounds on the square of the rate are there."""
+        return (None,) * 6 + (np.column_stack([np.zeros(len(gridpoints)), self._squares]),)
 
 
 class _Path(toppra.interpolator.AbstractGeometricPath):  # type: ignore[misc,unused-ignore]

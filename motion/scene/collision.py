@@ -16,9 +16,10 @@ from regrasp.motion.robots.forward import link_frames_in, spheres_in, world_sphe
 from regrasp.motion.robots.kinematics import ArmKinematics
 from regrasp.motion.robots.spheres import CAMERA_ACROSS, CAMERA_RADIUS
 from regrasp.motion.scene.bounds import bounding_spheres, group_pairs, group_starts, groups_meet, square_distance
-from regrasp.motion.scene.distance_grid import FREE_DISTANCE, DistanceGrid
+from regrasp.motion.scene.distance_grid import FREE_DISTANCE, NO_SURFACES, DistanceGrid
 
 _CAMERA, _CARRIED = -1, -2  # parts that are no links of the robot
+_DIFFERENCE = 1e-4  # of a path's parameter, for a difference quotient
 _ITSELF, _GRID, _OTHER_ARM = -1, -2, -3  # what a clearance is to, when it is not a box
 
 
@@ -124,6 +125,21 @@ def _clearances(q, base, joints, links, local, boxes, distance, lower, h):  # ty
 
 
 @nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
+def _along(path, slopes, base, joints, links, local, distance, lower, h):  # type: ignore[no-untyped-def]
+    """See `CollisionModel.along`."""
+    clearances, ways = np.empty((2, path.shape[0], local.shape[0]))
+    for k in range(path.shape[0]):
+        step = 0.5 * _DIFFERENCE * slopes[k]
+        before = world_spheres(base, joints, path[k] - step, links, local)
+        after = world_spheres(base, joints, path[k] + step, links, local)
+        for n in range(local.shape[0]):
+            middle = 0.5 * (before[n, :3] + after[n, :3])
+            clearances[k, n] = grid_distance(middle, distance, lower, h) - local[n, 3]
+            ways[k, n] = np.sqrt(square_distance(before[n, :3], after[n])) / _DIFFERENCE
+    return clearances, ways
+
+
+@nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
 def _meets_box(p, reach, boxes):  # type: ignore[no-untyped-def]
     """Whether a point is nearer than `reach` to a box; most boxes are ruled out by the first axis."""
     for b in range(boxes.shape[0]):
@@ -220,7 +236,7 @@ class CollisionModel:
         self._constraint: Constraint | None = None
         self._names = [box.name for box in boxes]
         links, parts, local, pairs = _body_spheres(kinematics, body)
-        distance = grid or DistanceGrid(np.full((1, 1, 1), FREE_DISTANCE, np.float32), np.zeros(3), 1e-3)
+        distance = grid or NO_SURFACES
         self._arguments = (
             kinematics.base,
             kinematics.joints,
@@ -285,6 +301,17 @@ class CollisionModel:
         """Least distances (n,) m of the arm's `spheres` to boxes and seen surfaces."""
         base, joints, _, links, local, _, boxes, _, *grid = self._arguments[:-1]
         return np.asarray(_clearances(np.asarray(q, float), base, joints, links, local, boxes, *grid))
+
+    def along(self, path: FloatArray, slopes: FloatArray, grid: DistanceGrid) -> tuple[FloatArray, FloatArray]:
+        """The distances (k, m) m of the arm's m `spheres` to a grid's surfaces along a path (k, n) of the joints.
+
+        And how far (k, m) m each moves for a unit of the parameter by which the path's derivatives are `slopes` (k, n).
+        """
+        base, joints, _, links, local = self._arguments[:5]
+        rows = np.ascontiguousarray(path, float), np.ascontiguousarray(slopes, float)
+        surfaces = np.ascontiguousarray(grid.distance), grid.lower, float(grid.h)
+        clearances, ways = _along(*rows, base, joints, links, local, *surfaces)
+        return np.asarray(clearances), np.asarray(ways)
 
     @property
     def links(self) -> NDArray[np.int64]:

@@ -91,3 +91,6 @@ class DistanceGrid:
         found = np.full(len(points), FREE_DISTANCE, np.float32)
         found[inside] = self.distance[tuple(index[inside].T)]
         return found
+
+
+NO_SURFACES = DistanceGrid(np.full((1, 1, 1), FREE_DISTANCE, np.float32), np.zeros(3), 1e-3)

@@ -63,7 +63,8 @@ class PlanningScene:
         }
         self._boxes = known.solids()
         self._grids: dict[bool, DistanceGrid | None] = {}  # optimistic or not; made when asked for
-        self._points = self._unseen = self._more = NO_POINTS
+        self._all_seen: DistanceGrid | None = None  # made when asked for
+        self._points = self._unseen = self._more = self._all_points = NO_POINTS
         self._felt: list[tuple[float, FloatArray]] = []  # when, and points (n, 3) m
         self._spacing = 0.01  # m, until the first voxels come
 
@@ -78,6 +79,7 @@ class PlanningScene:
         margin = self._scene_parameters.arm_margin
         self._points, self._spacing = self._within_reach(points), positive("the spacing", spacing)
         self._unseen = self._within_reach(NO_POINTS if unseen is None else unseen)
+        seen = self._points
         now = max((arm.reading().stamp for arm in self.arms.values()), default=0.0)
         self._felt = [(at, felt) for at, felt in self._felt if at > now - self._scene_parameters.felt_time]
         for spec in self.known.arms:
@@ -85,7 +87,8 @@ class PlanningScene:
                 spheres = self.model(spec.name, others=False).spheres(q)
                 self._points = _points_beyond(self._points, spheres, margin)
                 self._unseen = _points_beyond(self._unseen, spheres, margin)
-        self._grids.clear()
+        self._all_points = seen
+        self._forget_grids()
 
     @counts_as("planning")
     def keep_clear(self, points: FloatArray) -> None:
@@ -94,7 +97,7 @@ class PlanningScene:
         Points that no arm reaches do not count. Raises ValueError for points that are not finite.
         """
         self._more = self._within_reach(points)
-        self._grids.clear()
+        self._forget_grids()
 
     @counts_as("planning")
     def feel(self, arm: str, touch: Touch) -> FloatArray:
@@ -113,14 +116,18 @@ class PlanningScene:
                 felt, self.model(spec.name, others=False).spheres(np.array(spec.sleep)), self._spacing
             )
         self._felt.append((touch.stamp, felt))
-        self._grids.clear()
+        self._forget_grids()
         return place
 
     def forget_felt(self) -> bool:
         """Take what was felt off the map; whether there was any. Where a touch was is known to centimetres only."""
         felt, self._felt = self._felt, []
-        self._grids.clear()
+        self._forget_grids()
         return bool(felt)
+
+    def _forget_grids(self) -> None:
+        self._grids.clear()
+        self._all_seen = None
 
     def _within_reach(self, points: FloatArray) -> FloatArray:
         """The points (n, 3) m as far from an arm's base as it reaches, and `beyond_reach`; the grid grows no larger."""
@@ -146,6 +153,13 @@ class PlanningScene:
             return DistanceGrid(np.full((1, 1, 1), FREE_DISTANCE, np.float32), np.zeros(3), 1e-3)
         lower, upper = points.min(axis=0) - border, points.max(axis=0) + border
         return DistanceGrid.from_points(points, lower, upper, self._spacing, least=not optimistic)
+
+    @counts_as("planning")
+    def all_seen(self) -> DistanceGrid | None:
+        """The least distances to all points, those too that may be an arm itself, where it is now or sleeps."""
+        if self._all_seen is None and len(points := np.vstack([self._all_points, self._map(optimistic=False)])):
+            self._all_seen = self._grid_of(points, optimistic=False)
+        return self._all_seen
 
     def _grid(self, optimistic: bool = False) -> DistanceGrid | None:
         """The least distances to all points, or the likely ones to those that were seen; None where there are none."""
@@ -177,7 +191,7 @@ class PlanningScene:
             self._unseen = _points_beyond(self._unseen, spheres, reach)
             self._more = _points_beyond(self._more, spheres, reach)
             self._felt = [(at, _points_beyond(felt, spheres, reach)) for at, felt in self._felt]
-            self._grids.clear()
+            self._forget_grids()
             model = self.model(arm, held=held, without=without, opening=opening, optimistic=optimistic)
         return model
 

@@ -96,6 +96,44 @@ def test_an_arm_that_pulls_something_elastic_and_falls_behind_is_blocked_but_in_
     assert rig.motion.joints("right") == pytest.approx(ASIDE)
 
 
+def test_an_arm_goes_slowly_beside_what_was_seen_and_fast_elsewhere(rig: Rig) -> None:
+    model = rig.motion.model("right", others=False)
+    hand = model.spheres(READY)[-1, :3]
+    path, separation = np.vstack([ASIDE, READY]), rig.motion.parameters.separation
+
+    def fastest(points: Points) -> tuple[float, float]:
+        """The fastest that a sphere is (m/s) whose clearance allows no more than `slow`, and any at all."""
+        rig.motion.set_obstacles(points, 0.01)
+        rig.motion.stop()
+        rig.arms["right"].at = ASIDE
+        rig.run(rig.motion.execution.request("right", rig.motion._follow("right", path, 1.0, model)))
+        trajectory, near, anywhere = rig.arms["right"].followed[-1][1], 0.0, 0.0
+        for t in np.arange(0.0, trajectory.duration - 0.01, 0.01):
+            before, after = (model.spheres(trajectory.sample(t + dt)[0]) for dt in (0.0, 0.001))
+            speeds = np.linalg.norm(after[:, :3] - before[:, :3], axis=1) / 0.001
+            gaps = np.linalg.norm(before[:, None, :3] - points, axis=2).min(axis=1) - before[:, 3]
+            near = max(near, *speeds[gaps < separation.touching], 0.0)
+            anywhere = max(anywhere, *speeds)
+        return near, anywhere
+
+    wall = cube(np.add(hand, [0.0, 0.06, 0.0]))  # beside the goal; the hand comes on from the other side
+    near, anywhere = fastest(wall)
+    assert 0.5 * separation.slow < near <= 1.05 * separation.slow
+    assert anywhere > 2 * separation.slow
+    far = fastest(np.add(wall, [0.0, 0.0, 1.0]))[1]
+    assert far == pytest.approx(anywhere, rel=0.2)
+
+
+def test_an_arm_that_pulls_something_elastic_takes_its_time(rig: Rig) -> None:
+    durations = []
+    for pulling in (False, True):
+        rig.motion.stop()
+        rig.arms["right"].at = READY
+        rig.run(rig.motion.sleep("right", pulling=pulling))
+        durations.append(rig.arms["right"].followed[-1][1].duration)
+    assert durations[1] == pytest.approx(durations[0] / rig.motion.parameters.pulling_speed, rel=0.05)
+
+
 def test_an_arm_that_comes_free_ends_where_planned(rig: Rig) -> None:
     rig.arms["right"].stuck = 0.3
     task = rig.motion.move("right", READY[None])

@@ -1,3 +1,4 @@
+from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
@@ -8,11 +9,12 @@ from hypothesis.extra.numpy import arrays
 
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.trajectory import Trajectory
-from regrasp.motion.planning.timing import JointLimits, TimingParameters, time_path
+from regrasp.motion.planning.timing import JointLimits, PathSpeed, TimingParameters, time_path
 
 ACCELERATION = 5.0  # rad/s2 of every joint
 LIMITS = JointLimits(np.full(6, np.pi), np.full(6, ACCELERATION))
 STOP_TIME = TimingParameters().stop_time
+LEVERS = np.array([0.7, 0.7, 0.4, 0.2, 0.2, 0.1])  # m that the far end moves by a rad
 paths = st.integers(2, 6).flatmap(lambda k: arrays(float, (k, 6), elements=st.floats(-2, 2, width=32)))
 
 
@@ -68,3 +70,56 @@ def test_one_row_is_a_trajectory_that_stays() -> None:
 def test_half_the_speed_takes_twice_as_long() -> None:
     path = np.array([np.zeros(6), np.ones(6), [1, 1, 1, 0, 0, 0.0]])
     assert time_path(path, LIMITS, speed=0.5).duration == pytest.approx(2 * time_path(path, LIMITS).duration, rel=0.05)
+
+
+def at_most(speed: Callable[[FloatArray], FloatArray]) -> PathSpeed:
+    """Lets all joints move the far end together by no more than `speed` (k,) m/s, by the joints (k, 6)."""
+
+    def allowed(path: FloatArray, slopes: FloatArray) -> FloatArray:
+        return np.asarray(speed(path) / np.maximum(np.abs(slopes) @ LEVERS, 1e-9))
+
+    return allowed
+
+
+@settings(max_examples=40, deadline=None)
+@given(paths, st.sampled_from([1.0, 0.7, 0.3]), st.integers(0, 2**32 - 1))
+def test_a_speed_that_changes_along_the_path_is_kept_at_every_moment(path: FloatArray, speed: float, seed: int) -> None:
+    across = np.random.default_rng(seed).uniform(-1, 1, 6)
+
+    def least(q: FloatArray) -> FloatArray:
+        return np.asarray(0.25 + 0.15 * np.sin(q @ across))
+
+    trajectory = time_path(path, LIMITS, speed, allowed=at_most(least))
+    positions, velocities = finely(trajectory)
+    if len(positions) > 2:
+        assert np.all(np.abs(velocities) @ LEVERS <= 1.02 * least(positions))
+        assert np.all(np.abs(np.diff(velocities, axis=0)) / 0.002 < ACCELERATION * 1.01)
+    assert not trajectory.velocities[[0, -1]].any()
+    assert max((distance_to_path(p, path) for p in positions[::10]), default=0.0) < 0.06
+
+
+@settings(max_examples=20, deadline=None)
+@given(paths)
+def test_a_speed_that_is_free_everywhere_changes_nothing(path: FloatArray) -> None:
+    def anywhere(q: FloatArray) -> FloatArray:
+        return np.full(len(q), np.inf)
+
+    plain, free = (time_path(path, LIMITS, 0.7, allowed=allowed) for allowed in (None, at_most(anywhere)))
+    assert np.array_equal(plain.times, free.times)
+    assert np.array_equal(plain.positions, free.positions)
+    assert np.array_equal(plain.velocities, free.velocities)
+
+
+@pytest.mark.parametrize("speed", [1.0, 0.5])
+def test_only_the_half_of_a_path_with_a_limit_is_slow(speed: float) -> None:
+    path = np.outer([-1.0, 1.0], np.eye(6)[0])
+
+    def second_half(q: FloatArray) -> FloatArray:
+        return np.where(q[:, 0] > 0.0, 0.20, np.inf)
+
+    trajectory = time_path(path, LIMITS, speed, allowed=at_most(second_half))
+    positions, velocities = finely(trajectory)
+    fast = velocities[positions[:, 0] < -0.5, 0].max()
+    assert fast == pytest.approx(finely(time_path(path, LIMITS, speed))[1].max(), rel=0.02)
+    slow = LEVERS[0] * velocities[positions[:, 0] > 0.0, 0]
+    assert slow.max() == pytest.approx(0.20, rel=0.02)
