@@ -99,6 +99,9 @@ class FakeMotion:
         self.shifts: list[tuple[str, Vector]] = []
         self.cancelled: list[str] = []
         self.plugged: list[tuple[str, RigidTransform]] = []  # sockets, and how the hand held the connector
+        self.inserted: list[tuple[int, RigidTransform]] = []  # which try, and how the hand held the connector
+        self.clip_stiffness: Callable[[int], float] = lambda insertion: 1600.0  # N/m, after so many insertions
+        self.insertions = 4
         self.stopped = 0
         self.rest: list[RigidTransform] = []
         self.reachable: Callable[[RigidTransform], bool] = lambda pose: True
@@ -184,8 +187,17 @@ class FakeMotion:
     def carry_to_clip(self, held: RigidTransform) -> Request[None]:
         return self.work(self.known.cable.hand)
 
-    def insert(self, held: RigidTransform) -> Request[None]:
+    def insert(self, held: RigidTransform, attempt: int = 0) -> Request[None]:
+        self.inserted.append((attempt, held))
         return self.work(self.known.cable.hand)
+
+    def pull_at_clip(self, held: RigidTransform) -> Request[Evidence]:
+        def steps() -> Generator[None, None, Evidence]:
+            yield from self._steps()
+            stiffness = self.clip_stiffness(len(self.inserted))
+            return Evidence(stiffness > 600.0, "pull", stiffness, 600.0, f"it rose by {stiffness:.0f} N/m")
+
+        return Request(steps(), lambda: self.cancelled.append(self.known.cable.hand))
 
     def let_go(self) -> Request[None]:
         return self.release(self.known.cable.hand, 0.025)
@@ -239,7 +251,9 @@ class FakeMotion:
     def view_of(self, place: Vector, world_from_camera: RigidTransform) -> View:
         return self._first_view(views_of(place, world_from_camera, VIEWING.spiral.distance))
 
-    def best_view(self, world_from_connector: RigidTransform, taken: Sequence[Vector] = ()) -> View:
+    def best_view(
+        self, world_from_connector: RigidTransform, taken: Sequence[Vector] = (), past: str | None = None
+    ) -> View:
         return self._first_view([world_from_connector])
 
     def go_to_view(self, view: View) -> Request[None]:
