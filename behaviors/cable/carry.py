@@ -18,6 +18,8 @@ class InsertParameters:
 
     look_time: float = 0.8  # s of looking; choice
     seat_time: float = 0.6  # s of waiting; the clip's lips take 0.2 s to close
+    # before which try the other arm's camera looks where the hand hides the connector; that takes 7 to 10 s; choice
+    other_look: int = 0
 
 
 class Carry(HandLeaf):
@@ -46,7 +48,7 @@ class Insert(LookInHand, LookLeaf):
         motion = self.services.motion
         for attempt in range(motion.insertions):
             seen = yield from self.look_in_hand(self.parameters.look_time)
-            if not seen and attempt == 0:
+            if not seen and attempt == self.parameters.other_look:
                 yield from self._look_with_the_other_arm()
             yield motion.insert(self.held(), attempt)
             yield from self.wait(self.parameters.seat_time)

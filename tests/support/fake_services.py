@@ -88,6 +88,8 @@ class FakeGripper:
 class FakeMotion:
     """A motion takes `seconds`, after which its `error` is raised if there is one."""
 
+    insertions = 4
+
     def __init__(self, clock: Clock, known: CableKnown) -> None:
         self.clock, self.known = clock, known
         self.seconds = 0.2
@@ -101,7 +103,6 @@ class FakeMotion:
         self.plugged: list[tuple[str, RigidTransform]] = []  # sockets, and how the hand held the connector
         self.inserted: list[tuple[int, RigidTransform]] = []  # which try, and how the hand held the connector
         self.clip_stiffness: Callable[[int], float] = lambda insertion: 1600.0  # N/m, after so many insertions
-        self.insertions = 4
         self.stopped = 0
         self.rest: list[RigidTransform] = []
         self.reachable: Callable[[RigidTransform], bool] = lambda pose: True
