@@ -16,7 +16,7 @@ class GentlePullParameters:
     # m back from the seat, at each of which is felt: the clip's lips pull with 1.5 N/mm over 10 mm
     ways: tuple[float, ...] = (0.0015, 0.003, 0.0045)
     speed: float = 0.4  # share of the joints' speed in the small steps; choice
-    # N/m that the force rises at least where something holds. Measured, 20 seeds on Earth and 20 without gravity: in the
+    # N/m that the force rises at least where something holds. Measured, 20 seeds on Earth, 20 without gravity: in the
     # clip 1490 to 1650; at the seat with open lips up to 90, 35 mm short of it up to 50, 35 mm beside it up to 260
     stiffness: float = 600.0
 
