@@ -5,7 +5,10 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Evidence:
-    """The result of the test `by`: the measured `value` (m), the `limit` (m) for it, and a sentence with both."""
+    """The result of the test `by`: the measured `value`, the `limit` for it, and a sentence with both.
+
+    They are in m; those of a pull in N/m.
+    """
 
     detected: bool
     by: str

@@ -5,8 +5,11 @@ from typing import ClassVar
 
 from regrasp.behaviors.cable.hand import HandLeaf, LookInHand
 from regrasp.behaviors.cable.keys import HELD
+from regrasp.behaviors.cable.look import LookLeaf
 from regrasp.behaviors.keys import Keys
-from regrasp.behaviors.leaf import LeafSteps
+from regrasp.behaviors.leaf import LeafFailed, LeafSteps
+from regrasp.interfaces.cable.cause import CableCause
+from regrasp.motion.failure import PlanningError
 
 
 @dataclass(frozen=True)
@@ -15,6 +18,8 @@ class InsertParameters:
 
     look_time: float = 0.8  # s of looking; choice
     seat_time: float = 0.6  # s of waiting; the clip's lips take 0.2 s to close
+    # before which try the other arm's camera looks where the hand hides the connector; that takes 7 to 10 s; choice
+    other_look: int = 0
 
 
 class Carry(HandLeaf):
@@ -27,14 +32,42 @@ class Carry(HandLeaf):
         yield self.services.motion.carry_to_clip(self.held())
 
 
-class Insert(LookInHand):
-    """Looks how the connector lies in the hand, and brings it straight into the clip."""
+class Insert(LookInHand, LookLeaf):
+    """Looks how the connector lies in the hand, brings it straight into the clip, and pulls gently.
+
+    Where the hand hides it from the overview camera, the other arm's camera looks, if it can. Where the clip does not
+    hold it, the hand comes back out, looks again, and tries as if it lay a little otherwise. When no try is left, the
+    leaf fails; the jaw is still closed then.
+    """
 
     NEEDS: ClassVar[Keys] = (HELD,)
     parameters: ClassVar[InsertParameters] = InsertParameters()
 
     def steps(self) -> LeafSteps:
         """See the class."""
-        yield from self.look_in_hand(self.parameters.look_time)
-        yield self.services.motion.insert(self.held())
-        yield from self.wait(self.parameters.seat_time)
+        motion = self.services.motion
+        for attempt in range(motion.insertions):
+            seen = yield from self.look_in_hand(self.parameters.look_time)
+            if not seen and attempt == self.parameters.other_look and self.search_arm != self.hand:
+                yield from self._look_with_the_other_arm()
+            yield motion.insert(self.held(), attempt)
+            yield from self.wait(self.parameters.seat_time)
+            pull = yield from self.ask(motion.pull_at_clip(self.held()))
+            self.say("pulled at the clip", stiffness=round(pull.value), holds=pull.detected)
+            if pull.detected:
+                return
+        raise LeafFailed(CableCause.NOT_STOWED, f"the clip does not hold the connector: {pull.sentence}")
+
+    def _look_with_the_other_arm(self) -> LeafSteps:
+        """Look in the hand with the camera that searches. Where it cannot look there, only an event says so."""
+        motion, perception = self.services.motion, self.services.perception
+        connector = motion.tool(self.hand) * self.held()
+        try:
+            yield from self.ask(motion.go_to_view(motion.best_view(connector, past=self.hand)))
+            looked = yield from self.ask(
+                perception.watch(self.search, self.parameters.look_time, settle=self.looking.settle_time)
+            )
+            self.correct_held(looked.estimates)
+            yield from self.go_to_sleep(self.search_arm)
+        except PlanningError as error:
+            self.say("no look in the hand", why=str(error))

@@ -1,6 +1,6 @@
 """Steps that several of the cable's leaves share: looking, and what the hand does."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, TypeVar
 
@@ -10,6 +10,7 @@ from regrasp.behaviors.keys import Keys
 from regrasp.behaviors.leaf import LeafFailed, LeafSteps, StepsLeaf
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cable.cause import CableCause
+from regrasp.interfaces.cable.sight import Estimate
 from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.request import Request
 from regrasp.motion.failure import NO_WAY, GraspEmptyError, PlanningError
@@ -119,23 +120,27 @@ class LookInHand(HandLeaf):
 
     WRITES: ClassVar[Keys] = (HELD,)
 
-    def look_in_hand(self, seconds: float, least_turn_deg: float = 0.0) -> LeafSteps:
+    def look_in_hand(self, seconds: float, least_turn_deg: float = 0.0) -> Generator[Request[None] | None, None, bool]:
         """Correct the belief of how the connector lies in the hand by what the overview camera sees of it.
 
-        A turn by less than `least_turn_deg` is taken for an error of the sight.
+        A turn by less than `least_turn_deg` is taken for an error of the sight. Returns whether it was seen.
         """
-        motion, perception = self.services.motion, self.services.perception
         # Only later frames: in this moment the hand may still move.
-        looked = yield from self.ask(perception.watch(self.overview, seconds, later=True))
-        seen = looked.estimates
+        looked = yield from self.ask(self.services.perception.watch(self.overview, seconds, later=True))
+        return self.correct_held(looked.estimates, least_turn_deg)
+
+    def correct_held(self, seen: Sequence[Estimate], least_turn_deg: float = 0.0) -> bool:
+        """Correct the belief of how the connector lies in the hand by what was seen of it; whether that was enough."""
+        motion, perception = self.services.motion, self.services.perception
         held = self.read(HELD, None)
         found = None
         if held is not None:
             found = perception.in_hand(seen, motion.tool(self.hand), held, least_turn_deg=least_turn_deg)
         if found is None:
             self.say("the hand hides the connector", frames=len(seen))
-            return
+            return False
         shift, turn = round(found.shift, 4), round(found.turn_deg, 1)
         self.say("connector in the hand", whole=found.whole, shift=shift, turn_deg=turn, trusted=found.trusted)
         if found.trusted:
             self.write(HELD, found.pose)
+        return True

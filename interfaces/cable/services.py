@@ -76,8 +76,17 @@ class CableMotionService(MotionService, Protocol):
         """Bring the held connector before the clip."""
         ...
 
-    def insert(self, held: "RigidTransform") -> Request[None]:
-        """Bring the held connector straight into the clip."""
+    @property
+    def insertions(self) -> int:
+        """How many different tries `insert` knows."""
+        ...
+
+    def insert(self, held: "RigidTransform", attempt: int = 0) -> Request[None]:
+        """Bring the held connector straight into the clip; at each later `attempt` as if it lay a little otherwise."""
+        ...
+
+    def pull_at_clip(self, held: "RigidTransform") -> Request[Evidence]:
+        """Pull gently at the inserted connector; whether the clip holds it. If not, the hand goes back before it."""
         ...
 
     def let_go(self) -> Request[None]:
@@ -124,10 +133,12 @@ class CableMotionService(MotionService, Protocol):
         """A view of a `place` (3,) m that was glimpsed from a camera. Raises PlanningError when there is none."""
         ...
 
-    def best_view(self, world_from_connector: "RigidTransform", taken: Sequence[FloatArray] = ()) -> View:
+    def best_view(
+        self, world_from_connector: "RigidTransform", taken: Sequence[FloatArray] = (), past: str | None = None
+    ) -> View:
         """A view of the whole connector from a side that is not among the lines of sight `taken` (3,).
 
-        Raises PlanningError when there is none.
+        `past`: the arm that holds it, past which its ends show. Raises PlanningError when there is none.
         """
         ...
 

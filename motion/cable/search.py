@@ -88,23 +88,26 @@ class SearchMotion(Motion):
         return self._first_view(views_of(place, world_from_camera, self.parameters.viewing.spiral.distance))
 
     @counts_as("planning")
-    def best_view(self, world_from_connector: RigidTransform, taken: Sequence[FloatArray] = ()) -> View:
+    def best_view(
+        self, world_from_connector: RigidTransform, taken: Sequence[FloatArray] = (), past: str | None = None
+    ) -> View:
         """The best viewpoint that shows the whole connector, from another side than the lines of sight `taken` (3,).
 
-        One whose line of sight leads through unseen space is taken only where there is no other.
+        Where an arm holds it, both its ends show `past` that. One whose line of sight leads through unseen space is
+        taken only where there is no other.
 
         Raises PlanningError when there is none.
         """
         finite_pose("the connector's pose", world_from_connector)
         viewing = self.parameters.viewing
-        points = outline(world_from_connector, self.known.cable.connector.length)
+        points = outline(world_from_connector, self.known.cable.connector.length)[:: 1 if past is None else 2]
         for optimistic in (False, True):
             model = self.model(self.search_arm, optimistic=optimistic)
             for pose in closer_views(world_from_connector, viewing.close_views):
                 sight = pose.rotation.apply([0.0, 0.0, 1.0])
                 if any(float(sight @ other) > viewing.max_cosine for other in taken):
                     continue
-                if self.sees(pose, points, optimistic) and len(goals := self._view_goals(pose, model)):
+                if self.sees(pose, points, optimistic, past) and len(goals := self._view_goals(pose, model)):
                     return View(pose, goals)
         raise PlanningError(CauseCode.OUT_OF_REACH, "no free place from which the whole connector shows")
 

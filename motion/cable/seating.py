@@ -27,6 +27,9 @@ class SeatingParameters:
     # share of the joints' speed on the way there: twice as fast, a foam block is pressed with twice the force; choice
     speed_to: float = 0.35
     speed_in: float = 0.2  # share of the joints' speed on the way in; choice
+    # Ways in which the connector may lie in the hand other than believed, one a try: m nearer to the finger tips, and
+    # degrees about the pads' normal. The clip's lips take what is 20 mm and 20 degrees off; choice
+    tries: tuple[tuple[float, float], ...] = ((0.0, 0.0), (-0.012, 0.0), (0.0, 20.0), (0.0, -20.0))
 
     @property
     def straight_in(self) -> list[FloatArray]:
@@ -87,6 +90,12 @@ def seated_pose(tool: RigidTransform, seat: RigidTransform, held: RigidTransform
     now = tool.as_matrix()
     poses = _seated_poses(seat, held, np.linspace(-np.pi, np.pi, rolls))
     return RigidTransform.from_matrix(min(poses, key=lambda pose: angle_between(now, pose)))
+
+
+def lying_otherwise(held: RigidTransform, outwards: float, turn_deg: float) -> RigidTransform:
+    """tool_from_connector of one that lies so much nearer (m) to the finger tips than `held`, and turned in the jaw."""
+    turn = Rotation.from_euler("y", turn_deg, degrees=True)
+    return RigidTransform.from_components(held.translation + np.array([outwards, 0.0, 0.0]), turn * held.rotation)
 
 
 def _seated_poses(seat: RigidTransform, held: RigidTransform, rolls: FloatArray) -> FloatArray:

@@ -13,17 +13,20 @@ from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.cell import Box
 from regrasp.interfaces.devices import Arm, Clock, Gripper
+from regrasp.interfaces.evidence import Evidence
 from regrasp.interfaces.request import Request
 from regrasp.motion.arguments import finite_pose
 from regrasp.motion.cable.cable_reach import CableReachParameters
 from regrasp.motion.cable.cable_shape import cable_course, connector_points
+from regrasp.motion.cable.gentle_pull import GentlePullParameters, pull_gently
 from regrasp.motion.cable.plugging import PluggingParameters
-from regrasp.motion.cable.seating import poses_before, seated_pose
+from regrasp.motion.cable.seating import lying_otherwise, poses_before, seated_pose
 from regrasp.motion.cable.taking import TakingMotion, TakingParameters
 from regrasp.motion.failure import PlanningError, TouchError
 from regrasp.motion.grasping.approach import pick_candidates
 from regrasp.motion.request import MotionRequest
 from regrasp.motion.robots.contact_guard import ContactLimits
+from regrasp.motion.robots.tool_force import tool_force
 from regrasp.motion.scene.planning_scene import NO_POINTS
 
 T = TypeVar("T")
@@ -35,6 +38,7 @@ class CableMotionParameters(TakingParameters):
 
     # m straight back from where something was held; the first that is free; choice
     retreats: tuple[float, ...] = (0.10, 0.08, 0.06, 0.05, 0.04, 0.03)
+    gentle_pull: GentlePullParameters = field(default_factory=GentlePullParameters)
     cable_reach: CableReachParameters = field(default_factory=CableReachParameters)
     plugging: PluggingParameters = field(default_factory=PluggingParameters)
 
@@ -142,14 +146,50 @@ class CableMotion(TakingMotion):
 
         return self._together(self.hand, steps())
 
-    def insert(self, held: RigidTransform) -> MotionRequest:
-        """Bring the held connector (tool_from_connector) straight into the clip, with the roll that turns it least."""
+    @property
+    def insertions(self) -> int:
+        """How many different tries `insert` knows."""
+        return len(self.parameters.seating.tries)
+
+    def insert(self, held: RigidTransform, attempt: int = 0) -> MotionRequest:
+        """Bring the held connector (tool_from_connector) straight into the clip, with the roll that turns it least.
+
+        Each `attempt` after the first takes it to lie in the hand a little otherwise.
+        """
         finite_pose("the held connector's pose", held)
         seating = self.parameters.seating
+        lying = lying_otherwise(held, *seating.tries[attempt])
 
         def steps() -> Iterator[None]:
-            goal = seated_pose(self.tool(self.hand), self.known.cable.clip.world_from_seat, held, seating.fine_rolls)
+            goal = seated_pose(self.tool(self.hand), self.known.cable.clip.world_from_seat, lying, seating.fine_rolls)
             yield from self._done(self.straight(self.hand, goal, speed=seating.speed_in, pressing=True))
+
+        return self._together(self.hand, steps())
+
+    def pull_at_clip(self, held: RigidTransform) -> Request[Evidence]:
+        """Pull the inserted connector (tool_from_connector) gently back the way that the hand came in.
+
+        The answer says whether the clip holds it. Then the hand is back where it was, else before the clip.
+        """
+        finite_pose("the held connector's pose", held)
+        kin, values, seating = self.kinematics[self.hand], self.parameters.gentle_pull, self.parameters.seating
+
+        def steps() -> Generator[None, None, Evidence]:
+            tool = self.tool(self.hand)
+
+            def go_back(way: float) -> Generator[None, None, FloatArray]:
+                pose = tool * RigidTransform.from_translation([-way, 0.0, 0.0])
+                yield from self._done(self.straight(self.hand, pose, speed=values.speed, pressing=True))
+                return self.arms[self.hand].reading().efforts
+
+            def force(change: FloatArray) -> float:
+                q = self.joints(self.hand)
+                felt = tool_force(kin, q, change, kin.tool(q).apply(held.translation))
+                return float(felt @ tool.rotation.apply([1.0, 0.0, 0.0]))
+
+            pull = yield from pull_gently(go_back, force, values)
+            yield from go_back(0.0 if pull.detected else seating.distance)
+            return pull
 
         return self._together(self.hand, steps())
 

@@ -256,14 +256,23 @@ class PlanningScene:
         return CollisionModel(self.kinematics[arm], boxes, body, other, grid, self._scene_parameters.collision)
 
     @counts_as("planning")
-    def sees(self, world_from_camera: RigidTransform, points: FloatArray, optimistic: bool = False) -> bool:
-        """Whether nothing known or mapped stands between a camera and any of the points (n, 3) m; see `model`."""
+    def sees(
+        self, world_from_camera: RigidTransform, points: FloatArray, optimistic: bool = False, past: str | None = None
+    ) -> bool:
+        """Whether nothing known or mapped stands between a camera and any of the points (n, 3) m; see `model`.
+
+        Nor the arm `past`, if one is named.
+        """
         eye = world_from_camera.translation
         first, last = self._scene_parameters.sight_range
         shares = np.linspace(first, last, self._scene_parameters.sight_samples)[:, None, None]
         rays = (eye + shares * (points - eye)).reshape(-1, 3)
         for box in self._boxes:
             if np.any(np.all(np.abs(rays - box.center) < 0.5 * np.array(box.size), axis=1)):
+                return False
+        if past is not None:
+            body = self.model(past, others=False).spheres(self.joints(past))
+            if np.min(sphere_distances(rays, body)[0]) < 0.0:
                 return False
         grid = self._grid(optimistic)
         return grid is None or bool(np.min(grid.at(rays)) > 0.0)

@@ -88,6 +88,8 @@ class FakeGripper:
 class FakeMotion:
     """A motion takes `seconds`, after which its `error` is raised if there is one."""
 
+    insertions = 4
+
     def __init__(self, clock: Clock, known: CableKnown) -> None:
         self.clock, self.known = clock, known
         self.seconds = 0.2
@@ -101,6 +103,8 @@ class FakeMotion:
         self.shifts: list[tuple[str, Vector]] = []
         self.cancelled: list[str] = []
         self.plugged: list[tuple[str, RigidTransform]] = []  # sockets, and how the hand held the connector
+        self.inserted: list[tuple[int, RigidTransform]] = []  # which try, and how the hand held the connector
+        self.clip_stiffness: Callable[[int], float] = lambda insertion: 1600.0  # N/m, after so many insertions
         self.stopped = 0
         self.rest: list[RigidTransform] = []
         self.reachable: Callable[[RigidTransform], bool] = lambda pose: True
@@ -196,8 +200,17 @@ class FakeMotion:
     def carry_to_clip(self, held: RigidTransform) -> Request[None]:
         return self.work(self.hand)
 
-    def insert(self, held: RigidTransform) -> Request[None]:
+    def insert(self, held: RigidTransform, attempt: int = 0) -> Request[None]:
+        self.inserted.append((attempt, held))
         return self.work(self.hand)
+
+    def pull_at_clip(self, held: RigidTransform) -> Request[Evidence]:
+        def steps() -> Generator[None, None, Evidence]:
+            yield from self._steps()
+            stiffness = self.clip_stiffness(len(self.inserted))
+            return Evidence(stiffness > 600.0, "pull", stiffness, 600.0, f"it rose by {stiffness:.0f} N/m")
+
+        return Request(steps(), lambda: self.cancelled.append(self.known.cable.hand))
 
     def let_go(self) -> Request[None]:
         return self.release(self.hand, 0.025)
@@ -251,7 +264,9 @@ class FakeMotion:
     def view_of(self, place: Vector, world_from_camera: RigidTransform) -> View:
         return self._first_view(views_of(place, world_from_camera, VIEWING.spiral.distance))
 
-    def best_view(self, world_from_connector: RigidTransform, taken: Sequence[Vector] = ()) -> View:
+    def best_view(
+        self, world_from_connector: RigidTransform, taken: Sequence[Vector] = (), past: str | None = None
+    ) -> View:
         return self._first_view([world_from_connector])
 
     def go_to_view(self, view: View) -> Request[None]:

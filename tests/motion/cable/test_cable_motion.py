@@ -11,6 +11,7 @@ from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.cause import CauseCode
 from regrasp.motion.cable.carry_paths import CarryPathParameters
 from regrasp.motion.failure import GraspEmptyError, PlanningError
+from regrasp.motion.robots.spheres import sphere_distances
 from regrasp.motion.service import MotionParameters
 
 Points = NDArray[np.float64]
@@ -182,3 +183,17 @@ def test_the_clip_may_be_touched_by_a_straight_way_and_not_by_a_plan(rig: Rig) -
     inside = kin.ik(RigidTransform.from_translation(bracket[0].center))
     near = rig.motion.model("right", without=bracket)
     assert any(near.clearance(q) > rig.motion.model("right").clearance(q) for q in inside)
+
+
+def test_a_look_at_what_a_hand_holds_passes_the_hand(rig: Rig) -> None:
+    held = in_hand(rig, [0.02, 0.0, 0.10])
+    rig.run(rig.motion.carry_to_clip(held))
+    connector, hand = rig.motion.tool("right") * held, rig.motion.model("right", others=False)
+    view = rig.motion.best_view(connector, past="right")
+    half, eye = 0.5 * rig.known.cable.connector.length, view.world_from_camera.translation
+    ends = connector.apply([[-half, 0.0, 0.0], [half, 0.0, 0.0]])
+    rays = np.vstack([np.linspace(eye, eye + 0.85 * (end - eye), 50) for end in ends])
+    assert sphere_distances(rays, hand.spheres(rig.motion.joints("right")))[0].min() > 0.0
+    between = RigidTransform.from_translation(rig.motion.tool("right").apply([-0.3, 0.0, 0.0]))
+    assert not rig.motion.sees(between, ends, past="right")
+    assert rig.motion.sees(between, ends)

@@ -1,0 +1,84 @@
+"""A gentle pull tells what is held from what is not: by stated springs, and in the world."""
+
+from collections.abc import Generator
+
+import numpy as np
+import pytest
+from hand import take_hold
+from scipy.spatial.transform import RigidTransform
+
+from regrasp.interfaces.arrays import FloatArray
+from regrasp.interfaces.cable.cell import CableCell
+from regrasp.interfaces.devices import TICK
+from regrasp.interfaces.evidence import Evidence
+from regrasp.interfaces.request import Request
+from regrasp.interfaces.scene import Gravity
+from regrasp.motion.cable.gentle_pull import pull_gently
+from regrasp.motion.cable.service import CableMotion
+from regrasp.sim.cable.objects import CableObjects, CableObjectsParameters
+from regrasp.sim.world import NOTHING_ADDED, World
+
+LIPS, CABLE = 1500.0, 100.0  # N/m
+STRONG_STAND = CableObjectsParameters(stand_force=50.0)  # N; a bent cable tears itself from a weaker one
+
+
+def pulled(stiffness: float, steady: float) -> Evidence:
+    """A pull at a spring (N/m), while a force (N) pulls all the time."""
+
+    def go_back(way: float) -> Generator[None, None, FloatArray]:
+        yield
+        return np.array([steady + stiffness * way])
+
+    steps = pull_gently(go_back, lambda change: float(change[0]))
+    try:
+        while True:
+            next(steps)
+    except StopIteration as end:
+        evidence: Evidence = end.value
+        return evidence
+
+
+@pytest.mark.parametrize("steady", [-10.0, 0.0, 10.0])
+def test_what_pulls_all_the_time_does_not_matter(steady: float) -> None:
+    held, loose = pulled(LIPS, steady), pulled(CABLE, steady)
+    assert held.detected
+    assert held.value == pytest.approx(LIPS)
+    assert not loose.detected
+    assert "0.10 N/mm" in loose.sentence
+
+
+def settled(world: World[CableObjects]) -> tuple[CableMotion, RigidTransform]:
+    """A hand that holds the connector, which no stand holds any more, and how it does (tool_from_connector)."""
+    take_hold(world)
+    world.objects.socket.release()
+    world.advance(0.6)
+    grippers = {name: arm.gripper for name, arm in world.arms.items()}
+    motion = CableMotion(world.cell.known, world.arms, grippers, world, 0)  # type: ignore[arg-type]
+    return motion, motion.tool(motion.hand).inv() * world.objects.connector_pose()
+
+
+def done(world: World[CableObjects], request: Request[Evidence]) -> Evidence:
+    while not request.poll():
+        world.advance(TICK)
+    return request.answer
+
+
+@pytest.mark.parametrize("gravity", ["zero", "earth"])
+@pytest.mark.parametrize(("off", "seated"), [([0.0, 0.0, 0.0], True), ([-0.035, 0.0, 0.0], False)])
+def test_in_the_world_a_connector_in_the_clip_is_told_from_one_before_it(
+    cell: CableCell, gravity: Gravity, off: list[float], seated: bool
+) -> None:
+    seat = cell.known.cable.clip.world_from_seat
+    stand = RigidTransform.from_translation(off) * seat
+    world = World(cell, gravity, 1, CableObjects(cell, stand, STRONG_STAND), NOTHING_ADDED)
+    motion, held = settled(world)
+    assert world.objects.clip.holds == seated
+    before, begin = motion.tool(motion.hand), world.now()
+    pull = done(world, motion.pull_at_clip(held))
+    assert world.now() - begin < 2.4
+    assert pull.detected == seated
+    assert world.objects.clip.holds == seated
+    moved = before.inv().apply(motion.tool(motion.hand).translation)
+    distance = 0.0 if seated else motion.parameters.seating.distance
+    assert moved == pytest.approx([-distance, 0.0, 0.0], abs=2e-3)
+    world.close()
