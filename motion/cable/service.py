@@ -36,8 +36,6 @@ T = TypeVar("T")
 class CableMotionParameters(TakingParameters):
     """Those of every task, and of what is done with the cable."""
 
-    # m straight back from where something was held; the first that is free; choice
-    retreats: tuple[float, ...] = (0.10, 0.08, 0.06, 0.05, 0.04, 0.03)
     gentle_pull: GentlePullParameters = field(default_factory=GentlePullParameters)
     cable_reach: CableReachParameters = field(default_factory=CableReachParameters)
     plugging: PluggingParameters = field(default_factory=PluggingParameters)
@@ -135,13 +133,12 @@ class CableMotion(TakingMotion):
                     self.model(self.hand, without=clip.bracket, optimistic=optimistic),
                 )
                 goals = poses_before(models, q, clip.world_from_seat, held, seating.straight_in, seating)
-                if goals:
+                goals = self._within_cable(goals, held) or goals
+                if onward := self._onward(self.hand, models[0], goals):
                     break
             else:
                 message = "no free hand pose brings the held connector into the clip"
                 raise PlanningError(CauseCode.OUT_OF_REACH, message)
-            in_and_out = (seating.distance, seating.distance - self.parameters.retreats[0])
-            onward = [RigidTransform.from_translation([x, 0.0, 0.0]) for x in in_and_out]
             yield from self._done(self.carry(self.hand, goals, held, onward=onward, speed=seating.speed_to))
 
         return self._together(self.hand, steps())

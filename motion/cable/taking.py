@@ -20,12 +20,15 @@ from regrasp.motion.arguments import finite_pose
 from regrasp.motion.cable.cable_shape import cable_course
 from regrasp.motion.cable.carrying import CarryMotion, CarryMotionParameters
 from regrasp.motion.cable.seating import SeatingParameters, poses_before
+from regrasp.motion.cable.tether import course_length
 from regrasp.motion.failure import GraspEmptyError, PlanningError, TouchError
 from regrasp.motion.grasping.approach import pick_candidates
 from regrasp.motion.grasping.gap_test import GripWatch
 from regrasp.motion.grasping.grasps import Grasp
+from regrasp.motion.planning.straight import can_continue
 from regrasp.motion.request import MotionRequest
 from regrasp.motion.robots.poses import angle_between, inverse, multiply
+from regrasp.motion.scene.collision import CollisionModel
 from regrasp.motion.service import PointCloudSource
 
 NO_GRASP = (CauseCode.NO_COLLISION_FREE_GOAL, CauseCode.OUT_OF_REACH)
@@ -56,6 +59,8 @@ class TakingParameters(CarryMotionParameters):
     stow_rolls: int = (
         12  # angles about the connector at which it is asked whether a grasp can stow it; every 30 degrees
     )
+    # m straight back from where something was held; the first that is free; choice
+    retreats: tuple[float, ...] = (0.10, 0.08, 0.06, 0.05, 0.04, 0.03)
     unplug: UnplugParameters = field(default_factory=UnplugParameters)
     seating: SeatingParameters = field(default_factory=SeatingParameters)
 
@@ -242,7 +247,28 @@ class TakingMotion(CarryMotion):
         )
         seating = replace(self.parameters.seating, rolls=self.parameters.stow_rolls)
         q = np.array(self.known.arm(arm).sleep)
-        return bool(poses_before(models, q, clip.world_from_seat, held, seating.straight_in, seating))
+        goals = poses_before(models, q, clip.world_from_seat, held, seating.straight_in, seating)
+        return bool(self._onward(arm, models[0], self._within_cable(goals, held)))
+
+    def _within_cable(self, goals: Sequence[RigidTransform], held: RigidTransform) -> list[RigidTransform]:
+        """The goals (world_from_tool) at which the cable is long enough for what is held (tool_from_connector)."""
+        longest = self.known.cable.length + self.parameters.tether.stretch
+        return [goal for goal in goals if course_length(self.known, (goal * held).as_matrix()) <= longest]
+
+    def _onward(self, arm: str, model: CollisionModel, goals: Sequence[RigidTransform]) -> list[RigidTransform]:
+        """The ways in and back out (goal_from_tool) from before the clip, with the longest way out that a goal allows.
+
+        None where from no goal any way leads in and out.
+        """
+        kin, q, seating = self.kinematics[arm], self.joints(arm), self.parameters.seating
+        ends = [end for goal in goals for end in kin.ik(goal, q) if model.free(end, seating.margin)]
+        for retreat in self.parameters.retreats:
+            ways = [
+                RigidTransform.from_translation([x, 0.0, 0.0]) for x in (seating.distance, seating.distance - retreat)
+            ]
+            if any(can_continue(kin, end, ways) for end in ends):
+                return ways
+        return []
 
     def _room_to_draw_out(self, plug: RigidTransform) -> Callable[[Grasp], int]:
         """How a hand fares that draws out the plug (world_from_connector), by its grasp.

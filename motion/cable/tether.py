@@ -91,6 +91,17 @@ def _edge_kept(qa, qb, step, longest, nearest, most, *cable):  # type: ignore[no
     return True
 
 
+def course_length(known: CableKnown, world_from_connector: FloatArray, points: int = 20) -> float:
+    """Length (m) of the cable's course (`cable_course`) to a connector at a pose (4, 4), by so many `points`."""
+    end = world_from_connector.copy()
+    end[:3, 3] -= 0.5 * known.cable.connector.length * end[:3, 0]
+    anchor, direction = known.cable.anchor
+    nothing = np.full((1, 1, 1), FREE_DISTANCE, np.float32)
+    surroundings = box_table([]), nothing, np.zeros(3), 1e-3
+    full = known.cable.length
+    return float(_course(end, anchor, np.asarray(direction, float), full, points, 0.0, *surroundings)[0])
+
+
 class Tether:
     """Implements `regrasp.motion.scene.collision.Constraint`: the cable reaches, and does not sweep through things.
 

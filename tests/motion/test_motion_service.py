@@ -125,11 +125,12 @@ def test_an_arm_goes_slowly_beside_what_was_seen_and_fast_elsewhere(rig: Rig) ->
 
 
 def test_an_arm_that_pulls_something_elastic_takes_its_time(rig: Rig) -> None:
-    durations = []
-    for pulling in (False, True):
+    goals = np.array([rig.motion.known.arm("right").sleep])
+    guard, durations = rig.motion.parameters.execution.guard, []
+    for limits in (guard.free, guard.pulling):
         rig.motion.stop()
         rig.arms["right"].at = READY
-        rig.run(rig.motion.sleep("right", pulling=pulling))
+        rig.run(rig.motion.execution.request("right", rig.motion._move_steps("right", goals, contact=limits)))
         durations.append(rig.arms["right"].followed[-1][1].duration)
     assert durations[1] == pytest.approx(durations[0] / rig.motion.parameters.pulling_speed, rel=0.05)
 
