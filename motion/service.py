@@ -7,7 +7,7 @@ refused with a ValueError at once; what an arm cannot do, with a PlanningError b
 
 from collections.abc import Callable, Collection, Generator, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.spatial.transform import RigidTransform
@@ -146,8 +146,9 @@ class Motion(PlanningScene):
 
         def steps() -> Iterator[None]:
             try:
-                yield from self._move_steps(arm, goals, contact=self._guard.carrying, touches=2)
-            except TouchError as error:
+                light = replace(self._guard.carrying, elastic=True)
+                yield from self._move_steps(arm, goals, contact=light, touches=2)
+            except (TouchError, StoppedShortError) as error:
                 self._on_anomaly(f"{error}: something elastic may hold it")
                 self.forget_felt()
                 yield from self._move_steps(arm, goals, contact=self._guard.pulling)
