@@ -1,14 +1,15 @@
 """`regrasp robots`: list, show and check robots, and fit spheres to them."""
 
 import json
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from regrasp.app.files.findings import Finding, Findings, shown
-from regrasp.app.files.resources import resolve, shipped
+from regrasp.app.files.resources import named, resolve
 from regrasp.interfaces.quote import nearest, printable, quoted
 
 if TYPE_CHECKING:
@@ -18,32 +19,39 @@ if TYPE_CHECKING:
 app = typer.Typer(
     no_args_is_help=True, rich_markup_mode=None, help="List, show and check robots, and fit collision spheres."
 )
-Name = Annotated[str, typer.Argument(help="A shipped robot's name, or a path to a .yaml file.")]
+Name = Annotated[str, typer.Argument(help="A name that `regrasp robots list` tells, or a path to a .yaml file.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print it as JSON, for a program; SI units.")]
 LEAST_MARGIN, MOST_MARGIN = 0.002, 0.2  # m; choice: below, a link takes hundreds of spheres, above, a room
 
 
 @app.command("list")
 def list_robots(as_json: AsJson = False) -> None:
-    """List the shipped robots.
+    """List the robots that have a name: those that are shipped, and those that installed packages put in.
 
     A cell names one as its arm's robot; a file of your own may name one as its base and change some of it.
     """
     from regrasp.app.robots.robot_file import load_robot
 
-    robots = {name: load_robot(path) for name, path in shipped("robot").items()}
-    rows = [
-        {"name": name, "title": robot.title, "joints": len(robot.joint_names), "spheres": _count(robot)}
-        for name, robot in robots.items()
-    ]
-    if as_json:
-        typer.echo(json.dumps(rows, indent=2, ensure_ascii=False))
-        return
-    names, titles = (max(len(str(row[key])) for row in rows) for key in ("name", "title"))
+    rows: list[dict[str, Any]] = []
+    found: list[Finding] = []
+    for name in named("robot"):
+        try:
+            robot = load_robot(resolve("robot", name, Path()), (name, 0))
+        except Findings as error:  # of a package; the others are told
+            found += error.items
+            continue
+        rows.append({"name": name, "title": robot.title, "joints": len(robot.joint_names), "spheres": _count(robot)})
+    for line in [json.dumps(rows, indent=2, ensure_ascii=False)] if as_json else _lines(rows):
+        typer.echo(line)
+    if found:
+        raise Findings(found)
+
+
+def _lines(rows: list[dict[str, Any]]) -> Iterator[str]:
+    names, titles = (max(len(row[key]) for row in rows) for key in ("name", "title"))
     for row in rows:
-        typer.echo(
-            f"{row['name']:<{names}}  {row['title']:<{titles}}  {row['joints']} joints, {row['spheres']} spheres"
-        )
+        title = printable(f"{row['title']:<{titles}}")
+        yield f"{row['name']:<{names}}  {title}  {row['joints']} joints, {row['spheres']} spheres"
 
 
 def _count(robot: "Robot") -> int:
@@ -86,7 +94,9 @@ def show_robot(
 
 @app.command("check")
 def check_robots(
-    files: Annotated[list[str] | None, typer.Argument(help="Names or paths; default all that are shipped.")] = None,
+    files: Annotated[
+        list[str] | None, typer.Argument(help="Names or paths; default all that `regrasp robots list` tells.")
+    ] = None,
 ) -> None:
     """Check robot files, and measure how well their spheres cover the meshes.
 
@@ -105,7 +115,7 @@ def check_robots(
     from regrasp.app.robots.check import check_robot
 
     found: list[Finding] = []
-    for name in files or shipped("robot"):
+    for name in files or named("robot"):
         try:
             path = resolve("robot", name, Path())
             measures = check_robot(path)

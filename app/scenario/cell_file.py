@@ -101,8 +101,10 @@ def _task_findings(document: Document, cell: Cell, task: "Task", laid_out: bool)
     found = [] if task.cell_findings is None else [*task.cell_findings()(document, cell, False)]
     if found or not laid_out:
         return found
-    from regrasp.app.scenario.cell_layout import layout_findings  # late: it brings the optimiser
+    from regrasp.app.scenario.cell_layout import bases_in_one_place, layout_findings  # late: they bring the optimiser
 
+    if found := [*bases_in_one_place(document, cell.known)]:
+        return found
     found = [*layout_findings(document, cell.known)]
     return found if task.cell_findings is None else [*found, *task.cell_findings()(document, cell, True)]
 

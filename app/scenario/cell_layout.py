@@ -38,10 +38,20 @@ class Part(NamedTuple):
     halves: FloatArray
 
 
+def bases_in_one_place(
+    document: Document, known: KnownCell, parameters: CellLayoutParameters = CellLayoutParameters()
+) -> Iterator[Finding]:
+    """Arms whose bases stand in each other: a line a pair. Much else that seems wrong then follows from it."""
+    for below, part in combinations(arm_bases(known), 2):
+        depth = _base_depth(part, below)
+        if depth > parameters.overlap:
+            yield reaches(document, part, depth, below.name)
+
+
 def layout_findings(
     document: Document, known: KnownCell, parameters: CellLayoutParameters = CellLayoutParameters()
 ) -> list[Finding]:
-    """What is wrong with a cell although each of its values is right by itself."""
+    """What is wrong with a cell although each of its values is right by itself, but for `bases_in_one_place`."""
     bases = arm_bases(known)
     found = [
         *_joints(document, known),
@@ -102,10 +112,14 @@ def _inside(known: KnownCell, part: Part) -> Iterator[tuple[str, float]]:
     for arm, base in zip(known.arms, arm_bases(known), strict=True):
         if part.path == base.path:
             continue
-        if part.path[1] != "arms" or part.path > base.path:  # a pair of bases once
-            yield base.name, penetration_depth(np.vstack([part.halves, base.halves]), part.center - base.center)
+        if part.path[1] != "arms":
+            yield base.name, _base_depth(part, base)
         centers, halves = sleeping_arm_cubes(arm)
         yield f"the {arm.name} arm asleep", float(cube_depths(part.halves, part.center - centers, halves).max())
+
+
+def _base_depth(part: Part, base: Part) -> float:
+    return penetration_depth(np.vstack([part.halves, base.halves]), part.center - base.center)
 
 
 def arm_bases(known: KnownCell) -> list[Part]:

@@ -27,7 +27,8 @@ from regrasp.interfaces.cell import Box
 from regrasp.interfaces.robot.urdf import pose_of
 from regrasp.motion.failure import PlanningError
 from regrasp.motion.planning.planner import plan
-from regrasp.motion.robots.kinematics import ArmKinematics, wrap
+from regrasp.motion.robots.answers import wrap
+from regrasp.motion.robots.kinematics import ArmKinematics
 from regrasp.motion.scene.collision import CollisionModel
 from regrasp.sim.robot.bullet_ik import BulletIk
 

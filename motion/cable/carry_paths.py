@@ -54,7 +54,7 @@ def carry_paths(
     arm_free: Callable[[FloatArray], bool],
     parameters: CarryPathParameters = CarryPathParameters(),
 ) -> Iterator[FloatArray | None]:
-    """Joint paths (k, 6) rad from `q` (6,) to the goals (world_from_tool); `held` is tool_from_connector.
+    """Joint paths (k, n) from `q` (n,) to the goals (world_from_tool); `held` is tool_from_connector.
 
     First along the natural shapes of the cable, at once or when the connector is lifted: directly, in a plain detour,
     or by the `routes`. Then straight or in a flat arch. `arm_free`: whether the arm is free with its tool at a pose

@@ -126,7 +126,7 @@ class SearchMotion(Motion):
         raise PlanningError(CauseCode.OUT_OF_REACH, "no free place to look from")
 
     def _view_goals(self, world_from_camera: RigidTransform, model: CollisionModel) -> FloatArray:
-        """Joints (n, 6) rad of the search arm that bring its camera there and are free in its `model`."""
+        """Joints (k, n) of the search arm that bring its camera there and are free in its `model`."""
         mount, margin = self.known.search_mount, self.parameters.viewing.margin
         views = ik_view(self.kinematics[self.search_arm], world_from_camera, mount.mount_from_camera)
         return np.array([q for q in views if model.free(q, margin)]).reshape(-1, len(self.kinematics[self.search_arm]))

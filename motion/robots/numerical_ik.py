@@ -12,7 +12,7 @@ _EYE = np.eye(4)
 
 
 class NumericalSolver:
-    r"""Joint positions at which the tip has a pose, each found from a different start.
+    r"""Joint positions at which the tool has a pose, each found from a different start.
 
     Minimises :math:`|p(q) - p^*|^2 + |\log(R(q)^T R^*)|^2` within the joints' limits by scipy's trust-region
     reflective method. The starts are the same for every pose: the middle of the limits, then random ones.
@@ -21,8 +21,7 @@ class NumericalSolver:
     def __init__(self, chain: Chain, starts: int = 12, answers: int = 4, seed: int = 0) -> None:
         """It gives up after so many `starts`, or when it has so many `answers`."""
         self._joints = joint_table(chain)
-        self._last_from_tip = np.eye(4)
-        self._last_from_tip[:3, 3] = chain.last_from_tool[:3, 3]
+        self._last_from_tool = np.ascontiguousarray(chain.last_from_tool)
         inside = 1e-9 * (chain.upper - chain.lower)
         self._lower, self._upper = chain.lower + inside, chain.upper - inside
         rng = np.random.default_rng(seed)
@@ -31,9 +30,9 @@ class NumericalSolver:
         )
         self._answers = answers
 
-    def solve(self, base_from_tip: FloatArray, near: FloatArray | None = None) -> FloatArray:
-        """Positions (k, n) at which the tip has the pose (4, 4); the first is sought from `near` (n,)."""
-        starts = self._starts if near is None else np.vstack([near, self._starts])
+    def solve(self, base_from_tool: FloatArray, near: FloatArray | None = None) -> FloatArray:
+        """Positions (k, n) at which the tool has the pose (4, 4); the first is sought from the last n of `near`."""
+        starts = self._starts if near is None else np.vstack([near[-self._starts.shape[1] :], self._starts])
         found: list[FloatArray] = []
         for start in np.clip(starts, self._lower, self._upper):
             answer = least_squares(
@@ -41,7 +40,7 @@ class NumericalSolver:
                 start,
                 self._jacobian,
                 bounds=(self._lower, self._upper),
-                args=(base_from_tip,),
+                args=(base_from_tool,),
                 xtol=1e-12,
                 ftol=1e-14,
                 gtol=1e-12,
@@ -54,10 +53,10 @@ class NumericalSolver:
         return np.array(found).reshape(-1, self._starts.shape[1])
 
     def _error(self, q: FloatArray, target: FloatArray) -> FloatArray:
-        pose = tool_frame(_EYE, self._joints, self._last_from_tip, q)
+        pose = tool_frame(_EYE, self._joints, self._last_from_tool, q)
         turn = rotation_vector(pose[:3, :3] @ target[:3, :3].T)
         return np.concatenate([pose[:3, 3] - target[:3, 3], turn])
 
     def _jacobian(self, q: FloatArray, target: FloatArray) -> FloatArray:
         # The derivative of the rotation's logarithm is the identity where it vanishes; near enough to converge.
-        return np.asarray(tool_jacobian(_EYE, self._joints, self._last_from_tip, q))
+        return np.asarray(tool_jacobian(_EYE, self._joints, self._last_from_tool, q))

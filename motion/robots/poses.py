@@ -61,13 +61,20 @@ def rotation_matrix(vector: FloatArray) -> FloatArray:
 @nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
 def multiply(a: FloatArray, b: FloatArray) -> FloatArray:
     """The product (4, 4) of two poses."""
-    out = np.zeros((4, 4))
+    out = np.empty((4, 4))
+    multiply_into(a, b, out)
+    return out
+
+
+@nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
+def multiply_into(a: FloatArray, b: FloatArray, out: FloatArray) -> None:
+    """Write the product (4, 4) of two poses."""
     for r in range(3):
         for c in range(4):
             out[r, c] = a[r, 0] * b[0, c] + a[r, 1] * b[1, c] + a[r, 2] * b[2, c]
         out[r, 3] += a[r, 3]
+        out[3, r] = 0.0
     out[3, 3] = 1.0
-    return out
 
 
 @nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]

@@ -8,9 +8,10 @@ from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import FloatArray, Mask
 from regrasp.interfaces.wall_time import counts_as
+from regrasp.motion.robots.answers import is_new, wrap
 from regrasp.motion.robots.forward import link_frames_in
 from regrasp.motion.robots.ik_parameters import InverseKinematicsParameters
-from regrasp.motion.robots.kinematics import ArmKinematics, is_new, wrap
+from regrasp.motion.robots.kinematics import ArmKinematics
 from regrasp.motion.robots.poses import inverse, multiply, rotation_matrix
 
 
@@ -49,10 +50,8 @@ def _by_the_last_link(
     kin: ArmKinematics, wanted: FloatArray, last_from_camera: FloatArray, parameters: InverseKinematicsParameters
 ) -> FloatArray:
     """With all rolls, upright ones first: the camera moves with the tool."""
-    last_from_tip = np.eye(4)
-    last_from_tip[:3, 3] = kin.tip
-    tip = multiply(wanted, multiply(inverse(last_from_camera), last_from_tip))
-    return np.concatenate([kin.ik_tip(_rolled(tip, wanted, roll)) for roll in parameters.roll_starts])
+    tool = multiply(wanted, multiply(inverse(last_from_camera), kin.last_from_tool))
+    return np.concatenate([kin.ik(_rolled(tool, wanted, roll)) for roll in parameters.roll_starts])
 
 
 def _solutions(
@@ -66,18 +65,18 @@ def _solutions(
 
     `mount` (4, 4) is the camera's pose in its link; `along` is 1 or -1: which way round the last joint turns it.
     """
-    tip_from_mount = mount.copy()
-    tip_from_mount[:3, 3] -= kin.chain.origins[-1] + kin.tip
-    tip_target = wanted @ np.linalg.inv(tip_from_mount)
+    link_from_tool = kin.last_from_tool.copy()
+    link_from_tool[:3, 3] += kin.chain.origins[-1]
+    tool = wanted @ np.linalg.inv(multiply(inverse(link_from_tool), mount))
     for start in parameters.roll_starts:
-        for q in kin.solve(_rolled(tip_target, wanted, start)):
+        for q in kin.solve(_rolled(tool, wanted, start)):
             roll = start
             for _ in range(parameters.roll_iterations):
                 if abs(q[-1]) < parameters.roll:
                     yield np.append(q[:-1], 0.0)
                     break
                 roll -= along * q[-1]
-                target = _rolled(tip_target, wanted, roll)
+                target = _rolled(tool, wanted, roll)
                 branches = kin.solve(target)
                 if not len(branches):
                     break
@@ -126,13 +125,13 @@ def _views(
 
 
 @nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
-def _rolled(tip_target: FloatArray, wanted: FloatArray, roll: float) -> FloatArray:
-    """The tip's target turned by `roll` rad about the wanted optical axis through the wanted camera position."""
+def _rolled(tool: FloatArray, wanted: FloatArray, roll: float) -> FloatArray:
+    """The tool's pose turned by `roll` rad about the wanted optical axis through the wanted camera position."""
     turn = np.eye(4)
     turn[:3, :3] = rotation_matrix(roll * wanted[:3, 2])
     for r in range(3):
         turn[r, 3] = wanted[r, 3] - np.sum(turn[r, :3] * wanted[:3, 3])
-    return multiply(turn, tip_target)
+    return multiply(turn, tool)
 
 
 @nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]

@@ -283,7 +283,7 @@ class CollisionModel:
         return self._edge_free(qa, qb, margin, self.fine_step if fine else self.coarse_step)
 
     def path_free(self, path: FloatArray, margin: float) -> bool:
-        """Whether the joint path (k, 6) is free from its first row to its last, checked finely."""
+        """Whether the joint path (k, n) is free from its first row to its last, checked finely."""
         edges = pairwise(np.asarray(path, float))
         return self.free(path[0], margin) and all(self.edge_free(a, b, margin, fine=True) for a, b in edges)
 

@@ -8,7 +8,8 @@ from scipy.spatial.transform import RigidTransform
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.trajectory import Trajectory
 from regrasp.motion.grasping.grasps import grasp_candidates
-from regrasp.motion.robots.kinematics import ArmKinematics, wrap
+from regrasp.motion.robots.answers import wrap
+from regrasp.motion.robots.kinematics import ArmKinematics
 from regrasp.sim.cable.objects import CableObjects
 from regrasp.sim.world import World
 

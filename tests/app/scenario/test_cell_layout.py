@@ -39,7 +39,6 @@ def findings(*overrides: str, scenario: str = "no_obstacle") -> list[str]:
         ("known.boxes.0.center.2=0.3", "no way to take hold of a connector in socket back_4: 1152 grasp candidates: "),
         ("known.boxes.0.center.2=0.48", "floor reaches 0.015 m into the stowed connector; move one of them"),
         ("known.cameras.0.mount.position=[0.5145, 0, 0.3]", "the rear camera is inside back_panel; move one of them"),
-        ("known.arms.1.base=[0, 0.1, 0]", "the right arm's base reaches 0.079 m into the left arm's base; move one"),
         ("known.cable.clip.seat=[0.2, 0.9, 0.4]", "the clip is 1.13 m from the right arm's shoulder, which reaches"),
         ("known.cable.connector={length: 0.09, radius: 0.05, color: [1, 0, 0]}", "back_panel reaches 0.015 m into the"),
         ("known.cable.connector.radius=0.022", "a connector 44 mm thick does not fit the jaw, which opens"),
@@ -53,6 +52,12 @@ def findings(*overrides: str, scenario: str = "no_obstacle") -> list[str]:
 )  # fmt: skip
 def test_a_cell_that_cannot_work_is_told_before_a_run(override: str, expected: str) -> None:
     assert [message for message in findings(f"cell.{override}") if message.startswith(expected)]
+
+
+@pytest.mark.parametrize("place", ["[0.0, 0.18, 0.0]", "[0, 0.1, 0]"])
+def test_two_robots_in_one_place_are_one_line(place: str) -> None:
+    [told] = findings(f"cell.known.arms.1.base={place}")
+    assert told == "the right arm's base reaches 0.079 m into the left arm's base; move one of them"
 
 
 def test_arms_that_sleep_in_each_other_are_told() -> None:

@@ -15,8 +15,9 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cell import WristMount
 from regrasp.interfaces.robot.chain import Chain
+from regrasp.motion.robots.answers import wrap
 from regrasp.motion.robots.ik_parameters import InverseKinematicsParameters
-from regrasp.motion.robots.kinematics import ArmKinematics, wrap
+from regrasp.motion.robots.kinematics import ArmKinematics
 from regrasp.motion.robots.views import ik_view
 
 LIMITS = InverseKinematicsParameters()
@@ -127,8 +128,7 @@ def test_a_search_near_the_joints_of_a_pose_finds_them(name: str) -> None:
 @CLOSED
 def test_all_branches_are_answered(kin: ArmKinematics) -> None:
     for q in drawn(kin, 300, seed=2):
-        tip = tip_of(kin, kin.tool_matrix(q))
-        answers = kin.solve(tip)
+        answers = kin.solve(kin.tool_matrix(q))
         assert 1 <= len(answers) <= BRANCHES
         assert off(answers, q) < 2 * LIMITS.distinct
 
@@ -137,9 +137,9 @@ def test_all_branches_are_answered(kin: ArmKinematics) -> None:
 def test_a_search_from_everywhere_finds_no_further_branch(name: str) -> None:
     kin, poses = KINS[name], 0
     for q in drawn(kin, 10, seed=3):
-        tip = tip_of(kin, kin.tool_matrix(q))
-        answers = kin.solve(tip)
-        found = searched(kin.chain, np.linalg.inv(kin.base) @ tip, np.random.default_rng(0), 200)
+        pose = kin.tool_matrix(q)
+        answers = kin.solve(pose)
+        found = searched(kin.chain, np.linalg.inv(kin.base) @ tip_of(kin, pose), np.random.default_rng(0), 200)
         for other in found:
             assert off(answers, other) < 2 * LIMITS.distinct, (answers, other)
         poses += len(found) == len(answers)

@@ -7,7 +7,8 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cell import OPTICAL
-from regrasp.motion.robots.kinematics import ArmKinematics, wrap
+from regrasp.motion.robots.answers import wrap
+from regrasp.motion.robots.kinematics import ArmKinematics
 from regrasp.motion.robots.views import ik_view
 
 BASE = RigidTransform.from_components([0.1, -0.2, 0.05], Rotation.from_euler("z", 0.4))
