@@ -32,7 +32,7 @@ def test_the_cells_hand_takes_what_both_arms_can_take_well(rig: Rig) -> None:
 
 
 def test_the_other_arm_takes_what_is_far_from_the_hand(rig: Rig) -> None:
-    assert hands(rig, lying(0.40, 0.40, 0.25)) == ["left"]
+    assert hands(rig, lying(0.15, 0.60, 0.30)) == ["left"]
 
 
 def test_without_any_grasp_the_hand_stays_the_hand(rig: Rig) -> None:
