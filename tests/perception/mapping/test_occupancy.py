@@ -10,7 +10,7 @@ from scipy.spatial.transform import RigidTransform
 from regrasp.interfaces.cable.cell import Connector
 from regrasp.interfaces.cell import OPTICAL, Box, pose_along
 from regrasp.interfaces.frame import Intrinsics
-from regrasp.perception.mapping.occupancy import Occupancy, OccupancyParameters, Spared, near_boxes
+from regrasp.perception.mapping.occupancy import Occupancy, OccupancyParameters, Spared, Voxel, near_boxes
 
 Points = NDArray[np.float64]
 REAR = Intrinsics.from_fov(848, 480, np.deg2rad(65.0))
@@ -110,6 +110,17 @@ def test_the_robot_is_no_obstacle() -> None:
     integrate(ignored, [arm], REAR_POSE, ignore=[spheres])
     assert len(seen.occupied_points()) > 100
     assert len(ignored.occupied_points()) == 0
+
+
+def test_a_thing_is_three_centimetres_deep_at_least_and_beyond_that_it_may_end() -> None:
+    occupancy = empty(CONNECTOR)
+    integrate(occupancy, [TALL], REAR_POSE)
+    front = float(TALL.lower[0])
+    sure, perhaps = occupancy.occupied_points(Voxel.INSIDE), occupancy.unseen_points()
+    assert front + 0.02 < sure[:, 0].max() < front + 0.05
+    assert perhaps[:, 0].min() > front + 0.02
+    assert front + 0.06 < perhaps[:, 0].max() < front + 0.10
+    assert len(sure) + len(perhaps) == len(occupancy.occupied_points())
 
 
 def test_a_look_from_the_side_clears_what_was_assumed_behind() -> None:
