@@ -29,7 +29,13 @@ class SeatingParameters:
     speed_in: float = 0.2  # share of the joints' speed on the way in; choice
     # Ways in which the connector may lie in the hand other than believed, one a try: m nearer to the finger tips, and
     # degrees about the pads' normal. The clip's lips take what is 20 mm and 20 degrees off; choice
-    tries: tuple[tuple[float, float], ...] = ((0.0, 0.0), (-0.012, 0.0), (0.0, 20.0), (0.0, -20.0))
+    tries: tuple[tuple[float, float], ...] = (
+        (0.0, 0.0),
+        (-0.015, 0.0),
+        (0.015, 0.0),
+        (0.0, 20.0),
+        (0.0, -20.0),
+    )
 
     @property
     def straight_in(self) -> list[FloatArray]:
