@@ -264,8 +264,12 @@ class CableMotion(CarryMotion):
                 return -float(tool_force(kin, q, change, kin.tool(q).apply(held.translation)) @ out)
 
             pull = yield from pull_gently(lambda way: go(way * out), force, values)
-            before = tool.rotation.apply([-self.parameters.seating.distance, 0.0, 0.0])
-            yield from go(np.zeros(3) if pull.detected else before)
+            if pull.detected:
+                yield from go(np.zeros(3))
+            else:
+                before = tool.apply([-self.parameters.seating.clear, 0.0, 0.0])
+                way = before - self.tool(self.hand).translation
+                yield from self._done(self._shift_held(self.hand, way, held))
             return pull
 
         return self._together(self.hand, steps())
