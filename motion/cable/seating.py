@@ -20,6 +20,9 @@ class SeatingParameters:
 
     # m in front of the clip along the hand's own axis, from where it goes straight in; more would press the cable
     distance: float = 0.025
+    # m back from where the clip did not hold: its lips take again only what was 30 mm from the seat, and the hand may
+    # have been 15 mm too deep
+    clear: float = 0.045
     margin: float = 0.0  # m of clearance in front of the clip and on the straight path in; choice
     rolls: int = 36  # angles about the connector's axis that are tried; choice: every 10 degrees
     line_step: float = 0.01  # m between the waypoints of the straight path in that is checked; choice
@@ -29,7 +32,13 @@ class SeatingParameters:
     speed_in: float = 0.2  # share of the joints' speed on the way in; choice
     # Ways in which the connector may lie in the hand other than believed, one a try: m nearer to the finger tips, and
     # degrees about the pads' normal. The clip's lips take what is 20 mm and 20 degrees off; choice
-    tries: tuple[tuple[float, float], ...] = ((0.0, 0.0), (-0.012, 0.0), (0.0, 20.0), (0.0, -20.0))
+    tries: tuple[tuple[float, float], ...] = (
+        (0.0, 0.0),
+        (-0.015, 0.0),
+        (0.015, 0.0),
+        (0.0, 20.0),
+        (0.0, -20.0),
+    )
 
     @property
     def straight_in(self) -> list[FloatArray]:

@@ -18,7 +18,7 @@ from regrasp.interfaces.request import Request
 from regrasp.motion.arguments import finite_pose
 from regrasp.motion.cable.cable_reach import CableReachParameters
 from regrasp.motion.cable.cable_shape import cable_course, connector_points
-from regrasp.motion.cable.gentle_pull import GentlePullParameters, pull_gently
+from regrasp.motion.cable.gentle_pull import GentlePullParameters, across_the_cable, pull_gently
 from regrasp.motion.cable.plugging import PluggingParameters
 from regrasp.motion.cable.seating import lying_otherwise, poses_before, seated_pose
 from regrasp.motion.cable.taking import TakingMotion, TakingParameters
@@ -164,28 +164,33 @@ class CableMotion(TakingMotion):
         return self._together(self.hand, steps())
 
     def pull_at_clip(self, held: RigidTransform) -> Request[Evidence]:
-        """Pull the inserted connector (tool_from_connector) gently back the way that the hand came in.
+        """Pull the inserted connector (tool_from_connector) gently out of the clip.
 
         The answer says whether the clip holds it. Then the hand is back where it was, else before the clip.
         """
         finite_pose("the held connector's pose", held)
-        kin, values, seating = self.kinematics[self.hand], self.parameters.gentle_pull, self.parameters.seating
+        kin, values = self.kinematics[self.hand], self.parameters.gentle_pull
 
         def steps() -> Generator[None, None, Evidence]:
             tool = self.tool(self.hand)
+            out = across_the_cable(self.known, tool * held, tool.rotation.apply([-1.0, 0.0, 0.0]))
 
-            def go_back(way: float) -> Generator[None, None, FloatArray]:
-                pose = tool * RigidTransform.from_translation([-way, 0.0, 0.0])
+            def go(way: FloatArray) -> Generator[None, None, FloatArray]:
+                pose = RigidTransform.from_components(tool.translation + way, tool.rotation)
                 yield from self._done(self.straight(self.hand, pose, speed=values.speed, pressing=True))
                 return self.arms[self.hand].reading().efforts
 
             def force(change: FloatArray) -> float:
                 q = self.joints(self.hand)
-                felt = tool_force(kin, q, change, kin.tool(q).apply(held.translation))
-                return float(felt @ tool.rotation.apply([1.0, 0.0, 0.0]))
+                return -float(tool_force(kin, q, change, kin.tool(q).apply(held.translation)) @ out)
 
-            pull = yield from pull_gently(go_back, force, values)
-            yield from go_back(0.0 if pull.detected else seating.distance)
+            pull = yield from pull_gently(lambda way: go(way * out), force, values)
+            if pull.detected:
+                yield from go(np.zeros(3))
+            else:
+                before = tool.apply([-self.parameters.seating.clear, 0.0, 0.0])
+                way = before - self.tool(self.hand).translation
+                yield from self._done(self._shift_held(self.hand, way, held))
             return pull
 
         return self._together(self.hand, steps())

@@ -88,7 +88,7 @@ class FakeGripper:
 class FakeMotion:
     """A motion takes `seconds`, after which its `error` is raised if there is one."""
 
-    insertions = 4
+    insertions = 5
 
     def __init__(self, clock: Clock, known: CableKnown) -> None:
         self.clock, self.known = clock, known
