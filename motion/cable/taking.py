@@ -4,6 +4,7 @@ from collections.abc import Callable, Collection, Generator, Iterator, Mapping, 
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
+from typing import TypeVar, cast
 
 import numpy as np
 from scipy.spatial.transform import RigidTransform
@@ -31,6 +32,8 @@ from regrasp.motion.robots.poses import angle_between, inverse, multiply
 from regrasp.motion.scene.collision import CollisionModel
 from regrasp.motion.service import PointCloudSource
 
+T = TypeVar("T")
+
 NO_GRASP = (CauseCode.NO_COLLISION_FREE_GOAL, CauseCode.OUT_OF_REACH)
 
 
@@ -56,9 +59,8 @@ class TakingParameters(CarryMotionParameters):
     # m of clearance in the straight way in, from which on an arm has room: one that has less leaves it to another
     # that has; choice, of the near margins
     roomy: float = 0.014
-    stow_rolls: int = (
-        12  # angles about the connector at which it is asked whether a grasp can stow it; every 30 degrees
-    )
+    per_step: int = 12  # kinds of grasps of which it is asked in a tick whether they can stow it; choice: 50 ms
+    stow_rolls: int = 12  # angles about the connector that are tried for that: every 30 degrees
     # m straight back from where something was held; the first that is free; choice
     retreats: tuple[float, ...] = (0.10, 0.08, 0.06, 0.05, 0.04, 0.03)
     unplug: UnplugParameters = field(default_factory=UnplugParameters)
@@ -83,6 +85,8 @@ class TakingMotion(CarryMotion):
         super().__init__(known, arms, grippers, clock, seed, parameters, on_anomaly)
         self._hand = known.cable.hand
         self._missed: list[FloatArray] = []  # grasps (4, 4), connector_from_tool, that closed on nothing
+        # by arm: the pose (4, 4) of the connector, and whether it can be stowed with a grasp, see `_without_roll`
+        self._stows: dict[str, tuple[FloatArray, dict[tuple[float, ...], bool]]] = {}
 
     @property
     def hand(self) -> str:
@@ -90,7 +94,7 @@ class TakingMotion(CarryMotion):
         return self._hand
 
     def take_with(self, arm: str) -> None:
-        """Let an arm handle the cable from now on. Raises KeyError if there is no arm of that name."""
+        """Let an arm of that name handle the cable from now on."""
         self._hand = self.known.arm(arm).name
 
     def hands_for(self, world_from_connector: RigidTransform) -> Request[list[str]]:
@@ -139,7 +143,7 @@ class TakingMotion(CarryMotion):
         cable = cable_course(self.known, world_from_connector)
 
         def steps() -> Iterator[None]:
-            stows = yield from self._stowing(self.hand, world_from_connector)
+            stows = _at_once(self._stowing(self.hand, world_from_connector))
             try:
                 if any(map(stows, self._candidates(self.hand, world_from_connector))):
                     keep = partial(_only, stows)
@@ -225,16 +229,21 @@ class TakingMotion(CarryMotion):
     def _stowing(self, arm: str, connector: RigidTransform) -> Generator[None, None, Callable[[Grasp], bool]]:
         """Steps that find which grasps of a connector let an arm bring it into the clip.
 
-        A turn about the connector's axis makes no difference: it may lie in the clip with any roll.
+        A turn about the connector's axis makes no difference: it may lie in the clip with any roll. The answers for the
+        connector that was asked about last are kept.
         """
-        answers: dict[tuple[float, ...], bool] = {}
         now, from_connector = connector.as_matrix(), inverse(connector.as_matrix())
-        for grasp in self._candidates(arm, connector):
-            held = multiply(inverse(grasp.pose), now)
-            key = _without_roll(multiply(from_connector, grasp.pose))
-            if key not in answers:
-                answers[key] = self._can_stow(arm, RigidTransform.from_matrix(held))
-                yield
+        about, answers = self._stows.get(arm, (now, {}))
+        if not answers or not np.array_equal(about, now):
+            answers = {}
+            for grasp in self._candidates(arm, connector):
+                held = multiply(inverse(grasp.pose), now)
+                key = _without_roll(multiply(from_connector, grasp.pose))
+                if key not in answers:
+                    answers[key] = self._can_stow(arm, RigidTransform.from_matrix(held))
+                    if len(answers) % self.parameters.per_step == 0:
+                        yield
+            self._stows[arm] = now, answers
         return lambda grasp: answers.get(_without_roll(multiply(from_connector, grasp.pose)), True)
 
     @counts_as("planning")
@@ -317,6 +326,15 @@ class TakingMotion(CarryMotion):
             point_cloud,
             lambda candidates: sorted(order(candidates), key=missed),
         )
+
+
+def _at_once(steps: Generator[None, None, T]) -> T:
+    """What the steps return, done in one tick."""
+    while True:
+        try:
+            next(steps)
+        except StopIteration as end:
+            return cast(T, end.value)
 
 
 def _only(wanted: Callable[[Grasp], bool], candidates: list[Grasp]) -> list[Grasp]:

@@ -89,6 +89,7 @@ class FakeMotion:
     """A motion takes `seconds`, after which its `error` is raised if there is one."""
 
     insertions = 5
+    hand = ""
 
     def __init__(self, clock: Clock, known: CableKnown) -> None:
         self.clock, self.known = clock, known
