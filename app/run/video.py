@@ -64,6 +64,22 @@ def write_text(frame: RgbImage, text: str, origin: tuple[int, int], scale: float
     cv2.putText(frame, text, origin, cv2.FONT_HERSHEY_SIMPLEX, scale, _INK, 1, cv2.LINE_AA)
 
 
+def _drop_cut_box(path: Path) -> None:
+    """Cut off a fragmented film's last box where it is not whole: with half a header no player opens it.
+
+    A box is 4 bytes of its size, big-endian, 4 of its type, then its content (ISO/IEC 14496-12, section 4.2).
+    """
+    with contextlib.suppress(OSError), path.open("r+b") as film:
+        length, whole = path.stat().st_size, 0
+        while whole + 8 <= length:
+            film.seek(whole)
+            size = int.from_bytes(film.read(4), "big")
+            if size < 8 or whole + size > length:
+                break
+            whole += size
+        film.truncate(whole)
+
+
 class VideoWriter:
     """An H.264 film, encoded by imageio_ffmpeg's own ffmpeg; a context manager.
 
@@ -76,7 +92,7 @@ class VideoWriter:
         Raises:
             OSError: ffmpeg cannot be started.
         """
-        self._shape = (size[1], size[0], 3)
+        self._path, self._shape = path, (size[1], size[0], 3)
         self._broken = False
         source = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}", "-r", str(fps), "-i", "-"]
         target = ["-an", "-c:v", "libx264", "-preset", "veryfast", "-crf", "23", "-pix_fmt", "yuv420p"]
@@ -118,6 +134,7 @@ class VideoWriter:
         with contextlib.suppress(BrokenPipeError):  # its exit status says why
             stdin.close()
         if code := self._ffmpeg.wait():
+            _drop_cut_box(self._path)
             raise OSError(f"ffmpeg could not write the video (exit status {code})")
 
     def __enter__(self) -> Self:

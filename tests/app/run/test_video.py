@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
-from regrasp.app.run.video import OVERVIEW_SIZE, SIZE, RgbImage, VideoWriter, compose
+from regrasp.app.run.video import OVERVIEW_SIZE, SIZE, RgbImage, VideoWriter, _drop_cut_box, compose
 
 
 def image(width: int, height: int, color: tuple[int, int, int]) -> RgbImage:
@@ -108,3 +108,21 @@ def test_after_a_kill_what_was_filmed_plays(tmp_path: Path) -> None:
     with pytest.raises(OSError, match="ffmpeg could not write"):
         video.close()
     assert len(colors(film)) >= 20  # a second
+
+
+def test_a_film_that_is_cut_anywhere_plays_up_to_there(tmp_path: Path) -> None:
+    film, cut = tmp_path / "v.mp4", tmp_path / "cut.mp4"
+    video = VideoWriter(film, 20, (64, 48))
+    for i in range(10_000):
+        video.write(image(64, 48, (i % 200, 99, 99)))
+        if film.exists() and film.read_bytes().count(b"moof") > 3:
+            break
+    os.kill(video._ffmpeg.pid, signal.SIGKILL)
+    with pytest.raises(OSError, match="ffmpeg could not write"):
+        video.close()
+    content = film.read_bytes()
+    second = content.index(b"moof", content.index(b"moof") + 4)
+    for end in range(second, len(content), (len(content) - second) // 12):
+        cut.write_bytes(content[:end])
+        _drop_cut_box(cut)
+        assert len(colors(cut)) >= 20
