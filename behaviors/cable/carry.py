@@ -68,6 +68,6 @@ class Insert(LookInHand, LookLeaf):
                 perception.watch(self.search, self.parameters.look_time, settle=self.looking.settle_time)
             )
             self.correct_held(looked.estimates)
-            yield from self.go_to_sleep(self.search_arm)
         except PlanningError as error:
             self.say("no look in the hand", why=str(error))
+        yield from self.go_to_sleep(self.search_arm)

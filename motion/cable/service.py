@@ -1,27 +1,22 @@
 """What the cable's leaves ask of the arms: unplug, carry, insert, let go, and look for a lost end."""
 
-from collections.abc import Callable, Collection, Generator, Iterator, Mapping, Sequence
+from collections.abc import Collection, Generator, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
 from typing import TypeVar
 
 import numpy as np
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import FloatArray
-from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.cell import Box
-from regrasp.interfaces.devices import Arm, Clock, Gripper
 from regrasp.interfaces.evidence import Evidence
 from regrasp.interfaces.request import Request
 from regrasp.motion.arguments import finite_pose
-from regrasp.motion.cable.cable_reach import CableReachParameters
 from regrasp.motion.cable.cable_shape import cable_course, connector_points
-from regrasp.motion.cable.gentle_pull import GentlePullParameters, across_the_cable, pull_gently
-from regrasp.motion.cable.plugging import PluggingParameters
+from regrasp.motion.cable.gentle_pull import across_the_cable, pull_gently
 from regrasp.motion.cable.seating import lying_otherwise, poses_before, seated_pose
-from regrasp.motion.cable.taking import TakingMotion, TakingParameters
+from regrasp.motion.cable.taking import TakingMotion
 from regrasp.motion.failure import PlanningError, TouchError
 from regrasp.motion.grasping.approach import pick_candidates
 from regrasp.motion.request import MotionRequest
@@ -32,31 +27,8 @@ from regrasp.motion.scene.planning_scene import NO_POINTS
 T = TypeVar("T")
 
 
-@dataclass(frozen=True)
-class CableMotionParameters(TakingParameters):
-    """Those of every task, and of what is done with the cable."""
-
-    gentle_pull: GentlePullParameters = field(default_factory=GentlePullParameters)
-    cable_reach: CableReachParameters = field(default_factory=CableReachParameters)
-    plugging: PluggingParameters = field(default_factory=PluggingParameters)
-
-
 class CableMotion(TakingMotion):
     """Requests to the arm that handles the cable, the hand, and to the one that carries the camera that searches."""
-
-    parameters: CableMotionParameters
-
-    def __init__(
-        self,
-        known: CableKnown,
-        arms: Mapping[str, Arm],
-        grippers: Mapping[str, Gripper],
-        clock: Clock,
-        seed: int,
-        parameters: CableMotionParameters = CableMotionParameters(),
-        on_anomaly: Callable[[str], None] = lambda sentence: None,
-    ) -> None:
-        super().__init__(known, arms, grippers, clock, seed, parameters, on_anomaly)
 
     def warm_up(self) -> None:
         """Look for a grasp of the plugged connector, check its cable, and drop both.

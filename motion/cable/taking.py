@@ -18,8 +18,11 @@ from regrasp.interfaces.devices import Arm, Clock, Gripper
 from regrasp.interfaces.request import Request
 from regrasp.interfaces.wall_time import counts_as
 from regrasp.motion.arguments import finite_pose
+from regrasp.motion.cable.cable_reach import CableReachParameters
 from regrasp.motion.cable.cable_shape import cable_course
 from regrasp.motion.cable.carrying import CarryMotion, CarryMotionParameters
+from regrasp.motion.cable.gentle_pull import GentlePullParameters
+from regrasp.motion.cable.plugging import PluggingParameters
 from regrasp.motion.cable.seating import SeatingParameters, poses_before
 from regrasp.motion.cable.tether import course_length
 from regrasp.motion.failure import GraspEmptyError, PlanningError, TouchError
@@ -30,6 +33,7 @@ from regrasp.motion.planning.straight import can_continue
 from regrasp.motion.request import MotionRequest
 from regrasp.motion.robots.poses import angle_between, inverse, multiply
 from regrasp.motion.scene.collision import CollisionModel
+from regrasp.motion.scene.planning_scene import NO_POINTS
 from regrasp.motion.service import PointCloudSource
 
 T = TypeVar("T")
@@ -51,8 +55,8 @@ class UnplugParameters:
 
 
 @dataclass(frozen=True)
-class TakingParameters(CarryMotionParameters):
-    """Those of every task, of carrying, and of taking hold."""
+class CableMotionParameters(CarryMotionParameters):
+    """Those of every task, of carrying, of taking hold, and of what is done with the cable then."""
 
     # Two grasps nearer than so many m and rad are one: what closed on nothing is tried again after all others; choice
     same_grasp: tuple[float, float] = (0.015, 0.35)
@@ -65,12 +69,15 @@ class TakingParameters(CarryMotionParameters):
     retreats: tuple[float, ...] = (0.10, 0.08, 0.06, 0.05, 0.04, 0.03)
     unplug: UnplugParameters = field(default_factory=UnplugParameters)
     seating: SeatingParameters = field(default_factory=SeatingParameters)
+    gentle_pull: GentlePullParameters = field(default_factory=GentlePullParameters)
+    cable_reach: CableReachParameters = field(default_factory=CableReachParameters)
+    plugging: PluggingParameters = field(default_factory=PluggingParameters)
 
 
 class TakingMotion(CarryMotion):
     """Takes hold of the connector with the arm that can do it best."""
 
-    parameters: TakingParameters
+    parameters: CableMotionParameters
 
     def __init__(
         self,
@@ -79,8 +86,8 @@ class TakingMotion(CarryMotion):
         grippers: Mapping[str, Gripper],
         clock: Clock,
         seed: int,
-        parameters: TakingParameters,
-        on_anomaly: Callable[[str], None],
+        parameters: CableMotionParameters = CableMotionParameters(),
+        on_anomaly: Callable[[str], None] = lambda sentence: None,
     ) -> None:
         super().__init__(known, arms, grippers, clock, seed, parameters, on_anomaly)
         self._hand = known.cable.hand
@@ -108,10 +115,12 @@ class TakingMotion(CarryMotion):
 
         def steps() -> Generator[None, None, list[str]]:
             ease: dict[str, int] = {}
+            self._keep_clear_of_cable(world_from_connector)
             for arm in sorted(self.arms, key=lambda arm: arm != first):
                 found = yield from self._ease(arm, world_from_connector)
                 if found is not None:
                     ease[arm] = found
+            self.keep_clear(NO_POINTS)
             return sorted(ease, key=lambda arm: ease[arm]) or [self.hand]
 
         return Request(steps())
@@ -161,10 +170,17 @@ class TakingMotion(CarryMotion):
     def can_pick_loose(self, world_from_connector: RigidTransform) -> bool:
         """Whether an arm has a free grasp of the loose connector, with all space that no camera has seen for full."""
         finite_pose("the connector's pose", world_from_connector)
-        return any(
+        self._keep_clear_of_cable(world_from_connector)
+        free = any(
             self._has_grasp(arm, world_from_connector, self._candidates(arm, world_from_connector))
             for arm in sorted(self.arms, key=lambda arm: arm != self.hand)
         )
+        self.keep_clear(NO_POINTS)
+        return free
+
+    def _keep_clear_of_cable(self, connector: RigidTransform) -> None:
+        """Keep clear of the cable of the loose connector, but for where a jaw takes hold."""
+        self._keep_clear_but_near(cable_course(self.known, connector), connector.translation)
 
     def grip(self, world_from_connector: RigidTransform) -> Request[Grip]:
         """Close the hand's jaw on the connector; the answer is what it holds then. It fails as `close` does."""
@@ -211,8 +227,7 @@ class TakingMotion(CarryMotion):
         optimistic: bool = False,
         near_margins: tuple[float, ...] | None = None,
     ) -> bool:
-        """Whether one of the candidates is free for an arm, clear of the cable; `near_margins` as in `Clearances`."""
-        self._keep_clear_but_near(cable_course(self.known, connector), connector.translation)
+        """Whether one of the candidates is free for an arm; `near_margins` as in `Clearances`."""
         clearances = self.parameters.clearances
         if near_margins is not None:
             clearances = replace(clearances, near_margins=near_margins)

@@ -21,7 +21,7 @@ from regrasp.interfaces.scene import Gravity, Obstacle, SceneSetup
 from regrasp.motion.cable.cable_path import natural_paths
 from regrasp.motion.cable.held import connector_spheres
 from regrasp.motion.cable.seating import poses_before
-from regrasp.motion.cable.service import CableMotionParameters
+from regrasp.motion.cable.taking import CableMotionParameters
 from regrasp.motion.cable.viewing import outline
 from regrasp.motion.cable.viewpoints import closer_views
 from regrasp.motion.failure import PlanningError

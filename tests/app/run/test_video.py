@@ -96,9 +96,8 @@ def test_after_ctrl_c_the_film_plays(tmp_path: Path) -> None:
     assert len(colors(tmp_path / "v.mp4")) > 20
 
 
-def test_after_a_kill_what_was_filmed_plays(tmp_path: Path) -> None:
-    """Also of ffmpeg itself, as by a container that is stopped."""
-    film = tmp_path / "v.mp4"
+def killed(film: Path) -> None:
+    """A film of some seconds whose ffmpeg is killed, as by a container that is stopped."""
     video = VideoWriter(film, 20, (64, 48))
     for i in range(10_000):
         video.write(image(64, 48, (i % 200, 99, 99)))
@@ -107,19 +106,16 @@ def test_after_a_kill_what_was_filmed_plays(tmp_path: Path) -> None:
     os.kill(video._ffmpeg.pid, signal.SIGKILL)
     with pytest.raises(OSError, match="ffmpeg could not write"):
         video.close()
-    assert len(colors(film)) >= 20  # a second
+
+
+def test_after_a_kill_what_was_filmed_plays(tmp_path: Path) -> None:
+    killed(tmp_path / "v.mp4")
+    assert len(colors(tmp_path / "v.mp4")) >= 20  # a second
 
 
 def test_a_film_that_is_cut_anywhere_plays_up_to_there(tmp_path: Path) -> None:
     film, cut = tmp_path / "v.mp4", tmp_path / "cut.mp4"
-    video = VideoWriter(film, 20, (64, 48))
-    for i in range(10_000):
-        video.write(image(64, 48, (i % 200, 99, 99)))
-        if film.exists() and film.read_bytes().count(b"moof") > 3:
-            break
-    os.kill(video._ffmpeg.pid, signal.SIGKILL)
-    with pytest.raises(OSError, match="ffmpeg could not write"):
-        video.close()
+    killed(film)
     content = film.read_bytes()
     second = content.index(b"moof", content.index(b"moof") + 4)
     for end in range(second, len(content), (len(content) - second) // 12):

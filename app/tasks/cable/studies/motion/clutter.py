@@ -17,7 +17,8 @@ from regrasp.interfaces.devices import Guard
 from regrasp.interfaces.reading import GripperReading, JointReading
 from regrasp.interfaces.scene import Obstacle
 from regrasp.interfaces.trajectory import Trajectory
-from regrasp.motion.cable.service import CableMotion, CableMotionParameters
+from regrasp.motion.cable.service import CableMotion
+from regrasp.motion.cable.taking import CableMotionParameters
 
 
 @dataclass(frozen=True)
