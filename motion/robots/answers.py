@@ -6,7 +6,6 @@ import numpy as np
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.motion.robots.forward import (
     ANY_AXIS,
-    AXIS,
     KIND,
     LOWER,
     SIGN,
@@ -18,7 +17,7 @@ from regrasp.motion.robots.forward import (
     tool_frame,
     tool_jacobian,
 )
-from regrasp.motion.robots.poses import inverse, multiply, multiply_into, rotation_vector
+from regrasp.motion.robots.poses import inverse, multiply, rotation_vector
 
 _TURN = 2 * np.pi
 _ROUNDING = 1e-9  # rad past a joint's limit that are rounding errors
@@ -58,18 +57,6 @@ def is_new(row: FloatArray, rows: FloatArray, count: int, distinct: float) -> bo
         if joint == len(row):
             return False
     return True
-
-
-@nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
-def in_first_parent(base_inverse, joints, pose, rail, out):  # type: ignore[no-untyped-def]
-    """Write a pose (4, 4) in the world as one in the frame of the first joint's parent, of a rail's carriage at that m.
-
-    A product that is returned takes half a microsecond more.
-    """
-    multiply_into(base_inverse, pose, out)
-    if joints[0, KIND] == SLIDE:
-        for r in range(3):
-            out[r, 3] -= joints[0, r] + rail * joints[0, AXIS + r]
 
 
 @nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
@@ -187,7 +174,10 @@ def _refined(base, joints, tip, q, target):  # type: ignore[no-untyped-def]
         jacobian = tool_jacobian(base, joints, last, q)
         if joints[0, KIND] == SLIDE:
             jacobian[:, 0] = 0.0
-        q = q + np.linalg.lstsq(jacobian, error, 1e-9)[0]
+        step = np.linalg.lstsq(jacobian, error, 1e-9)[0]
+        if joints[0, KIND] == SLIDE:
+            step[0] = 0.0  # the solver's rounding
+        q = q + step
     return q
 
 

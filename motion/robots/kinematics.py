@@ -9,7 +9,7 @@ from scipy.spatial.transform import RigidTransform
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.robot.chain import Chain
 from regrasp.interfaces.robot.robot import Robot
-from regrasp.motion.robots.answers import answers, in_first_parent, keep_within, solutions, straight_wrist_axis
+from regrasp.motion.robots.answers import answers, keep_within, solutions, straight_wrist_axis
 from regrasp.motion.robots.forward import joint_table, link_frames_in, tool_frame, tool_jacobian
 from regrasp.motion.robots.ik_parameters import InverseKinematicsParameters
 from regrasp.motion.robots.numerical_ik import NumericalSolver
@@ -19,9 +19,9 @@ _STRAIGHT = 1e-3  # sine of the joint before the last at which a wrist is straig
 
 
 class Solver(Protocol):
-    """What answers for the pose of the tool, in the frame of the first joint's parent."""
+    """What answers for the pose of the tool in the world, with a rail at zero."""
 
-    def solve(self, base_from_tool: FloatArray, near: FloatArray | None = None) -> FloatArray:
+    def solve(self, world_from_tool: FloatArray, near: FloatArray | None = None) -> FloatArray:
         """Positions (k, n), some of which may miss the pose (4, 4)."""
         ...
 
@@ -29,14 +29,15 @@ class Solver(Protocol):
 class _ClosedForm:
     """eaik's closed form, for chains of six revolute joints that it can decompose."""
 
-    def __init__(self, chain: Chain, first: int) -> None:
-        axes, places = chain.axes[first:], np.vstack([chain.origins[first:], chain.last_from_tool[:3, 3]])
+    def __init__(self, chain: Chain, base: FloatArray) -> None:
+        turn, places = base[:3, :3], np.vstack([chain.origins, chain.last_from_tool[:3, 3]]) @ base[:3, :3].T
+        places[0] += base[:3, 3]
         # The package's own wrapper, HPRobot, takes no tool that is turned.
-        robot = EaikRobot(axes.T, places.T, chain.last_from_tool[:3, :3], [], True)
+        robot = EaikRobot(turn @ chain.axes.T, places.T, turn @ chain.last_from_tool[:3, :3], [], True)
         self.known, self._branches = bool(robot.has_known_decomposition()), robot.calculate_IK
 
-    def solve(self, base_from_tool: FloatArray, near: FloatArray | None = None) -> FloatArray:
-        return self._branches(base_from_tool).Q
+    def solve(self, world_from_tool: FloatArray, near: FloatArray | None = None) -> FloatArray:
+        return self._branches(world_from_tool).Q
 
 
 class ArmKinematics:
@@ -63,13 +64,16 @@ class ArmKinematics:
         self.lower, self.upper = chain.lower, chain.upper
         _check_limits(chain)
         self._rail = robot.rail is not None
-        self._base_inverse = np.linalg.inv(self.base)
         self._zero = np.zeros(len(chain))
         tolerances = np.array([parameters.position, parameters.angle, parameters.distinct])
         wrist = straight_wrist_axis(self.joints)
         self._arm = (self.base, self.joints, self.last_from_tool, wrist, tolerances)
-        self._search = NumericalSolver(chain.without(int(self._rail)))
-        closed = _closed_form(chain, int(self._rail))
+        turning, parent = chain.without(int(self._rail)), self.base.copy()
+        self._along_rail = self.base[:3, :3] @ chain.axes[0]
+        if self._rail:
+            parent[:3, 3] += self.base[:3, :3] @ chain.origins[0]
+        self._search = NumericalSolver(turning, parent)
+        closed = _closed_form(turning, parent)
         self._solver: Solver = self._search if closed is None else closed
         self.closed_form = closed is not None
 
@@ -125,7 +129,7 @@ class ArmKinematics:
                 places = places[np.argsort(np.abs(places - near[0]), kind="stable")]
             solver = self._solver
             found = np.concatenate(
-                [self._answers(solver.solve(self._in_base(pose, at), near), pose, near, at) for at in places]
+                [self._answers(solver.solve(self._without_rail(pose, at), near), pose, near, at) for at in places]
             )
             if len(found):
                 break
@@ -133,30 +137,29 @@ class ArmKinematics:
 
     def solve(self, world_from_tool: FloatArray) -> FloatArray:
         """All solutions (k, n) for the tool's pose (4, 4), wrapped, whatever the limits; with a rail at zero."""
-        raw = self._solver.solve(self._in_base(world_from_tool, 0.0))
-        return solutions(*self._arm, raw, 0.0, world_from_tool)
+        return solutions(*self._arm, self._solver.solve(world_from_tool), 0.0, world_from_tool)
 
     def _searched(self, pose: FloatArray, near: FloatArray | None, rail: float) -> FloatArray:
         """As `ik`, with the rail at that m. A pose with a straight wrist that the closed form misses is searched.
 
         There it takes one of many solutions, which may be out of reach.
         """
-        base_from_tool = self._in_base(pose, rail)
-        raw = self._solver.solve(base_from_tool, near)
-        found = self._answers(raw, pose, near, rail)
+        target = self._without_rail(pose, rail) if self._rail else pose
+        raw = self._solver.solve(target, near)
+        found = answers(*self._arm, raw, rail, pose, self._zero if near is None else near)
         if len(found) or not self.closed_form or not _any_straight(raw):
             return found
-        return self._answers(self._search.solve(base_from_tool, near), pose, near, rail)
+        return self._answers(self._search.solve(target, near), pose, near, rail)
 
     def _answers(self, raw: FloatArray, pose: FloatArray, near: FloatArray | None, rail: float) -> FloatArray:
         """Those of a solver's rows that bring the tool to its pose, within the limits and nearest to `near` (n,)."""
         return answers(*self._arm, raw, rail, pose, self._zero if near is None else near)
 
-    def _in_base(self, pose: FloatArray, rail: float) -> FloatArray:
-        """The tool's pose (4, 4) in the frame of the first joint's parent, of a rail's carriage."""
-        out = np.empty((4, 4))
-        in_first_parent(self._base_inverse, self.joints, pose, rail, out)
-        return out
+    def _without_rail(self, pose: FloatArray, rail: float) -> FloatArray:
+        """A pose (4, 4) of the tool as it is with the rail at zero instead of `rail` m."""
+        moved = pose.copy()
+        moved[:3, 3] -= rail * self._along_rail
+        return moved
 
     def within_limits(self, rows: FloatArray, near: FloatArray | None = None) -> FloatArray:
         """The rows (k, n) within the joint limits, rounding errors aside; whole turns nearest to `near` (n,)."""
@@ -179,11 +182,11 @@ def past_limits(kin: ArmKinematics, q: FloatArray) -> str:
     )
 
 
-def _closed_form(chain: Chain, first: int) -> _ClosedForm | None:
-    """What solves the joints from number `first` on by a closed form; None if there is none."""
-    if len(chain) - first != 6 or chain.slides[first:].any():
+def _closed_form(chain: Chain, base: FloatArray) -> _ClosedForm | None:
+    """What solves the joints of a chain at `base` (4, 4) by a closed form; None if there is none."""
+    if len(chain) != 6 or chain.slides.any():
         return None
-    closed = _ClosedForm(chain, first)
+    closed = _ClosedForm(chain, base)
     return closed if closed.known else None
 
 

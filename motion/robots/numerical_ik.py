@@ -8,8 +8,6 @@ from regrasp.interfaces.robot.chain import Chain
 from regrasp.motion.robots.forward import joint_table, tool_frame, tool_jacobian
 from regrasp.motion.robots.poses import rotation_vector
 
-_EYE = np.eye(4)
-
 
 class NumericalSolver:
     r"""Joint positions at which the tool has a pose, each found from a different start.
@@ -18,9 +16,9 @@ class NumericalSolver:
     reflective method. The starts are the same for every pose: the middle of the limits, then random ones.
     """
 
-    def __init__(self, chain: Chain, starts: int = 12, answers: int = 4, seed: int = 0) -> None:
-        """It gives up after so many `starts`, or when it has so many `answers`."""
-        self._joints = joint_table(chain)
+    def __init__(self, chain: Chain, base: FloatArray, starts: int = 12, answers: int = 4, seed: int = 0) -> None:
+        """The chain stands at `base` (4, 4). It gives up after so many `starts`, or when it has so many `answers`."""
+        self._base, self._joints = np.ascontiguousarray(base), joint_table(chain)
         self._last_from_tool = np.ascontiguousarray(chain.last_from_tool)
         inside = 1e-9 * (chain.upper - chain.lower)
         self._lower, self._upper = chain.lower + inside, chain.upper - inside
@@ -30,7 +28,7 @@ class NumericalSolver:
         )
         self._answers = answers
 
-    def solve(self, base_from_tool: FloatArray, near: FloatArray | None = None) -> FloatArray:
+    def solve(self, world_from_tool: FloatArray, near: FloatArray | None = None) -> FloatArray:
         """Positions (k, n) at which the tool has the pose (4, 4); the first is sought from the last n of `near`."""
         starts = self._starts if near is None else np.vstack([near[-self._starts.shape[1] :], self._starts])
         found: list[FloatArray] = []
@@ -40,7 +38,7 @@ class NumericalSolver:
                 start,
                 self._jacobian,
                 bounds=(self._lower, self._upper),
-                args=(base_from_tool,),
+                args=(world_from_tool,),
                 xtol=1e-12,
                 ftol=1e-14,
                 gtol=1e-12,
@@ -53,10 +51,10 @@ class NumericalSolver:
         return np.array(found).reshape(-1, self._starts.shape[1])
 
     def _error(self, q: FloatArray, target: FloatArray) -> FloatArray:
-        pose = tool_frame(_EYE, self._joints, self._last_from_tool, q)
+        pose = tool_frame(self._base, self._joints, self._last_from_tool, q)
         turn = rotation_vector(pose[:3, :3] @ target[:3, :3].T)
         return np.concatenate([pose[:3, 3] - target[:3, 3], turn])
 
     def _jacobian(self, q: FloatArray, target: FloatArray) -> FloatArray:
         # The derivative of the rotation's logarithm is the identity where it vanishes; near enough to converge.
-        return np.asarray(tool_jacobian(_EYE, self._joints, self._last_from_tool, q))
+        return np.asarray(tool_jacobian(self._base, self._joints, self._last_from_tool, q))

@@ -160,6 +160,7 @@ def test_a_joint_that_turns_more_than_once_round_comes_back_nearest_to_where_it_
 
 
 @example(1696, 0.0)
+@example(148353, 0.0)
 @given(st.integers(0, 2**32 - 1), st.floats(-1.0, 2.0))
 def test_a_rail_stays_where_it_is_if_the_arm_reaches(seed: int, rail: float) -> None:
     q = drawn(ON_RAIL, 1, seed)[0]
