@@ -6,8 +6,8 @@ refused with a ValueError at once; what an arm cannot do, with a PlanningError b
 """
 
 from collections.abc import Callable, Collection, Generator, Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from itertools import product
 
 import numpy as np
 from scipy.spatial.transform import RigidTransform
@@ -44,6 +44,7 @@ class MotionParameters:
     approach_speed: float = 0.3  # share of the joints' speed on straight paths near things; choice
     optimistic_speed: float = 0.3  # share of the joints' speed on a path that may touch something; choice
     pulling_speed: float = 0.5  # share at most of one that pulls an elastic thing, and feels little else; choice
+    arm_error: float = 0.005  # m that a tool may be off: the ViperX's accuracy by its maker
     touches: int = 6  # that end a motion; after each before it the arm goes on by another way; choice
     camera_timeout: float = 1.0  # s that a camera has to show the arm; a sound one needs 0.2
     clearances: Clearances = field(default_factory=Clearances)
@@ -293,8 +294,12 @@ class Motion(PlanningScene):
         without: Collection[Box],
         point_cloud: PointCloudSource | None,
         order: Callable[[list[Grasp]], list[Grasp]] = list,
+        onward: Callable[[FloatArray], bool] = lambda q: True,
     ) -> MotionRequest:
-        """`pick`; of the candidates, the cheapest first, those are tried that `order` keeps, in its order."""
+        """`pick`; of the candidates, the cheapest first, those are tried that `order` keeps, in its order.
+
+        Where there are any, it takes hold with joints (n,) that are well for what comes then, as `onward` says.
+        """
         finite_pose("the cylinder's pose", world_from_cylinder)
         near_points = None if clear_of is None else rows("the points to keep clear of", clear_of, 3)
 
@@ -311,6 +316,7 @@ class Motion(PlanningScene):
                     raise
                 where = self._how_far(arm, world_from_cylinder.translation)
                 raise PlanningError(error.code, f"{error} of the {arm} arm: {where}") from None
+            approaches = [path for path in approaches if onward(path[-1])] or approaches
             self.grippers[arm].open(jaw.open_gap)
             path = self._plan(model, q, np.array([approach[0] for approach in approaches]))
             approach = min(approaches, key=lambda approach: float(np.abs(approach[0] - path[-1]).max()))
@@ -421,16 +427,19 @@ class Motion(PlanningScene):
     ) -> list[FloatArray]:
         """Joint paths (k, n) from standoff to grasp; `model` counts away from what is grasped.
 
-        They touch the boxes `without` only if there are no others. `clearances`: default as set.
+        They touch the boxes `without` only if there are no others, and come nearer to known boxes than the arm errs,
+        which are rigid, likewise. `clearances`: default as set.
         """
         clearances, pick = clearances or self.parameters.clearances, self.parameters.pick
-        gap = self.parameters.execution.jaw.open_gap
-        if without:
-            near = self.model(arm, opening=gap, optimistic=optimistic)
-            with suppress(PlanningError):
-                return find_approaches(model, near, self.joints(arm), candidates, clearances, pick)
-        near = self.model(arm, without=without, opening=gap, optimistic=optimistic)
-        return find_approaches(model, near, self.joints(arm), candidates, clearances, pick)
+        gap, q = self.parameters.execution.jaw.open_gap, self.joints(arm)
+        spared = ((), without) if without else ((),)
+        for grown, boxes in product((self.parameters.arm_error, 0.0), spared):
+            near = self.model(arm, without=boxes, opening=gap, optimistic=optimistic, grown=grown)
+            try:
+                return find_approaches(model, near, q, candidates, clearances, pick)
+            except PlanningError as found:
+                error = found
+        raise error
 
     def _plan(
         self,

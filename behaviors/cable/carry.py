@@ -4,12 +4,13 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from regrasp.behaviors.cable.hand import HandLeaf, LookInHand
-from regrasp.behaviors.cable.keys import HELD
+from regrasp.behaviors.cable.keys import HELD, NOTICES, VAIN_CARRIES
 from regrasp.behaviors.cable.look import LookLeaf
 from regrasp.behaviors.keys import Keys
 from regrasp.behaviors.leaf import LeafFailed, LeafSteps
 from regrasp.interfaces.cable.cause import CableCause
-from regrasp.motion.failure import PlanningError
+from regrasp.interfaces.cause import CauseCode
+from regrasp.motion.failure import NO_WAY, PlanningError
 
 
 @dataclass(frozen=True)
@@ -22,41 +23,75 @@ class InsertParameters:
     other_look: int = 0
 
 
+@dataclass(frozen=True)
+class CarryParameters:
+    """How often the connector is carried."""
+
+    carries: int = 2  # that fail before the hand lets it fall; choice
+
+
 class Carry(HandLeaf):
-    """Plans the held connector's path to a place in front of the clip and follows it."""
+    """Plans the held connector's path to a place in front of the clip and follows it.
+
+    Where it is held so that no pose of the hand brings it there, or carrying it has failed before, the hand lets it
+    fall: its cable may hang on something, and it is taken otherwise then.
+    """
 
     NEEDS: ClassVar[Keys] = (HELD,)
+    READS: ClassVar[Keys] = (NOTICES, VAIN_CARRIES)
+    WRITES: ClassVar[Keys] = (NOTICES, VAIN_CARRIES)
+    CLEARS: ClassVar[Keys] = (HELD,)
+    parameters: ClassVar[CarryParameters] = CarryParameters()
 
     def steps(self) -> LeafSteps:
         """See the class."""
-        yield self.services.motion.carry_to_clip(self.held())
+        try:
+            yield from self.ask(self.services.motion.carry_to_clip(self.held()))
+        except PlanningError as error:
+            failed = self.read(VAIN_CARRIES) + 1
+            self.write(VAIN_CARRIES, failed)
+            again = error.code in NO_WAY and failed < self.parameters.carries
+            if not again and error.code in (*NO_WAY, CauseCode.OUT_OF_REACH):
+                yield from self.let_fall()
+            raise
 
 
 class Insert(LookInHand, LookLeaf):
     """Looks how the connector lies in the hand, brings it straight into the clip, and pulls gently.
 
     Where the hand hides it from the overview camera, the other arm's camera looks, if it can. Where the clip does not
-    hold it, the hand comes back out, looks again, and tries as if it lay a little otherwise. When no try is left, the
-    leaf fails; the jaw is still closed then.
+    hold it, the hand comes back out, looks again, and tries as if it lay a little otherwise. When no try is left, it
+    lies in the hand in an unknown way: the hand lets it fall, and the leaf fails.
     """
 
     NEEDS: ClassVar[Keys] = (HELD,)
+    READS: ClassVar[Keys] = (NOTICES,)
+    WRITES: ClassVar[Keys] = (HELD, NOTICES)
+    CLEARS: ClassVar[Keys] = (HELD,)
     parameters: ClassVar[InsertParameters] = InsertParameters()
 
     def steps(self) -> LeafSteps:
         """See the class."""
-        motion = self.services.motion
+        motion, why = self.services.motion, ""
         for attempt in range(motion.insertions):
             seen = yield from self.look_in_hand(self.parameters.look_time)
             if not seen and attempt == self.parameters.other_look and self.search_arm != self.hand:
                 yield from self._look_with_the_other_arm()
-            yield motion.insert(self.held(), attempt)
+            try:
+                yield from self.ask(motion.insert(self.held(), attempt))
+            except PlanningError as error:
+                if error.code is not CauseCode.OUT_OF_REACH:
+                    raise
+                why = why or str(error)
+                continue
             yield from self.wait(self.parameters.seat_time)
             pull = yield from self.ask(motion.pull_at_clip(self.held()))
             self.say("pulled at the clip", stiffness=round(pull.value), holds=pull.detected)
             if pull.detected:
                 return
-        raise LeafFailed(CableCause.NOT_STOWED, f"the clip does not hold the connector: {pull.sentence}")
+            why = pull.sentence
+        yield from self.let_fall()
+        raise LeafFailed(CableCause.NOT_STOWED, f"the clip does not hold the connector: {why}")
 
     def _look_with_the_other_arm(self) -> LeafSteps:
         """Look in the hand with the camera that searches. Where it cannot look there, only an event says so."""

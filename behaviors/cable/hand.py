@@ -4,7 +4,7 @@ from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, TypeVar
 
-from regrasp.behaviors.cable.keys import HELD
+from regrasp.behaviors.cable.keys import HELD, NOTICES, VAIN_CARRIES, LossNotice
 from regrasp.behaviors.cable.services import CableServices
 from regrasp.behaviors.keys import Keys
 from regrasp.behaviors.leaf import LeafFailed, LeafSteps, StepsLeaf
@@ -52,6 +52,10 @@ class CableLeaf(StepsLeaf):
         """Points (n, 3) m in the world that the overview saw from second `since` on; None until a picture comes."""
         return self.services.perception.surface(self.overview, since)
 
+    def note_loss(self, by: str) -> None:
+        """Note that the connector is lost, as `by` shows. The leaf READS and WRITES the key NOTICES."""
+        self.write(NOTICES, (*self.read(NOTICES), LossNotice(self.services.clock.now(), by)))
+
     def go_to_sleep(self, arm: str, *, pulling: bool = False) -> LeafSteps:
         """Bring an arm to its sleep pose, out of the cameras' and the other arm's way.
 
@@ -61,7 +65,10 @@ class CableLeaf(StepsLeaf):
 
 
 class HandLeaf(CableLeaf):
-    """A leaf in which the hand works. One that asks for `held` NEEDS the key HELD, one that grips WRITES it."""
+    """A leaf in which the hand works.
+
+    One that asks for `held` NEEDS the key HELD, one that grips WRITES it and VAIN_CARRIES.
+    """
 
     leaving: ClassVar[HandParameters] = HandParameters()
 
@@ -71,6 +78,15 @@ class HandLeaf(CableLeaf):
         if held is None:
             raise LeafFailed(CableCause.SLIPPED, "the hand holds nothing any more")
         return held
+
+    def let_fall(self) -> LeafSteps:
+        """Let go of a connector that the hand holds so that it cannot deliver it: it is taken otherwise then.
+
+        The leaf CLEARS the key HELD, besides what `note_loss` needs.
+        """
+        yield self.services.motion.let_go()
+        self.clear(HELD)
+        self.note_loss("hand")
 
     def take(self, arms: Sequence[str], pick: Callable[[], Request[None]]) -> LeafSteps:
         """Let the first of the `arms` that finds a way bring its jaw round the connector: the hand from now on.
@@ -95,6 +111,7 @@ class HandLeaf(CableLeaf):
         """Close the jaw; then the belief is that it holds the connector. Raises PlanningError when it does not."""
         grip = yield from self.ask(self.services.motion.grip(world_from_connector))
         self.write(HELD, grip.pose)
+        self.write(VAIN_CARRIES, 0)
         self.say("grasped", gap=grip.gap)
 
     def grip_or_leave(self, world_from_connector: "RigidTransform") -> LeafSteps:

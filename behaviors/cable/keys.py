@@ -28,5 +28,6 @@ class LossNotice:
 
 HELD: "Key[RigidTransform]" = Key("cable/held", "tool_from_connector of the hand, which holds it")
 FOUND: Key[Found] = Key("cable/found", "where the connector was found for a grasp, in the world")
+VAIN_CARRIES: Key[int] = Key("cable/vain_carries", "carries that failed since it was gripped", default=0)
 VAIN_SEARCHES: Key[int] = Key("cable/vain_searches", "searches that failed since it was found last", default=0)
 NOTICES: Key[tuple[LossNotice, ...]] = Key("cable/notices", "losses that were noticed, the latest last", default=())

@@ -3,7 +3,7 @@
 from typing import ClassVar
 
 from regrasp.behaviors.cable.hand import HandLeaf
-from regrasp.behaviors.cable.keys import FOUND, HELD
+from regrasp.behaviors.cable.keys import FOUND, HELD, VAIN_CARRIES
 from regrasp.behaviors.keys import Keys
 from regrasp.behaviors.leaf import LeafSteps
 
@@ -16,7 +16,7 @@ class Regrasp(HandLeaf):
     """
 
     NEEDS: ClassVar[Keys] = (FOUND,)
-    WRITES: ClassVar[Keys] = (HELD,)
+    WRITES: ClassVar[Keys] = (HELD, VAIN_CARRIES)
 
     def steps(self) -> LeafSteps:
         """See the class."""

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 from regrasp.behaviors.cable.hand import HandLeaf
-from regrasp.behaviors.cable.keys import HELD, NOTICES, LossNotice
+from regrasp.behaviors.cable.keys import HELD, NOTICES
 from regrasp.behaviors.cable.look import LookLeaf
 from regrasp.behaviors.keys import Keys
 from regrasp.behaviors.leaf import LeafFailed, LeafSteps
@@ -109,5 +109,5 @@ class LookAtStow(LookLeaf):
         return looked.estimates
 
     def _lost(self, message: str) -> None:
-        self.write(NOTICES, (*self.read(NOTICES), LossNotice(self.services.clock.now(), "place")))
+        self.note_loss("place")
         raise LeafFailed(self.CAUSE, message)

@@ -5,7 +5,7 @@ from functools import partial
 from typing import Any, ClassVar
 
 from regrasp.behaviors.cable.hand import HandLeaf
-from regrasp.behaviors.cable.keys import HELD
+from regrasp.behaviors.cable.keys import HELD, VAIN_CARRIES
 from regrasp.behaviors.keys import Keys
 from regrasp.behaviors.leaf import LeafPort, LeafSteps
 from regrasp.motion.failure import GraspEmptyError
@@ -26,7 +26,7 @@ class Unplug(HandLeaf):
     no way, another arm tries.
     """
 
-    WRITES: ClassVar[Keys] = (HELD,)
+    WRITES: ClassVar[Keys] = (HELD, VAIN_CARRIES)
     INPUT_PORTS: ClassVar[dict[str, Any]] = {
         "socket": LeafPort(
             data_type=str,

@@ -2,6 +2,7 @@
 
 from collections.abc import Collection, Generator, Iterator, Sequence
 from contextlib import suppress
+from functools import partial
 from typing import TypeVar
 
 import numpy as np
@@ -19,6 +20,7 @@ from regrasp.motion.cable.seating import lying_otherwise, poses_before, seated_p
 from regrasp.motion.cable.taking import TakingMotion
 from regrasp.motion.failure import PlanningError, TouchError
 from regrasp.motion.grasping.approach import pick_candidates
+from regrasp.motion.planning.straight import straight_lines
 from regrasp.motion.request import MotionRequest
 from regrasp.motion.robots.contact_guard import ContactLimits
 from regrasp.motion.robots.tool_force import tool_force
@@ -71,8 +73,9 @@ class CableMotion(TakingMotion):
 
         def steps() -> Iterator[None]:
             axis, held = plug.rotation.apply([1.0, 0.0, 0.0]), self.tool(self.hand).inv() * plug
+            way = next(filter(partial(self._free_along, -axis), values.draw_outs), values.draw_outs[-1])
             try:
-                yield from self._done(self.shift(self.hand, -values.draw_out * axis, checked=False))
+                yield from self._done(self.shift(self.hand, -way * axis, checked=False))
             except PlanningError as error:
                 if error.code is not CauseCode.MOTION_BLOCKED:
                     raise
@@ -88,6 +91,14 @@ class CableMotion(TakingMotion):
                 return
 
         return self._together(self.hand, steps())
+
+    def _free_along(self, direction: FloatArray, way: float) -> bool:
+        """Whether the hand can go `way` m straight in a direction (3,) and come hardly nearer to anything."""
+        kin, q, clearances = self.kinematics[self.hand], self.joints(self.hand), self.parameters.clearances
+        goal = kin.tool_matrix(q)
+        goal[:3, 3] += way * direction
+        path, model = straight_lines(kin, q, [goal]), self.model(self.hand)
+        return path is not None and model.path_free(path[1:], min(model.clearance(q) - clearances.nearer, 0.0))
 
     def carry_to_clip(self, held: RigidTransform) -> MotionRequest:
         """Bring the held connector (tool_from_connector) before the clip, from where the hand can go in and back out.

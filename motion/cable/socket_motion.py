@@ -35,7 +35,7 @@ class SocketMotion(CableMotion):
         """
         socket, seating, values = self.known.cable.socket(name), self.parameters.seating, self.parameters.unplug
         # As a plug is drawn out: along its axis, and away from the panel, which is before the hand.
-        before = -values.draw_out * held.rotation.apply([1.0, 0.0, 0.0])
+        before = -values.draw_outs[0] * held.rotation.apply([1.0, 0.0, 0.0])
         away = before - [values.retreat, 0.0, 0.0]
 
         def steps() -> Iterator[None]:

@@ -29,7 +29,7 @@ from regrasp.motion.failure import GraspEmptyError, PlanningError, TouchError
 from regrasp.motion.grasping.approach import pick_candidates
 from regrasp.motion.grasping.gap_test import GripWatch
 from regrasp.motion.grasping.grasps import Grasp
-from regrasp.motion.planning.straight import can_continue
+from regrasp.motion.planning.straight import can_continue, straight_lines
 from regrasp.motion.request import MotionRequest
 from regrasp.motion.robots.poses import angle_between, inverse, multiply
 from regrasp.motion.scene.collision import CollisionModel
@@ -45,7 +45,8 @@ NO_GRASP = (CauseCode.NO_COLLISION_FREE_GOAL, CauseCode.OUT_OF_REACH)
 class UnplugParameters:
     """How the plug is gripped and drawn out."""
 
-    draw_out: float = 0.05  # m along the plug's axis; the plug sits 0.015 m deep
+    # m along the plug's axis, the first that is free, else the last; the plug sits 0.015 m deep; choice
+    draw_outs: tuple[float, ...] = (0.05, 0.04, 0.03)
     # m by which the plug lies nearer to the finger tips than the pads' middle: they end 12 mm past it, and the panel is
     # 20 mm behind the plug
     shallow: float = 0.008
@@ -136,7 +137,14 @@ class TakingMotion(CarryMotion):
         def order(candidates: list[Grasp]) -> list[Grasp]:
             return sorted(candidates, key=room)
 
-        return self._pick_connector(plug, self.parameters.unplug.shallow, None, point_cloud, order)
+        kin, axis = self.kinematics[self.hand], plug.rotation.apply([1.0, 0.0, 0.0])
+
+        def can_draw_out(q: FloatArray) -> bool:
+            out = kin.tool_matrix(q)
+            out[:3, 3] -= self.parameters.unplug.draw_outs[0] * axis
+            return straight_lines(kin, q, [out]) is not None
+
+        return self._pick_connector(plug, self.parameters.unplug.shallow, None, point_cloud, order, can_draw_out)
 
     def pick_loose(
         self,
@@ -300,7 +308,7 @@ class TakingMotion(CarryMotion):
         0: it is free then, 1: it may be, 2: it meets something.
         """
         kin, out = self.kinematics[self.hand], np.eye(4)
-        out[:3, 3] = -self.parameters.unplug.draw_out * plug.rotation.apply([1.0, 0.0, 0.0])
+        out[:3, 3] = -self.parameters.unplug.draw_outs[0] * plug.rotation.apply([1.0, 0.0, 0.0])
         gap, margin = 2 * self.known.cable.connector.radius, self.parameters.clearances.tight_margin
         models = [self.model(self.hand, opening=gap, optimistic=optimistic) for optimistic in (False, True)]
 
@@ -324,6 +332,7 @@ class TakingMotion(CarryMotion):
         cable: FloatArray | None,
         point_cloud: PointCloudSource | None,
         order: Callable[[list[Grasp]], list[Grasp]],
+        onward: Callable[[FloatArray], bool] = lambda q: True,
     ) -> MotionRequest:
         """`pick` the connector; what has closed on nothing is tried after all other grasps, which the `order` sorts."""
         connector_from_world, near = inverse(world_from_connector.as_matrix()), self.parameters.same_grasp
@@ -340,6 +349,7 @@ class TakingMotion(CarryMotion):
             self._bracket_near(world_from_connector),
             point_cloud,
             lambda candidates: sorted(order(candidates), key=missed),
+            onward,
         )
 
 

@@ -233,18 +233,20 @@ class PlanningScene:
         without: Collection[Box] = (),
         opening: float | None = None,
         optimistic: bool = False,
+        grown: float = 0.0,
     ) -> CollisionModel:
         """What `arm` must not touch now.
 
         `held` (m, 4) m are spheres in the tool frame that stand for what the hand carries. Without `others` the other
         arms and the seen surfaces do not count; the boxes `without` may be touched. The jaw stands as the fingers read,
         or `opening` m wide. `optimistic`: the space that no camera has seen
-        counts as free, and seen surfaces are taken to be at the far sides of their voxels.
+        counts as free, and seen surfaces are taken to be at the far sides of their voxels. Known boxes count as
+        `grown` m larger on each side.
         """
         bodies = [
             self.model(name, others=False).spheres(self.joints(name)) for name in self.arms if others and name != arm
         ]
-        boxes = [box for box in self._boxes if box not in without]
+        boxes = [_larger(box, grown) if grown else box for box in self._boxes if box not in without]
         camera = self._cameras.get(arm)
         body = ArmBody(
             camera.offset if camera else None,
@@ -276,6 +278,12 @@ class PlanningScene:
                 return False
         grid = self._grid(optimistic)
         return grid is None or bool(np.min(grid.at(rays)) > 0.0)
+
+
+def _larger(box: Box, by: float) -> Box:
+    """The box, `by` m larger on each side."""
+    x, y, z = (edge + 2 * by for edge in box.size)
+    return box.model_copy(update={"size": (x, y, z)})
 
 
 def _points_beyond(points: FloatArray, spheres: FloatArray, margin: float) -> FloatArray:

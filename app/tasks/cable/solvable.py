@@ -83,7 +83,7 @@ def lost_pose(
         return None
     plug = known.cable.socket(PLUGGED_INTO).world_from_plug(known.cable.connector.length)
     back, goal = np.outer(np.linspace(-1.0, 0.0, 10)[::-1], [1.0, 0.0, 0.0]), known.cable.clip.world_from_seat
-    out = plug * RigidTransform.from_translation(parameters.unplug.draw_out * back)
+    out = plug * RigidTransform.from_translation(parameters.unplug.draw_outs[0] * back)
     away = RigidTransform.from_translation(parameters.unplug.retreat * back) * out[-1]
     natural = natural_paths(known, away[-1].as_matrix(), goal.as_matrix(), parameters.carry.cable)
     path = np.concatenate([out.as_matrix(), away.as_matrix(), next(natural)])

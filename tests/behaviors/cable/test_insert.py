@@ -7,6 +7,9 @@ from fake_services import Seen, Stage, seen, unseen
 from py_trees.common import Status
 from scipy.spatial.transform import RigidTransform, Rotation
 
+from regrasp.behaviors.cable.keys import HELD as HELD_KEY
+from regrasp.behaviors.cable.keys import NOTICES
+from regrasp.behaviors.keys import value_of
 from regrasp.interfaces.cable.cause import CableCause
 from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.cell import pose_along
@@ -80,7 +83,7 @@ def test_what_the_clip_does_not_hold_is_looked_at_again_and_inserted_otherwise(s
     assert len(stage.log.of("connector in the hand")) == 3
 
 
-def test_when_no_try_is_left_it_fails_and_still_holds(stage: Stage) -> None:
+def test_when_no_try_is_left_it_fails_and_lets_it_fall(stage: Stage) -> None:
     stage.belief.held, stage.motion.clip_stiffness = HELD, lambda insertion: 50.0
     stage.perception.shows = lambda _, t: lying(t, stage.motion.tool_pose * HELD)
     assert stage.run(stage.tree(INSERT), 60.0) is Status.FAILURE
@@ -88,8 +91,9 @@ def test_when_no_try_is_left_it_fails_and_still_holds(stage: Stage) -> None:
     assert cause.code == CableCause.NOT_STOWED
     assert "rose by 50 N/m" in cause.message
     assert len(stage.motion.inserted) == stage.motion.insertions
-    assert stage.belief.held is not None
-    assert not any(told for gripper in stage.motion.grippers.values() for told in gripper.told)
+    assert value_of(HELD_KEY, None) is None
+    assert [word for word, _ in stage.motion.grippers[stage.motion.hand].told] == ["open"]
+    assert [notice.by for notice in value_of(NOTICES)] == ["hand"]
 
 
 def test_where_the_hand_hides_it_the_other_arm_looks_and_goes_back_to_sleep(stage: Stage) -> None:
