@@ -427,13 +427,14 @@ class Motion(PlanningScene):
     ) -> list[FloatArray]:
         """Joint paths (k, n) from standoff to grasp; `model` counts away from what is grasped.
 
-        They touch the boxes `without` only if there are no others, and come nearer to known boxes than the arm errs,
-        which are rigid, likewise. `clearances`: default as set.
+        They touch the boxes `without` only if there are no others. Known boxes are rigid: nearer to them than the arm
+        errs they lead only where the map is read optimistically and there are no others. `clearances`: default as set.
         """
         clearances, pick = clearances or self.parameters.clearances, self.parameters.pick
         gap, q = self.parameters.execution.jaw.open_gap, self.joints(arm)
         spared = ((), without) if without else ((),)
-        for grown, boxes in product((self.parameters.arm_error, 0.0), spared):
+        errors = (self.parameters.arm_error, 0.0)[: 1 + optimistic]
+        for grown, boxes in product(errors, spared):
             near = self.model(arm, without=boxes, opening=gap, optimistic=optimistic, grown=grown)
             try:
                 return find_approaches(model, near, q, candidates, clearances, pick)

@@ -349,7 +349,7 @@ def test_a_camera_that_shows_no_arm_changes_nothing(rig: Rig, points: Points | N
     plug = rig.known.cable.socket("back_4").world_from_plug(rig.known.cable.connector.length)
     rig.run(rig.motion.pick("right", plug, rig.known.cable.connector, point_cloud=lambda _since: points))
     blind = Rig(rig.known)
-    blind.run(blind.motion.pick("right", plug, rig.known.cable.connector, shallow=0.008))
+    blind.run(blind.motion.pick("right", plug, rig.known.cable.connector))
     assert rig.motion.joints("right") == pytest.approx(blind.motion.joints("right"))
 
 
