@@ -279,7 +279,7 @@ class Motion(PlanningScene):
                 self._check_shift(model, path, float(np.linalg.norm(way)))
             else:
                 model = self.model(arm, held=held)
-            limits = contact if checked else self._guard.pressing
+            limits = contact if checked or contact else self._guard.pressing
             yield from self._follow(arm, path, self.parameters.approach_speed, model, limits)
 
         return self.execution.request(arm, steps())

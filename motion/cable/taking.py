@@ -47,6 +47,7 @@ class UnplugParameters:
 
     # m along the plug's axis, the first that is free, else the last; the plug sits 0.015 m deep; choice
     draw_outs: tuple[float, ...] = (0.05, 0.04, 0.03)
+    loose: float = 0.02  # m of that after which only the cable pulls, and a touch is felt; choice
     # m by which the plug lies nearer to the finger tips than the pads' middle: they end 12 mm past it, and the panel is
     # 20 mm behind the plug
     shallow: float = 0.008

@@ -34,6 +34,8 @@ class ContactGuardParameters:
     # The end of a cable that keeps to its natural shapes changes the efforts by 0.12 of the wrist's and 0.04 of the
     # other joints'; a slow hand presses foam for half a second before that is felt; choice.
     carrying: ContactLimits = ContactLimits(0.15, adaptation=1.0)
+    # One that is drawn out of its socket straightens its cable; this stops at 12 N at a ViperX's hand; choice
+    drawing: ContactLimits = ContactLimits(0.3, elastic=True)
     # One that is bent, pressed together, or caught in the jaw changes them by up to half; choice
     pulling: ContactLimits = ContactLimits(0.7, elastic=True)
     # A plug that is gripped askew jams in its socket up to what the drives can do: this stops at a blow only; choice
