@@ -19,7 +19,7 @@ class UnplugParameters:
 
 
 class Unplug(HandLeaf):
-    """Grips the connector in the `socket` of that name, draws it out along its axis, and away from the panel.
+    """Grips the connector in the `socket` of that name, draws it out along its axis, and goes back the way it came in.
 
     A hand that closes on nothing tries again, with another grasp where there is one. Every other try goes by the
     encoders alone: where things stand beside the arm, what a camera sees of it misleads. Where the cell's hand finds

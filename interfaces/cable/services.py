@@ -69,7 +69,7 @@ class CableMotionService(MotionService, Protocol):
         ...
 
     def pull_out(self, plug: "RigidTransform") -> Request[None]:
-        """Draw the gripped plug out of its socket, and away from the panel."""
+        """Draw the gripped plug out of its socket, and go back the way the hand came in."""
         ...
 
     def carry_to_clip(self, held: "RigidTransform") -> Request[None]:

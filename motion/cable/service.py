@@ -64,10 +64,7 @@ class CableMotion(TakingMotion):
         return super()._shift(arm, displacement, checked, without, held, contact)
 
     def pull_out(self, plug: RigidTransform) -> MotionRequest:
-        """Draw the gripped plug (world_from_connector) out along its axis, and then, where free, away from the panel.
-
-        That is to -x.
-        """
+        """Draw the gripped plug (world_from_connector) out along its axis, and then the hand back the way it came in."""
         finite_pose("the plug's pose", plug)
         values = self.parameters.unplug
 
@@ -77,13 +74,15 @@ class CableMotion(TakingMotion):
             try:
                 yield from self._done(self.shift(self.hand, -values.loose * axis, checked=False))
                 rest, limits = (values.loose - way) * axis, self._along_cable(self._guard.drawing, held)
-                yield from self._done(self._shift(self.hand, rest, checked=False, contact=limits))
+                if way > values.loose:
+                    yield from self._done(self._shift(self.hand, rest, checked=False, contact=limits))
             except PlanningError as error:
                 if error.code is not CauseCode.MOTION_BLOCKED:
                     raise
                 self._on_anomaly(f"the plug is drawn out only in part: {error}")
+            back = -self.tool(self.hand).rotation.apply([1.0, 0.0, 0.0])
             for share_of_way in values.retreat_shares:
-                away = np.array([-share_of_way * values.retreat, 0.0, 0.0])
+                away = share_of_way * values.retreat * back
                 try:
                     yield from self._done(self._shift_held(self.hand, away, held))
                 except TouchError:

@@ -34,7 +34,7 @@ class SocketMotion(CableMotion):
         It fails with OUT_OF_REACH when no hand pose there is free.
         """
         socket, seating, values = self.known.cable.socket(name), self.parameters.seating, self.parameters.unplug
-        # As a plug is drawn out: along its axis, and away from the panel, which is before the hand.
+        # As a plug is drawn out, and then away from the panel, which is before the hand.
         before = -values.draw_outs[0] * held.rotation.apply([1.0, 0.0, 0.0])
         away = before - [values.retreat, 0.0, 0.0]
 

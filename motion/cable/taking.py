@@ -46,12 +46,12 @@ class UnplugParameters:
     """How the plug is gripped and drawn out."""
 
     # m along the plug's axis, the first that is free, else the last; the plug sits 0.015 m deep; choice
-    draw_outs: tuple[float, ...] = (0.05, 0.04, 0.03)
+    draw_outs: tuple[float, ...] = (0.05, 0.04, 0.03, 0.02)
     loose: float = 0.02  # m of that after which only the cable pulls, and a touch is felt; choice
     # m by which the plug lies nearer to the finger tips than the pads' middle: they end 12 mm past it, and the panel is
     # 20 mm behind the plug
     shallow: float = 0.008
-    retreat: float = 0.06  # m away from the panel then; choice
+    retreat: float = 0.06  # m back along the hand then; choice
     # of that, the first that is free; where none is, the way to the clip begins there; choice
     retreat_shares: tuple[float, ...] = (1.0, 0.6, 0.3)
 
