@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Generator, Iterator, Mapping
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 
@@ -73,6 +74,14 @@ class ExecutionParameters:
     timing: TimingParameters = field(default_factory=TimingParameters)
 
 
+class Separation(PathSpeed, Protocol):
+    """How far an arm is from what it could touch."""
+
+    def near(self, q: FloatArray) -> bool:
+        """Whether something is near where the arm's joints (n,) are."""
+        ...
+
+
 class Execution:
     """Carries out motions of the arms on the simulated clock; planning one takes `latency` s.
 
@@ -128,11 +137,11 @@ class Execution:
         path: FloatArray,
         speed: float,
         contact: ContactLimits | None = None,
-        allowed: PathSpeed | None = None,
+        separation: Separation | None = None,
     ) -> Iterator[None]:
         """Steps that bring an arm along a joint path (k, n), at `speed` in (0, 1] of the joints' limits.
 
-        Slower where less is `allowed`.
+        Slower, and stopped by less, where the `separation` from other things is small.
 
         An arm that falls behind is stopped and led on, slower each time. One that touches something stops at once and
         goes a little way back; `contact` says what counts as a touch (default: of an arm that moves freely). Raises
@@ -140,10 +149,10 @@ class Execution:
         StoppedShortError when it ends off its goal, or never follows while something elastic may hold it back.
         """
         limits = contact or self.parameters.guard.free
-        yield from self._follow(arm, self._from_command(arm, path), speed, limits, allowed)
+        yield from self._follow(arm, self._from_command(arm, path), speed, limits, separation)
 
     def _follow(
-        self, arm: str, path: FloatArray, speed: float, contact: ContactLimits, allowed: PathSpeed | None = None
+        self, arm: str, path: FloatArray, speed: float, contact: ContactLimits, separation: Separation | None = None
     ) -> Iterator[None]:
         moved = self._watches[arm].moved_alone(self._arms[arm].reading())
         if moved is not None:
@@ -151,9 +160,9 @@ class Execution:
         share = self._speed_share[arm]
         for _ in range(self.parameters.attempts):
             of_limits, timing = speed * self._speed_share[arm], self.parameters.timing
-            trajectory = time_path(path, self._limits[arm], of_limits, timing, allowed)
+            trajectory = time_path(path, self._limits[arm], of_limits, timing, separation)
             yield from self._pause(self._latency)
-            guard = self._guard(arm, contact)
+            guard = self._guard(arm, contact, separation)
             trouble, elapsed = yield from self._run(arm, trajectory, guard)
             if guard.touch is not None:
                 self._on_anomaly(felt := self._felt(arm, guard.touch))
@@ -221,8 +230,9 @@ class Execution:
             return path
         return np.vstack([stands, path[1:]])
 
-    def _guard(self, arm: str, contact: ContactLimits) -> ContactGuard:
-        return ContactGuard(self._dynamics[arm], self._arms[arm].gravity(), self._chains[arm].torques, contact)
+    def _guard(self, arm: str, contact: ContactLimits, separation: Separation | None) -> ContactGuard:
+        near = None if separation is None else separation.near
+        return ContactGuard(self._dynamics[arm], self._arms[arm].gravity(), self._chains[arm].torques, contact, near)
 
     def _back_off(self, arm: str, trajectory: Trajectory, elapsed: float) -> Iterator[None]:
         """Steps that bring an arm back the way that it came, as far as the parameters say."""

@@ -64,7 +64,7 @@ class CableMotion(TakingMotion):
         return super()._shift(arm, displacement, checked, without, held, contact)
 
     def pull_out(self, plug: RigidTransform) -> MotionRequest:
-        """Draw the gripped plug (world_from_connector) out along its axis, and then the hand back the way it came in."""
+        """Draw the gripped plug (world_from_connector) out along its axis, and then move the hand back as it came."""
         finite_pose("the plug's pose", plug)
         values = self.parameters.unplug
 

@@ -29,7 +29,7 @@ class SeparationParameters:
 
 @dataclass(frozen=True, eq=False)
 class SpeedBySeparation:
-    """Implements `regrasp.motion.planning.timing.PathSpeed` for the arm of a model and the surfaces of a grid.
+    """Implements `regrasp.motion.execution.Separation` for the arm of a model and the surfaces of a grid.
 
     A sphere meets a surface no faster than its centre moves, so each is held to what its own clearance allows.
     """
@@ -43,3 +43,9 @@ class SpeedBySeparation:
         clearances, ways = self.model.along(path, slopes, self.surfaces)
         with np.errstate(divide="ignore"):  # what does not move is free to
             return np.asarray((self.parameters.speeds(clearances) / ways).min(axis=1))
+
+    def near(self, q: FloatArray) -> bool:
+        """Whether at joints (n,) something that moves is within the separation of a surface or of a known box."""
+        clearances, ways = self.model.along(q[None], np.ones((1, len(q))), self.surfaces)
+        nearest = np.minimum(clearances[0], self.model.clearances(q))[ways[0] > 0.0]
+        return bool((nearest < self.parameters.separation).any())

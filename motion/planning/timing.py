@@ -22,6 +22,7 @@ class TimingParameters:
     sample: float = 0.015  # s between samples; up to 0.02 after the slowing that the check of the limits may ask for
     limit_share: float = 0.85  # of the limits; toppra overshoots accelerations between its grid points
     grid_step: float = 0.02  # rad of path between two grid points at most
+    same_place: float = 1e-6  # rad or m in each joint; of waypoints that are nearer the later stands for both; choice
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +67,8 @@ def time_path(
     """
     path = np.asarray(path, float).reshape(-1, len(limits.speeds))
     fastest = limits.braking_within(parameters.stop_time)
-    path = path[np.append(True, np.abs(np.diff(path, axis=0)).max(axis=1) > 1e-9)]
+    # toppra finds no timing along pieces of 1e-8 rad, as where an arm that has all but come to rest goes back
+    path = path[np.append(np.abs(np.diff(path, axis=0)).max(axis=1) > parameters.same_place, True)]
     if len(path) == 1:
         return Trajectory(np.zeros(1), path.copy(), np.zeros(path.shape))
     curve = _blended(path, parameters.corner)

@@ -1,5 +1,6 @@
 """Contact detection on a moving arm: the drives' efforts against those that its rigid-body dynamics ask for."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,27 +18,28 @@ class ContactLimits:
     friction of real drives.
     """
 
-    share: float  # of a joint's greatest effort: 0.12 is 1.3 N m at a ViperX's waist, 2 to 4 N at its hand
+    share: float  # of a joint's greatest effort: 0.08 is 0.9 N m at a ViperX's waist, 1 to 3 N at its hand
     # s, time constant with which an effort that lasts becomes the usual one: what grows more slowly is no touch
     adaptation: float = 0.25
     # Where something pulls at the hand, m, and the unit vector along which it may pull as it likes, (6,) in the tool
     # frame; None: nowhere.
     pull: FloatArray | None = None
     elastic: bool = False  # something elastic may hold the arm back: one that falls behind is blocked, not broken
+    far: float | None = None  # the share where nothing is near that could be touched; None: the same
 
 
 @dataclass(frozen=True)
 class ContactGuardParameters:
     """What counts as a touch of an arm: one that moves freely, holds or pulls an elastic thing, or presses."""
 
-    free: ContactLimits = ContactLimits(0.12)  # choice
+    free: ContactLimits = ContactLimits(0.08)  # choice
     # The end of a cable that keeps to its natural shapes changes the efforts by 0.12 of the wrist's and 0.04 of the
-    # other joints'; a slow hand presses foam for half a second before that is felt; choice.
-    carrying: ContactLimits = ContactLimits(0.15, adaptation=1.0)
+    # other joints', sometimes by more; a slow hand presses foam for half a second before that is felt; choice.
+    carrying: ContactLimits = ContactLimits(0.12, adaptation=1.0, far=0.4)
     # One that is drawn out of its socket straightens its cable; this stops at 12 N at a ViperX's hand; choice
     drawing: ContactLimits = ContactLimits(0.3, elastic=True)
     # One that is bent, pressed together, or caught in the jaw changes them by up to half; choice
-    pulling: ContactLimits = ContactLimits(0.7, elastic=True)
+    pulling: ContactLimits = ContactLimits(0.3, elastic=True, far=0.7)
     # A plug that is gripped askew jams in its socket up to what the drives can do: this stops at a blow only; choice
     pressing: ContactLimits = ContactLimits(2.0)
 
@@ -67,7 +69,7 @@ class ContactGuard:
     as that of a wall, the share of :math:`r` along :math:`J^T f` of its direction f is taken away first.
     See Haddadin, De Luca, Albu-Schaeffer 2017,
     "Robot Collisions: A Survey", III-B.
-    `gravity` is (3,) m/s2 in the world.
+    `gravity` is (3,) m/s2 in the world. `near` says whether joints (n,) are near anything; None: always.
     """
 
     def __init__(
@@ -76,9 +78,12 @@ class ContactGuard:
         gravity: FloatArray,
         torques: FloatArray,
         limits: ContactLimits,
+        near: Callable[[FloatArray], bool] | None = None,
     ) -> None:
         self._dynamics, self._gravity, self._adaptation = dynamics, gravity, limits.adaptation
         self._limits, self._pull = limits.share * torques, limits.pull
+        self._times_far = 1.0 if limits.far is None or near is None else limits.far / limits.share
+        self._near = near
         self._last: JointReading | None = None
         self._usual: FloatArray | None = None
         self.touch: Touch | None = None
@@ -95,10 +100,14 @@ class ContactGuard:
         if self._usual is None:
             self._usual = outside
         change = outside - self._usual
-        if (np.abs(self._without_pull(reading.positions, change)) > self._limits).any():
+        beyond = float((np.abs(self._without_pull(reading.positions, change)) / self._limits).max())
+        if beyond > 1.0 and (beyond > self._times_far or self._is_near(reading.positions)):
             self.touch = Touch(reading.stamp, reading.positions, last.velocities, change)
         self._usual = self._usual + min(interval / self._adaptation, 1.0) * change
         return self.touch is not None
+
+    def _is_near(self, q: FloatArray) -> bool:
+        return self._near is None or self._near(q)
 
     def _without_pull(self, q: FloatArray, efforts: FloatArray) -> FloatArray:
         """The efforts (n,) less those that a force along the pull explains best, by the limits as weights."""

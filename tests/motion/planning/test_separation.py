@@ -72,3 +72,10 @@ def test_what_the_hand_carries_counts() -> None:
     carries = CollisionModel(KIN, [], ArmBody(carried=np.array([[0.06, 0.0, 0.0, 0.01]])))
     assert rate(alone, grid, TURN) == np.inf
     assert rate(carries, grid, TURN) < np.inf
+
+
+@pytest.mark.parametrize(("clearance", "near"), [(0.08, False), (0.02, True)])
+def test_an_arm_is_near_to_a_surface_within_the_separation(clearance: float, near: bool) -> None:
+    model = CollisionModel(KIN, [])
+    assert SpeedBySeparation(model, beside(model, clearance), VALUES).near(HOME) is near
+

@@ -67,6 +67,15 @@ def test_one_row_is_a_trajectory_that_stays() -> None:
     assert trajectory.sample(0.5)[0] == pytest.approx(q)
 
 
+def test_a_way_back_that_begins_all_but_at_rest_has_a_timing() -> None:
+    rng = np.random.default_rng(0)
+    for _ in range(600):  # toppra found none for one in 200
+        steps = np.append(rng.uniform(1e-4, 1e-3, 8), 10 ** rng.uniform(-9, -7.3))
+        path = np.cumsum(np.vstack([np.zeros(6), steps[:, None] * rng.normal(0, 1, (9, 6))]), axis=0)
+        trajectory = time_path(path, LIMITS, 0.3)
+        assert trajectory.positions[[0, -1]] == pytest.approx(path[[0, -1]], abs=1e-6)
+
+
 def test_half_the_speed_takes_twice_as_long() -> None:
     path = np.array([np.zeros(6), np.ones(6), [1, 1, 1, 0, 0, 0.0]])
     assert time_path(path, LIMITS, speed=0.5).duration == pytest.approx(2 * time_path(path, LIMITS).duration, rel=0.05)

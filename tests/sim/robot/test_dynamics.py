@@ -192,3 +192,18 @@ def test_what_is_carried_may_pull_along_its_axis_but_not_push_across() -> None:
             guard(JointReading(n / 480, q, still, -efforts if n > 1 else still))
         felt[name] = guard.touch is not None
     assert felt == {"along": False, "across": True}
+
+
+@pytest.mark.parametrize("near", [True, False])
+def test_what_is_carried_may_pull_harder_where_nothing_is_near(near: bool) -> None:
+    dynamics = ArmDynamics(VX300S, RigidTransform.identity())
+    limits, torques = ContactGuardParameters().carrying, VX300S.chain.torques
+    assert limits.far is not None
+    felt = []
+    for share in (0.5 * (limits.share + limits.far), 1.5 * limits.far):
+        guard = ContactGuard(dynamics, np.zeros(3), torques, limits, lambda _: near)
+        for n in range(4):
+            pushed = share * torques * np.eye(6)[0] * (n > 1)
+            guard(JointReading(n / 480, np.zeros(6), np.zeros(6), pushed))
+        felt.append(guard.touch is not None)
+    assert felt == [near, True]
