@@ -78,4 +78,3 @@ def test_what_the_hand_carries_counts() -> None:
 def test_an_arm_is_near_to_a_surface_within_the_separation(clearance: float, near: bool) -> None:
     model = CollisionModel(KIN, [])
     assert SpeedBySeparation(model, beside(model, clearance), VALUES).near(HOME) is near
-
