@@ -18,7 +18,7 @@ class ContactLimits:
     friction of real drives.
     """
 
-    share: float  # of a joint's greatest effort: 0.08 is 0.9 N m at a ViperX's waist, 1 to 3 N at its hand
+    share: float  # of a joint's greatest effort: 0.12 is 1.3 N m at a ViperX's waist, 2 to 4 N at its hand
     # s, time constant with which an effort that lasts becomes the usual one: what grows more slowly is no touch
     adaptation: float = 0.25
     # Where something pulls at the hand, m, and the unit vector along which it may pull as it likes, (6,) in the tool
@@ -32,7 +32,7 @@ class ContactLimits:
 class ContactGuardParameters:
     """What counts as a touch of an arm: one that moves freely, holds or pulls an elastic thing, or presses."""
 
-    free: ContactLimits = ContactLimits(0.08)  # choice
+    free: ContactLimits = ContactLimits(0.12)  # choice: with 0.08 what is felt is too weak to tell where it was
     # The end of a cable that keeps to its natural shapes changes the efforts by 0.12 of the wrist's and 0.04 of the
     # other joints', sometimes by more; a slow hand presses foam for half a second before that is felt; choice.
     carrying: ContactLimits = ContactLimits(0.12, adaptation=1.0, far=0.4)

@@ -61,7 +61,7 @@ def test_the_rows_are_the_ticks_and_say_what_is_so(records: Path) -> None:
         )
         assert np.abs(signals[f"{arm}.joints"] - signals[f"{arm}.joints_true"]).max() < 0.05
     connector = signals["connector_true"].reshape(-1, 3, 4)
-    assert np.linalg.norm(connector[-1, :, 3] - connector[0, :, 3]) > 0.03  # it was drawn out
+    assert np.linalg.norm(connector[-1, :, 3] - connector[0, :, 3]) > 0.02  # it was drawn out
     held = signals["connector_held_true"] > 0.5
     assert not held[0]
     assert held[-1]
