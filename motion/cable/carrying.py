@@ -78,13 +78,14 @@ class CarryMotion(SearchMotion):
             paths = (path for path in candidates if path is None or can_continue(kin, path[-1], onward, carry.step))
             widest = self.known.arm(arm).robot.gripper.opening
             wide = self.model(arm, held=spheres, opening=widest, optimistic=optimistic)
+            tethered = model
             if max_bend is not None:
-                model, wide = model.constrained(tether), wide.constrained(tether)
-            path = yield from first_free((wide, model), clearances, carry.leaving, paths)
+                tethered, wide = model.constrained(tether), wide.constrained(tether)
+            path = yield from first_free((wide, tethered), clearances, carry.leaving, paths)
             if path is None:
                 solutions = [end for goal in goals for end in kin.ik(goal, q)]
                 ends = [end for end in solutions if can_continue(kin, end, onward, carry.step)]
-                path = yield from self._shortest_plan(model, q, np.array(ends).reshape(-1, len(kin)), carry.searched)
+                path = yield from self._shortest_plan(tethered, q, np.array(ends).reshape(-1, len(kin)), carry.searched)
             natural = max_bend is not None and np.isfinite(max_bend)
             limits = self._along_cable(self._guard.carrying if natural else self._guard.pulling, held)
             try:

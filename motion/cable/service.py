@@ -73,8 +73,8 @@ class CableMotion(TakingMotion):
             way = next(filter(partial(self._free_along, -axis), values.draw_outs), values.draw_outs[-1])
             try:
                 yield from self._done(self.shift(self.hand, -values.loose * axis, checked=False))
-                rest, limits = (values.loose - way) * axis, self._along_cable(self._guard.drawing, held)
                 if way > values.loose:
+                    rest, limits = (values.loose - way) * axis, self._along_cable(self._guard.drawing, held)
                     yield from self._done(self._shift(self.hand, rest, checked=False, contact=limits))
             except PlanningError as error:
                 if error.code is not CauseCode.MOTION_BLOCKED:

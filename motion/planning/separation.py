@@ -45,7 +45,8 @@ class SpeedBySeparation:
             return np.asarray((self.parameters.speeds(clearances) / ways).min(axis=1))
 
     def near(self, q: FloatArray) -> bool:
-        """Whether at joints (n,) something that moves is within the separation of a surface or of a known box."""
+        """Whether at joints (n,) something that moves is within the separation of a surface, a box or another arm."""
+        if not self.model.free(q, self.parameters.separation):
+            return True
         clearances, ways = self.model.along(q[None], np.ones((1, len(q))), self.surfaces)
-        nearest = np.minimum(clearances[0], self.model.clearances(q))[ways[0] > 0.0]
-        return bool((nearest < self.parameters.separation).any())
+        return bool((clearances[ways > 0.0] < self.parameters.separation).any())

@@ -150,6 +150,29 @@ def test_a_jaw_that_closes_on_nothing_says_so(rig: Rig) -> None:
     assert error.value.code is CauseCode.GRASP_EMPTY
 
 
+def drawn_out(rig: Rig, plug: RigidTransform) -> tuple[float, float, Points]:
+    """How far (m) the right hand draws a plug out along its axis, then itself back, and its displacement (3,) m."""
+    start = rig.motion.tool("right")
+    rig.run(rig.motion.pull_out(plug))
+    axis, back = plug.rotation.apply([1.0, 0.0, 0.0]), -start.rotation.apply([1.0, 0.0, 0.0])
+    way = rig.motion.tool("right").translation - start.translation
+    (out, retreat), *_ = np.linalg.lstsq(np.stack([-axis, back], axis=1), way)
+    return float(out), float(retreat), np.asarray(way - back * retreat + axis * out)
+
+
+@pytest.mark.parametrize(("socket", "out"), [("back_1", 0.05), ("back_4", 0.02)])
+def test_a_plug_is_drawn_out_as_far_as_is_free_and_the_hand_goes_back_as_it_came(
+    rig: Rig, socket: str, out: float
+) -> None:
+    """Behind the hand at back_4 another socket's block stands."""
+    plug = rig.known.cable.socket(socket).world_from_plug(rig.known.cable.connector.length)
+    rig.run(rig.motion.pick_plug(plug))
+    drawn, retreat, rest = drawn_out(rig, plug)
+    assert drawn == pytest.approx(out, abs=1e-3)
+    assert retreat == pytest.approx(0.06, abs=1e-3)
+    assert rest == pytest.approx(np.zeros(3), abs=1e-3)
+
+
 def test_the_hand_draws_back_as_far_as_is_free(rig: Rig) -> None:
     rig.arms["right"].at = READY
     start = rig.motion.tool("right")

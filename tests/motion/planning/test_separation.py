@@ -78,3 +78,14 @@ def test_what_the_hand_carries_counts() -> None:
 def test_an_arm_is_near_to_a_surface_within_the_separation(clearance: float, near: bool) -> None:
     model = CollisionModel(KIN, [])
     assert SpeedBySeparation(model, beside(model, clearance), VALUES).near(HOME) is near
+
+
+@pytest.mark.parametrize(("gap", "near"), [(0.08, False), (0.02, True)])
+def test_an_arm_is_near_to_another_arm_within_the_separation(gap: float, near: bool) -> None:
+    alone = CollisionModel(KIN, [])
+    spheres = moving(alone)
+    beyond = (spheres[:, 0] + spheres[:, 3]).max() + gap
+    tip = spheres[spheres[:, [0, 3]].sum(axis=1).argmax()]
+    other = np.array([[beyond + 0.05, tip[1], tip[2], 0.05]])
+    model = CollisionModel(KIN, [], other_arm=other)
+    assert SpeedBySeparation(model, beside(model, 0.5), VALUES).near(HOME) is near
