@@ -1,28 +1,75 @@
 """Grasp the connector again where it was found."""
 
-from typing import ClassVar
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
 
 from regrasp.behaviors.cable.hand import HandLeaf
 from regrasp.behaviors.cable.keys import FOUND, HELD, VAIN_CARRIES
 from regrasp.behaviors.keys import Keys
 from regrasp.behaviors.leaf import LeafSteps
+from regrasp.interfaces.cause import CauseCode
+from regrasp.motion.failure import PlanningError
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import RigidTransform
+
+
+@dataclass(frozen=True)
+class RegraspParameters:
+    """How an end that was pulled out by its cable is looked at. All values are choices."""
+
+    hang_time: float = 3.0  # s for the end to hang still
+    look_time: float = 1.5  # s of looking then
 
 
 class Regrasp(HandLeaf):
     """Brings an arm to where the connector was found, closes the jaw and tells by its gap whether it holds.
 
     The arm that can do it best is the hand from now on. One that finds no way there goes to sleep, and the next one
-    tries. A hand that closes on nothing opens and goes back to sleep, and the leaf fails.
+    tries. Where none finds one, an arm takes hold of the cable and lifts the connector out, and another takes it then.
+    A hand that closes on nothing opens and goes back to sleep, and the leaf fails.
     """
 
     NEEDS: ClassVar[Keys] = (FOUND,)
     WRITES: ClassVar[Keys] = (HELD, VAIN_CARRIES)
+    parameters: ClassVar[RegraspParameters] = RegraspParameters()
 
     def steps(self) -> LeafSteps:
         """See the class."""
         motion, connector = self.services.motion, self.read(FOUND).world_from_connector
         motion.set_obstacles(*self.services.perception.obstacles_beside(connector))
-        hands = yield from self.ask(motion.hands_for(connector))
+        try:
+            yield from self._take(connector)
+        except PlanningError as error:
+            no_grasp = error.code in (CauseCode.NO_COLLISION_FREE_GOAL, CauseCode.OUT_OF_REACH)
+            if not no_grasp or len(self.services.known.arms) == 1:
+                raise
+            yield from self._take_by_cable(connector, error)
+
+    def _take(self, connector: "RigidTransform", holds_cable: str | None = None) -> LeafSteps:
+        """Grip the connector (world_from_connector) with the best arm, but for one that `holds_cable`."""
+        motion = self.services.motion
+        hands = yield from self.ask(motion.hands_for(connector, () if holds_cable is None else (holds_cable,)))
         yield from self.take(hands, lambda: motion.pick_loose(connector, point_cloud=self.overview_points))
         self.say("took it", arm=motion.hand)
         yield from self.grip_or_leave(connector)
+
+    def _take_by_cable(self, connector: "RigidTransform", no_grasp: PlanningError) -> LeafSteps:
+        """Lift the connector out by its cable, and grip it with another arm. Raises `no_grasp` where that fails."""
+        motion, perception = self.services.motion, self.services.perception
+        try:
+            arm = yield from self.ask(motion.pull_cable(connector))
+        except PlanningError as error:
+            self.say("the cable is not to be had either", why=str(error))
+            raise no_grasp from None
+        self.say("lifted by its cable", arm=arm)
+        yield from self.wait(self.parameters.hang_time)
+        looked = yield from self.ask(perception.watch(self.overview, self.parameters.look_time, later=True))
+        try:
+            if not looked.estimates:
+                raise no_grasp
+            yield from self._take(perception.fuse(looked.estimates).world_from_connector, arm)
+        except PlanningError:
+            yield from self.ask(motion.let_go_of_cable(arm))
+            raise
+        yield from self.ask(motion.let_go_of_cable(arm))

@@ -1,6 +1,6 @@
 """What the cable's leaves ask of the robot's services, besides what those of every task do."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from typing import TYPE_CHECKING, Protocol
 
 from regrasp.interfaces.arrays import FloatArray
@@ -37,8 +37,8 @@ class CableMotionService(MotionService, Protocol):
         """Let an arm handle the cable from now on."""
         ...
 
-    def hands_for(self, world_from_connector: "RigidTransform") -> Request[list[str]]:
-        """The arms that can take the loose connector, the best first; the present hand where none can."""
+    def hands_for(self, world_from_connector: "RigidTransform", without: Collection[str] = ()) -> Request[list[str]]:
+        """The arms, but for those `without`, that can take the loose connector, the best first; one where none can."""
         ...
 
     def pick_plug(
@@ -66,6 +66,14 @@ class CableMotionService(MotionService, Protocol):
 
     def watch_grip(self) -> GripService:
         """Begin to watch by the pads whether the hand holds the connector."""
+        ...
+
+    def pull_cable(self, world_from_connector: "RigidTransform") -> Request[str]:
+        """Let an arm take hold of the cable near the loose connector, lift it, and keep hold; the answer is the arm."""
+        ...
+
+    def let_go_of_cable(self, arm: str) -> Request[None]:
+        """Open the jaw of an arm that holds the cable, and bring the arm to its sleep pose."""
         ...
 
     def pull_out(self, plug: "RigidTransform") -> Request[None]:

@@ -16,8 +16,8 @@ from regrasp.interfaces.request import Request
 from regrasp.motion.arguments import finite_pose
 from regrasp.motion.cable.cable_shape import cable_course, connector_points
 from regrasp.motion.cable.gentle_pull import across_the_cable, pull_gently
+from regrasp.motion.cable.pulling_motion import PullingMotion
 from regrasp.motion.cable.seating import lying_otherwise, poses_before, seated_pose
-from regrasp.motion.cable.taking import TakingMotion
 from regrasp.motion.failure import PlanningError, TouchError
 from regrasp.motion.grasping.approach import pick_candidates
 from regrasp.motion.planning.straight import straight_lines
@@ -29,7 +29,7 @@ from regrasp.motion.scene.planning_scene import NO_POINTS
 T = TypeVar("T")
 
 
-class CableMotion(TakingMotion):
+class CableMotion(PullingMotion):
     """Requests to the arm that handles the cable, the hand, and to the one that carries the camera that searches."""
 
     def warm_up(self) -> None:
@@ -190,19 +190,7 @@ class CableMotion(TakingMotion):
         What it held may still hang in the jaw: that it pulls is no touch.
         """
 
-        def steps() -> Generator[None, None, str]:
-            why = ""
-            for distance in self.parameters.retreats:
-                back = self.tool(self.hand).rotation.apply([-distance, 0.0, 0.0])
-                try:
-                    yield from self._done(self._shift(self.hand, back, contact=self._guard.pulling))
-                except PlanningError as error:
-                    why = str(error)
-                else:
-                    return ""
-            return why
-
-        return self._together(self.hand, steps())
+        return self._together(self.hand, self._draw_back(self.hand))
 
     def leave_clip(self) -> MotionRequest:
         """Bring the hand to its sleep pose without sweeping the stowed end out of its clip."""

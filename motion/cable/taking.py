@@ -19,6 +19,7 @@ from regrasp.interfaces.request import Request
 from regrasp.interfaces.wall_time import counts_as
 from regrasp.motion.arguments import finite_pose
 from regrasp.motion.cable.cable_reach import CableReachParameters
+from regrasp.motion.cable.cable_section import PullingParameters
 from regrasp.motion.cable.cable_shape import cable_course
 from regrasp.motion.cable.carrying import CarryMotion, CarryMotionParameters
 from regrasp.motion.cable.gentle_pull import GentlePullParameters
@@ -74,6 +75,7 @@ class CableMotionParameters(CarryMotionParameters):
     gentle_pull: GentlePullParameters = field(default_factory=GentlePullParameters)
     cable_reach: CableReachParameters = field(default_factory=CableReachParameters)
     plugging: PluggingParameters = field(default_factory=PluggingParameters)
+    pulling: PullingParameters = field(default_factory=PullingParameters)
 
 
 class TakingMotion(CarryMotion):
@@ -106,8 +108,10 @@ class TakingMotion(CarryMotion):
         """Let an arm of that name handle the cable from now on."""
         self._hand = self.known.arm(arm).name
 
-    def hands_for(self, world_from_connector: RigidTransform) -> Request[list[str]]:
-        """The arms that can take the loose connector, the best first; the present hand where none can.
+    def hands_for(self, world_from_connector: RigidTransform, without: Collection[str] = ()) -> Request[list[str]]:
+        """The arms, but for those `without`, that can take the loose connector, the best first.
+
+        Where none can, the present hand, or the first that is left.
 
         Best is one that can stow it with that grasp, then one whose way in leads through seen space, then one that has
         room there, then the cell's hand.
@@ -118,12 +122,13 @@ class TakingMotion(CarryMotion):
         def steps() -> Generator[None, None, list[str]]:
             ease: dict[str, int] = {}
             self._keep_clear_of_cable(world_from_connector)
-            for arm in sorted(self.arms, key=lambda arm: arm != first):
+            arms = sorted(self.arms.keys() - set(without), key=lambda arm: arm != first)
+            for arm in arms:
                 found = yield from self._ease(arm, world_from_connector)
                 if found is not None:
                     ease[arm] = found
             self.keep_clear(NO_POINTS)
-            return sorted(ease, key=lambda arm: ease[arm]) or [self.hand]
+            return sorted(ease, key=lambda arm: ease[arm]) or sorted(arms, key=lambda arm: arm != self.hand)[:1]
 
         return Request(steps())
 
@@ -212,6 +217,19 @@ class TakingMotion(CarryMotion):
         return GripWatch(
             self.grippers[self.hand], 2 * self.known.cable.connector.radius, self.parameters.execution.jaw.grip.gap
         )
+
+    def _draw_back(self, arm: str) -> Generator[None, None, str]:
+        """Steps that draw a hand straight back as far as is free. They return '', or why no distance was."""
+        why = ""
+        for distance in self.parameters.retreats:
+            back = self.tool(arm).rotation.apply([-distance, 0.0, 0.0])
+            try:
+                yield from self._done(self._shift(arm, back, contact=self._guard.pulling))
+            except PlanningError as error:
+                why = str(error)
+            else:
+                return ""
+        return why
 
     def _ease(self, arm: str, connector: RigidTransform) -> Generator[None, None, int | None]:
         """How easily an arm takes the loose connector, from 0 for best; None: not at all. See `hands_for`."""

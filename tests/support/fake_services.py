@@ -106,6 +106,7 @@ class FakeMotion:
         self.plugged: list[tuple[str, RigidTransform]] = []  # sockets, and how the hand held the connector
         self.inserted: list[tuple[int, RigidTransform]] = []  # which try, and how the hand held the connector
         self.clip_stiffness: Callable[[int], float] = lambda insertion: 1600.0  # N/m, after so many insertions
+        self.pulled: list[str] = []  # arms that hold the cable
         self.stopped = 0
         self.rest: list[RigidTransform] = []
         self.reachable: Callable[[RigidTransform], bool] = lambda pose: True
@@ -113,10 +114,10 @@ class FakeMotion:
     def take_with(self, arm: str) -> None:
         self.hand = arm
 
-    def hands_for(self, world_from_connector: RigidTransform) -> Request[list[str]]:
+    def hands_for(self, world_from_connector: RigidTransform, without: Collection[str] = ()) -> Request[list[str]]:
         def steps() -> Generator[None, None, list[str]]:
             yield from self._steps()
-            return self.hands
+            return [arm for arm in self.hands if arm not in without]
 
         return Request(steps())
 
@@ -191,6 +192,18 @@ class FakeMotion:
             return Grip(closing.answer, self.tool_pose.inv() * world_from_connector)
 
         return Request(steps())
+
+    def pull_cable(self, world_from_connector: RigidTransform) -> Request[str]:
+        def steps() -> Generator[None, None, str]:
+            yield from self._steps()
+            self.pulled.append(arm := "left")
+            return arm
+
+        return Request(steps())
+
+    def let_go_of_cable(self, arm: str) -> Request[None]:
+        self.pulled.remove(arm)
+        return self.release(arm, 0.025)
 
     def watch_grip(self) -> GripWatch:
         return GripWatch(self.grippers[self.hand], 2 * self.known.cable.connector.radius)

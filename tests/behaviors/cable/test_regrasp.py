@@ -3,8 +3,9 @@
 from collections.abc import Generator
 from pathlib import Path
 
+import numpy as np
 import pytest
-from fake_services import FakeMotion, PointCloud, Stage
+from fake_services import FakeMotion, PointCloud, Stage, seen
 from py_trees.common import Status
 from scipy.spatial.transform import RigidTransform
 
@@ -22,13 +23,14 @@ class Hindered(FakeMotion):
     """Arms that find no way to the connector, each with its cause."""
 
     hindered: dict[str, CauseCode]
+    lifted_place: float = 0.3  # m, the height from which on nothing hinders
 
     def pick_loose(
         self, world_from_connector: RigidTransform, *, point_cloud: PointCloud | None = None
     ) -> Request[None]:
         def steps() -> Generator[None, None, None]:
             yield
-            if self.hand in self.hindered:
+            if self.hand in self.hindered and world_from_connector.translation[2] < self.lifted_place:
                 raise PlanningError(self.hindered[self.hand], f"the {self.hand} arm has no way")
 
         return Request(steps())
@@ -83,3 +85,27 @@ def test_a_broken_arm_is_not_replaced_by_the_other(stage: Stage) -> None:
     assert stage.run(stage.tree(REGRASP), 20.0) is Status.FAILURE
     assert stage.causes[-1].code is CauseCode.ARM_FAILED
     assert not motion.moves
+
+
+def test_what_no_arm_can_take_is_lifted_by_its_cable_and_taken_by_the_other_arm(stage: Stage) -> None:
+    motion = hindered(stage, left=CauseCode.NO_COLLISION_FREE_GOAL, right=CauseCode.OUT_OF_REACH)
+    stage.perception.shows = lambda camera, stamp: seen(stamp, np.array([0.4, 0.0, 0.4]), camera)
+    assert stage.run(stage.tree(REGRASP), 60.0) is Status.SUCCESS
+    assert [fields["arm"] for fields in stage.log.of("lifted by its cable")] == ["left"]
+    assert motion.hand == "right"
+    assert not motion.pulled
+    assert value_of(HELD, None) is not None
+
+
+def test_what_is_not_seen_once_lifted_is_let_go(stage: Stage) -> None:
+    motion = hindered(stage, left=CauseCode.NO_COLLISION_FREE_GOAL, right=CauseCode.NO_COLLISION_FREE_GOAL)
+    assert stage.run(stage.tree(REGRASP), 60.0) is Status.FAILURE
+    assert len(stage.log.of("lifted by its cable")) == 1
+    assert stage.causes[-1].code is CauseCode.NO_COLLISION_FREE_GOAL
+    assert not motion.pulled
+
+
+def test_a_touch_on_the_way_to_the_connector_is_no_reason_to_pull_at_its_cable(stage: Stage) -> None:
+    hindered(stage, left=CauseCode.PLANNING_FAILED, right=CauseCode.PLANNING_FAILED)
+    assert stage.run(stage.tree(REGRASP), 60.0) is Status.FAILURE
+    assert not stage.log.of("lifted by its cable")

@@ -1,0 +1,38 @@
+"""The cable as a thing to take hold of: a piece of it that counts as a cylinder."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import RigidTransform, Rotation
+
+from regrasp.interfaces.arrays import FloatArray
+
+
+@dataclass(frozen=True)
+class CableSection:
+    """A piece of the cable: implements `regrasp.motion.grasping.approach.Cylinder`. All values are choices."""
+
+    length: float = 0.08  # m that count as straight
+    radius: float = 0.004  # m, that of the cable
+
+
+@dataclass(frozen=True)
+class PullingParameters:
+    """Where the cable is gripped, and how far it is lifted. All values are choices."""
+
+    section: CableSection = CableSection()
+    # m along the cable from the connector; where it lies is known the less, the further
+    places: tuple[float, ...] = (0.07, 0.09, 0.11, 0.13, 0.15, 0.17, 0.20, 0.23, 0.26)
+    lifts: tuple[float, ...] = (0.25, 0.20, 0.15, 0.10, 0.05)  # m up; the first to which a way is free
+    loose: float = 0.03  # m straight up first, with all the force that the drives have
+    aside: tuple[float, ...] = (0.0, -0.08, 0.08)  # m in x and in y that it may be moved besides
+    turn: float = 1.5  # rad, the most that a joint may turn for that: the jaw does not turn over
+
+
+def section_of_cable(course: FloatArray, place: float) -> RigidTransform:
+    """world_from_section, `place` m from the last of a cable's points (n, 3) m; x points along the cable to that."""
+    back = course[::-1]
+    along = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(back, axis=0), axis=1)))
+    n = int(np.clip(np.searchsorted(along, place), 1, len(back) - 2))
+    way = back[n - 1] - back[n + 1]
+    return RigidTransform.from_components(back[n], Rotation.align_vectors(way[None], [[1.0, 0.0, 0.0]])[0])
