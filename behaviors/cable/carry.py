@@ -34,7 +34,8 @@ class Carry(HandLeaf):
     """Plans the held connector's path to a place in front of the clip and follows it.
 
     Where it is held so that no pose of the hand brings it there, or carrying it has failed before, the hand lets it
-    fall: its cable may hang on something, and it is taken otherwise then.
+    fall: its cable may hang on something, and it is taken otherwise then. The cable is bent by force only once that has
+    happened: that is what pulls the connector out of the jaw, and presses the arm against things.
     """
 
     NEEDS: ClassVar[Keys] = (HELD,)
@@ -46,7 +47,7 @@ class Carry(HandLeaf):
     def steps(self) -> LeafSteps:
         """See the class."""
         try:
-            yield from self.ask(self.services.motion.carry_to_clip(self.held()))
+            yield from self.ask(self.services.motion.carry_to_clip(self.held(), forced=self._was_let_fall()))
         except PlanningError as error:
             failed = self.read(VAIN_CARRIES) + 1
             self.write(VAIN_CARRIES, failed)
@@ -54,6 +55,9 @@ class Carry(HandLeaf):
             if not again and error.code in (*NO_WAY, CauseCode.OUT_OF_REACH):
                 yield from self.let_fall()
             raise
+
+    def _was_let_fall(self) -> bool:
+        return any(notice.by == "hand" for notice in self.read(NOTICES))
 
 
 class Insert(LookInHand, LookLeaf):

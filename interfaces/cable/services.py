@@ -80,7 +80,7 @@ class CableMotionService(MotionService, Protocol):
         """Draw the gripped plug out of its socket, and go back the way the hand came in."""
         ...
 
-    def carry_to_clip(self, held: "RigidTransform") -> Request[None]:
+    def carry_to_clip(self, held: "RigidTransform", *, forced: bool = True) -> Request[None]:
         """Bring the held connector before the clip."""
         ...
 

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import FloatArray
+from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.request import Request
 from regrasp.motion.arguments import finite_pose, share
 from regrasp.motion.cable.cable_shape import cable_course
@@ -50,12 +51,14 @@ class CarryMotion(SearchMotion):
         *,
         onward: Sequence[RigidTransform] = (),
         speed: float,
+        forced: bool = True,
     ) -> MotionRequest:
         """Bring what `arm` holds (tool_from_connector) to one of the goals (world_from_tool), the first preferred.
 
         Along the shapes that the cable takes by itself where that is free, else straight or in a flat arch, else along
         any free path. On all of them the cable reaches, sweeps through nothing and bends little (`Tether`); only where
-        there is none it may bend more, and at last it does not count. Where possible there is room for a jaw that opens
+        there is none it may bend more, and at last it does not count; not so unless `forced`: then OUT_OF_REACH is
+        raised. Where possible there is room for a jaw that opens
         on the way, as after a slip. From the goal the tool must also reach the poses `onward` (goal_from_tool) in
         straight lines.
         """
@@ -95,7 +98,8 @@ class CarryMotion(SearchMotion):
                 raise
 
         def tries() -> Iterator[None]:
-            for max_bend in self.parameters.tether.bends:
+            natural, *bent = self.parameters.tether.bends
+            for max_bend in (natural, *bent) if forced else (natural,):
                 try:
                     yield from self._tries(arm, partial(steps, max_bend=max_bend))
                 except PlanningError as error:
@@ -104,6 +108,10 @@ class CarryMotion(SearchMotion):
                     self._on_anomaly(f"{error}, with the cable bent by at most {max_bend:g}/m")
                 else:
                     return
+            if not forced:
+                raise PlanningError(
+                    CauseCode.OUT_OF_REACH, "it cannot be carried there without bending its cable by force"
+                )
             yield from self._tries(arm, partial(steps, max_bend=None))
 
         return self.execution.request(arm, tries())

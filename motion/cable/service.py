@@ -101,10 +101,11 @@ class CableMotion(PullingMotion):
         path, model = straight_lines(kin, q, [goal]), self.model(self.hand)
         return path is not None and model.path_free(path[1:], min(model.clearance(q) - clearances.nearer, 0.0))
 
-    def carry_to_clip(self, held: RigidTransform) -> MotionRequest:
+    def carry_to_clip(self, held: RigidTransform, *, forced: bool = True) -> MotionRequest:
         """Bring the held connector (tool_from_connector) before the clip, from where the hand can go in and back out.
 
-        It fails with OUT_OF_REACH when no hand pose there is free.
+        It fails with OUT_OF_REACH when no hand pose there is free, and unless `forced` also when its cable would have to
+        be bent by force. An arm takes the connector with such a grasp again only where it has no other.
         """
         finite_pose("the held connector's pose", held)
         seating = self.parameters.seating
@@ -123,9 +124,18 @@ class CableMotion(PullingMotion):
             else:
                 message = "no free hand pose brings the held connector into the clip"
                 raise PlanningError(CauseCode.OUT_OF_REACH, message)
-            yield from self._done(self.carry(self.hand, goals, held, onward=onward, speed=seating.speed_to))
+            yield from self._done(
+                self.carry(self.hand, goals, held, onward=onward, speed=seating.speed_to, forced=forced)
+            )
 
-        return self._together(self.hand, steps())
+        def noting_in_vain() -> Iterator[None]:
+            try:
+                yield from steps()
+            except PlanningError:
+                self._vain[self.hand].append(held.inv().as_matrix())
+                raise
+
+        return self._together(self.hand, noting_in_vain())
 
     @property
     def insertions(self) -> int:

@@ -63,6 +63,8 @@ class CableMotionParameters(CarryMotionParameters):
 
     # Two grasps nearer than so many m and rad are one: what closed on nothing is tried again after all others; choice
     same_grasp: tuple[float, float] = (0.015, 0.35)
+    # m and rad between grasps that are both in vain, if the connector could not be carried with one; choice
+    alike_in_vain: tuple[float, float] = (0.03, 0.7)
     # m of clearance in the straight way in, from which on an arm has room: one that has less leaves it to another
     # that has; choice, of the near margins
     roomy: float = 0.014
@@ -97,6 +99,8 @@ class TakingMotion(CarryMotion):
         self._hand = known.cable.hand
         self._missed: list[FloatArray] = []  # grasps (4, 4), connector_from_tool, that closed on nothing
         # by arm: the pose (4, 4) of the connector, and whether it can be stowed with a grasp, see `_without_roll`
+        # By arm, grasps (4, 4), connector_from_tool, with which the connector could not be carried to the clip
+        self._vain: dict[str, list[FloatArray]] = {arm: [] for arm in self.arms}
         self._stows: dict[str, tuple[FloatArray, dict[tuple[float, ...], bool]]] = {}
 
     @property
@@ -271,8 +275,8 @@ class TakingMotion(CarryMotion):
     def _stowing(self, arm: str, connector: RigidTransform) -> Generator[None, None, Callable[[Grasp], bool]]:
         """Steps that find which grasps of a connector let an arm bring it into the clip.
 
-        A turn about the connector's axis makes no difference: it may lie in the clip with any roll. The answers for the
-        connector that was asked about last are kept.
+        Not those with which it has failed to. A turn about the connector's axis makes no difference: it may lie in the
+        clip with any roll. The answers for the connector that was asked about last are kept.
         """
         now, from_connector = connector.as_matrix(), inverse(connector.as_matrix())
         about, answers = self._stows.get(arm, (now, {}))
@@ -286,7 +290,13 @@ class TakingMotion(CarryMotion):
                     if len(answers) % self.parameters.per_step == 0:
                         yield
             self._stows[arm] = now, answers
-        return lambda grasp: answers.get(_without_roll(multiply(from_connector, grasp.pose)), True)
+
+        def stows(grasp: Grasp) -> bool:
+            taken, near = multiply(from_connector, grasp.pose), self.parameters.alike_in_vain
+            in_vain = any(_alike(taken, other, *near) for other in self._vain[arm])
+            return not in_vain and answers.get(_without_roll(taken), True)
+
+        return stows
 
     @counts_as("planning")
     def _can_stow(self, arm: str, held: RigidTransform) -> bool:

@@ -24,6 +24,7 @@ class ContactLimits:
     # Where something pulls at the hand, m, and the unit vector along which it may pull as it likes, (6,) in the tool
     # frame; None: nowhere.
     pull: FloatArray | None = None
+    pull_near: float = 15.0  # N that it may pull where something is near: what random scenes showed; choice
     elastic: bool = False  # something elastic may hold the arm back: one that falls behind is blocked, not broken
     far: float | None = None  # the share where nothing is near that could be touched; None: the same
 
@@ -66,8 +67,8 @@ class ContactGuard:
 
     with the acceleration by the last two velocities. A touch is a difference of :math:`r` from its own slow mean
     beyond the `limits`, shares of the joints' `torques` (n,), N m or N. Of a taut cable, whose pull grows as quickly
-    as that of a wall, the share of :math:`r` along :math:`J^T f` of its direction f is taken away first.
-    See Haddadin, De Luca, Albu-Schaeffer 2017,
+    as that of a wall, the share of :math:`r` along :math:`J^T f` of its direction f is taken away first; where
+    something is near, no more than a cable pulls. See Haddadin, De Luca, Albu-Schaeffer 2017,
     "Robot Collisions: A Survey", III-B.
     `gravity` is (3,) m/s2 in the world. `near` says whether joints (n,) are near anything; None: always.
     """
@@ -81,7 +82,7 @@ class ContactGuard:
         near: Callable[[FloatArray], bool] | None = None,
     ) -> None:
         self._dynamics, self._gravity, self._adaptation = dynamics, gravity, limits.adaptation
-        self._limits, self._pull = limits.share * torques, limits.pull
+        self._limits, self._pull, self._pull_near = limits.share * torques, limits.pull, limits.pull_near
         self._times_far = 1.0 if limits.far is None or near is None else limits.far / limits.share
         self._near = near
         self._last: JointReading | None = None
@@ -100,8 +101,9 @@ class ContactGuard:
         if self._usual is None:
             self._usual = outside
         change = outside - self._usual
-        beyond = float((np.abs(self._without_pull(reading.positions, change)) / self._limits).max())
-        if beyond > 1.0 and (beyond > self._times_far or self._is_near(reading.positions)):
+        if self._beyond(reading.positions, change, np.inf) > self._times_far or (
+            self._beyond(reading.positions, change, self._pull_near) > 1.0 and self._is_near(reading.positions)
+        ):
             self.touch = Touch(reading.stamp, reading.positions, last.velocities, change)
         self._usual = self._usual + min(interval / self._adaptation, 1.0) * change
         return self.touch is not None
@@ -109,10 +111,14 @@ class ContactGuard:
     def _is_near(self, q: FloatArray) -> bool:
         return self._near is None or self._near(q)
 
-    def _without_pull(self, q: FloatArray, efforts: FloatArray) -> FloatArray:
-        """The efforts (n,) less those that a force along the pull explains best, by the limits as weights."""
-        if self._pull is None:
-            return efforts
-        along = self._dynamics.efforts_of_pull(q, self._pull) / self._limits
-        share = float(along @ (efforts / self._limits)) / max(float(along @ along), 1e-12)
-        return efforts - share * along * self._limits
+    def _beyond(self, q: FloatArray, efforts: FloatArray, most: float) -> float:
+        """The greatest of the efforts (n,), in its joint's limits, less those of a pull of `most` N.
+
+        The pull is the one that explains the efforts best, with the limits as weights.
+        """
+        efforts = efforts / self._limits
+        if self._pull is not None:
+            along = self._dynamics.efforts_of_pull(q, self._pull) / self._limits
+            force = float(along @ efforts) / max(float(along @ along), 1e-12)
+            efforts = efforts - min(max(force, -most), most) * along
+        return float(np.abs(efforts).max())

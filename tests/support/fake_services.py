@@ -106,6 +106,7 @@ class FakeMotion:
         self.plugged: list[tuple[str, RigidTransform]] = []  # sockets, and how the hand held the connector
         self.inserted: list[tuple[int, RigidTransform]] = []  # which try, and how the hand held the connector
         self.clip_stiffness: Callable[[int], float] = lambda insertion: 1600.0  # N/m, after so many insertions
+        self.forced: list[bool] = []  # for each carry, whether the cable might be bent by force
         self.pulled: list[str] = []  # arms that hold the cable
         self.stopped = 0
         self.rest: list[RigidTransform] = []
@@ -211,7 +212,8 @@ class FakeMotion:
     def pull_out(self, plug: RigidTransform) -> Request[None]:
         return self.work(self.hand)
 
-    def carry_to_clip(self, held: RigidTransform) -> Request[None]:
+    def carry_to_clip(self, held: RigidTransform, *, forced: bool = True) -> Request[None]:
+        self.forced.append(forced)
         return self.work(self.hand)
 
     def insert(self, held: RigidTransform, attempt: int = 0) -> Request[None]:

@@ -7,7 +7,7 @@ from fake_services import Stage
 from py_trees.common import Status
 from scipy.spatial.transform import RigidTransform
 
-from regrasp.behaviors.cable.keys import NOTICES
+from regrasp.behaviors.cable.keys import NOTICES, LossNotice
 from regrasp.behaviors.keys import value_of
 from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.cause import CauseCode
@@ -52,3 +52,10 @@ def test_a_broken_arm_lets_nothing_fall(stage: Stage) -> None:
         assert carried(stage, CauseCode.ARM_FAILED) == []
     assert stage.belief.held is not None
     assert value_of(NOTICES) == ()
+
+
+def test_the_cable_is_bent_by_force_only_once_the_connector_was_let_fall(stage: Stage) -> None:
+    for notices in ((LossNotice(1.0, "gap"),), (LossNotice(1.0, "gap"), LossNotice(2.0, "hand"))):
+        stage.belief.notices = notices
+        stage.run(stage.tree(CARRY), 10.0)
+    assert stage.motion.forced == [False, True]

@@ -220,3 +220,32 @@ def test_a_look_at_what_a_hand_holds_passes_the_hand(rig: Rig) -> None:
     between = RigidTransform.from_translation(rig.motion.tool("right").apply([-0.3, 0.0, 0.0]))
     assert not rig.motion.sees(between, ends, past="right")
     assert rig.motion.sees(between, ends)
+
+
+def test_unless_forced_a_carry_does_not_bend_the_cable(rig: Rig) -> None:
+    held = in_hand(rig, [0.02, 0.0, 0.10])
+    across = Rotation.from_euler("z", 70, degrees=True)
+    connector = natural_pose(rig.known, np.array([-0.04, 0.0, 0.17]))
+    goal = RigidTransform.from_components(connector.translation, across * connector.rotation) * held.inv()
+    start = rig.motion.joints("right")
+    with pytest.raises(PlanningError, match="without bending its cable by force") as failure:
+        rig.run(rig.motion.carry("right", [goal], held, speed=0.5, forced=False))
+    assert failure.value.code is CauseCode.OUT_OF_REACH
+    assert rig.motion.joints("right") == pytest.approx(start)
+    rig.run(rig.motion.carry("right", [goal], held, speed=0.5))
+    assert rig.motion.tool("right").translation == pytest.approx(goal.translation, abs=1e-3)
+
+
+def test_a_connector_that_could_not_be_carried_is_taken_otherwise(rig: Rig) -> None:
+    motion, connector = rig.motion, natural_pose(rig.known, np.array([0.02, 0.0, 0.10]))
+    rig.run(motion.pick_loose(connector))
+    first = motion.tool("right").inv() * connector
+    motion.set_obstacles(cube(np.array(rig.known.cable.clip.seat), 0.2), 0.01)
+    with pytest.raises(PlanningError):
+        rig.run(motion.carry_to_clip(first))
+    motion.set_obstacles(np.empty((0, 3)), 0.01)
+    rig.run(motion.sleep("right"))
+    rig.run(motion.pick_loose(connector))
+    second = motion.tool("right").inv() * connector
+    apart = np.linalg.norm((first.inv().translation - second.inv().translation))
+    assert apart > 0.03 or (first.rotation.inv() * second.rotation).magnitude() > 0.7
