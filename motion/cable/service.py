@@ -104,8 +104,8 @@ class CableMotion(PullingMotion):
     def carry_to_clip(self, held: RigidTransform, *, forced: bool = True) -> MotionRequest:
         """Bring the held connector (tool_from_connector) before the clip, from where the hand can go in and back out.
 
-        It fails with OUT_OF_REACH when no hand pose there is free, and unless `forced` also when its cable would have to
-        be bent by force. An arm takes the connector with such a grasp again only where it has no other.
+        It fails with OUT_OF_REACH when no hand pose there is free, and unless `forced` also when its cable would have
+        to be bent by force. After any failure the arm takes the connector with such a grasp only where it has no other.
         """
         finite_pose("the held connector's pose", held)
         seating = self.parameters.seating

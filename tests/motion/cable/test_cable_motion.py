@@ -247,5 +247,5 @@ def test_a_connector_that_could_not_be_carried_is_taken_otherwise(rig: Rig) -> N
     rig.run(motion.sleep("right"))
     rig.run(motion.pick_loose(connector))
     second = motion.tool("right").inv() * connector
-    apart = np.linalg.norm((first.inv().translation - second.inv().translation))
+    apart = np.linalg.norm(first.inv().translation - second.inv().translation)
     assert apart > 0.03 or (first.rotation.inv() * second.rotation).magnitude() > 0.7
