@@ -86,8 +86,7 @@ class CarryMotion(SearchMotion):
                 tethered, wide = model.constrained(tether), wide.constrained(tether)
             path = yield from first_free((wide, tethered), clearances, carry.leaving, paths)
             if path is None:
-                solutions = [end for goal in goals for end in kin.ik(goal, q)]
-                ends = [end for end in solutions if can_continue(kin, end, onward, carry.step)]
+                ends = [end for end in kin.ik_of_all(goals, q) if can_continue(kin, end, onward, carry.step)]
                 path = yield from self._shortest_plan(tethered, q, np.array(ends).reshape(-1, len(kin)), carry.searched)
             natural = max_bend is not None and np.isfinite(max_bend)
             limits = self._along_cable(self._guard.carrying if natural else self._guard.pulling, held)

@@ -97,8 +97,8 @@ class PullingMotion(TakingMotion):
         places = [np.add(tool.translation, [x, y, lift]) for x, y in product(values.aside, repeat=2)]
         near = [place for place in places if np.linalg.norm(place - anchor) < reach]
         goals = [RigidTransform.from_components(place, tool.rotation) for place in near]
-        solutions = [end for goal in goals for end in kin.ik(goal, q) if np.abs(end - q).max() < values.turn]
-        return np.array(solutions).reshape(-1, len(kin))
+        ends = kin.ik_of_all(goals, q)
+        return ends[np.abs(ends - q).max(axis=1) < values.turn]
 
     def _leave_cable(self, arm: str) -> Iterator[None]:
         """Open a jaw, draw it straight back as far as is free, and bring the arm to its sleep pose."""

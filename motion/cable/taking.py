@@ -322,7 +322,7 @@ class TakingMotion(CarryMotion):
         None where from no goal any way leads in and out.
         """
         kin, q, seating = self.kinematics[arm], self.joints(arm), self.parameters.seating
-        ends = [end for goal in goals for end in kin.ik(goal, q) if model.free(end, seating.margin)]
+        ends = [end for end in kin.ik_of_all(goals, q) if model.free(end, seating.margin)]
         for retreat in self.parameters.retreats:
             ways = [
                 RigidTransform.from_translation([x, 0.0, 0.0]) for x in (seating.distance, seating.distance - retreat)

@@ -67,16 +67,41 @@ def answers(base, joints, last_from_tool, wrist, tolerances, raw, rail, target, 
 
 
 @nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
+def answers_of_all(base, joints, last_from_tool, wrist, tolerances, raw, ends, targets, near):  # type: ignore[no-untyped-def]
+    """`answers` for the poses `targets` (m, 4, 4), one after the other, and how many each has (m,).
+
+    The solver's rows for a pose end before `ends` (m,) of the rows `raw` (k, n), where those for the next one begin.
+    """
+    n = len(joints)
+    rows, counts, frames = np.empty((len(raw), n)), np.empty(len(targets), np.int64), np.empty((n + 1, 4, 4))
+    frames[0] = base
+    begin, kept = 0, 0
+    for pose in range(len(targets)):
+        mine = rows[kept:]
+        found = _right(
+            mine, frames, joints, last_from_tool, wrist, tolerances, raw[begin : ends[pose]], 0.0, targets[pose]
+        )
+        counts[pose] = keep_within(joints, mine[:found], near)
+        begin, kept = ends[pose], kept + counts[pose]
+    return rows[:kept], counts
+
+
+@nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
 def solutions(base, joints, last_from_tool, wrist, tolerances, raw, rail, target):  # type: ignore[no-untyped-def]
     """Those of the rows `raw` that bring the tool to its pose `target` (4, 4), wrapped, without repetitions.
 
     The rows (k, n) may lack the first column: that of a rail, which stands at that m.
     """
-    within, near_by, distinct = _squares(tolerances[0], tolerances[1]), _squares(_NEAR, _NEAR), tolerances[2]
-    n, tip, target = len(joints), last_from_tool[:3, 3], _tip_pose(target, last_from_tool)
-    rows, count = np.empty((len(raw), n)), 0
-    frames = np.empty((n + 1, 4, 4))
+    rows, frames = np.empty((len(raw), len(joints))), np.empty((len(joints) + 1, 4, 4))
     frames[0] = base
+    return rows[: _right(rows, frames, joints, last_from_tool, wrist, tolerances, raw, rail, target)]
+
+
+@nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
+def _right(rows, frames, joints, last_from_tool, wrist, tolerances, raw, rail, target):  # type: ignore[no-untyped-def]
+    """Write `solutions` into `rows` (k, n), return how many; in `frames` (n + 1, 4, 4) the base is set."""
+    within, near_by, distinct = _squares(tolerances[0], tolerances[1]), _squares(_NEAR, _NEAR), tolerances[2]
+    n, tip, target, count = len(joints), last_from_tool[:3, 3], _tip_pose(target, last_from_tool), 0
     for row in range(len(raw)):
         q = rows[count]
         _fill(q, raw, row, rail)
@@ -86,16 +111,16 @@ def solutions(base, joints, last_from_tool, wrist, tolerances, raw, rail, target
             if wrist == _NO_WRIST and not _meets(frames[n], tip, target, near_by):
                 continue
             if wrist == _NO_WRIST:
-                q[:] = _refined(base, joints, tip, q, target)
+                q[:] = _refined(frames[0], joints, tip, q, target)
             else:
-                q[:] = _with_straight_wrist(base, joints, wrist, q, target)
+                q[:] = _with_straight_wrist(frames[0], joints, wrist, q, target)
             _wrap_turning(q, joints)
             place_links(frames, joints, q)
             if not _meets(frames[n], tip, target, within):
                 continue
         if is_new(q, rows, count, distinct):
             count += 1
-    return rows[:count]
+    return count
 
 
 @nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]

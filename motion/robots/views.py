@@ -51,7 +51,7 @@ def _by_the_last_link(
 ) -> FloatArray:
     """With all rolls, upright ones first: the camera moves with the tool."""
     tool = multiply(wanted, multiply(inverse(last_from_camera), kin.last_from_tool))
-    return np.concatenate([kin.ik(_rolled(tool, wanted, roll)) for roll in parameters.roll_starts])
+    return kin.ik_of_all(np.array([_rolled(tool, wanted, roll) for roll in parameters.roll_starts]))
 
 
 def _solutions(

@@ -265,3 +265,14 @@ def _chain_at(chain: Chain, q: FloatArray) -> tuple[FloatArray, Rotation, FloatA
     place = place + turn.apply(chain.last_from_tool[:3, 3])
     columns = [np.hstack([np.cross(axis, place - at), axis]) for axis, at in zip(axes, places, strict=True)]
     return place, turn, np.stack(columns, axis=2)
+
+
+@EVERY_KIN
+def test_many_poses_have_the_answers_of_each(kin: ArmKinematics) -> None:
+    straight = np.zeros(len(kin))
+    near = drawn(kin, 1, seed=3)[0]
+    poses = [kin.tool_matrix(q) for q in (*drawn(kin, 12), straight)]
+    poses.insert(5, RigidTransform.from_translation([30.0, 0.0, 0.0]).as_matrix() @ poses[0])
+    one_by_one = np.concatenate([kin.ik(pose, near) for pose in poses])
+    np.testing.assert_array_equal(kin.ik_of_all(np.array(poses), near), one_by_one)
+    assert kin.ik_of_all(np.empty((0, 4, 4))).shape == (0, len(kin))
