@@ -345,13 +345,15 @@ class Motion(PlanningScene):
         allowed = None if surfaces is None else SpeedBySeparation(model, surfaces, self.parameters.separation)
         yield from self.execution.follow(arm, path, speed, contact, allowed)
 
-    def _tries(self, arm: str, steps: Callable[[bool], Iterator[None]], most: int | None = None) -> Iterator[None]:
+    def _tries(
+        self, arm: str, steps: Callable[[bool], Iterator[None]], most: int | None = None, forgetting: bool = True
+    ) -> Iterator[None]:
         """The steps, from the beginning after each touch, with what was felt on the map.
 
         Raises the last TouchError after the `most` touches (default: as set).
 
         They are told whether the map is to be read optimistically (see `model`): where nothing is found otherwise.
-        Where nothing is found even so, what was felt is forgotten: it may have been a little beside.
+        Where nothing is found even so, what was felt is forgotten, if `forgetting`: it may have been a little beside.
         """
         touches, optimistic = 0, False
         while True:
@@ -365,7 +367,7 @@ class Motion(PlanningScene):
             except PlanningError as error:
                 if error.code not in NO_WAY or isinstance(error, StoppedShortError):
                     raise
-                if optimistic and not self.forget_felt():
+                if optimistic and not (forgetting and self.forget_felt()):
                     raise
                 optimistic = not optimistic
             else:

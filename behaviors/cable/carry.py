@@ -35,7 +35,7 @@ class Carry(HandLeaf):
 
     Where it is held so that no pose of the hand brings it there, or carrying it has failed before, the hand lets it
     fall: its cable may hang on something, and it is taken otherwise then. The cable is bent by force only once that has
-    happened: that is what pulls the connector out of the jaw, and presses the arm against things.
+    happened: that may pull the connector out of the jaw, and press the arm against things.
     """
 
     NEEDS: ClassVar[Keys] = (HELD,)

@@ -56,17 +56,17 @@ class CarryMotion(SearchMotion):
         """Bring what `arm` holds (tool_from_connector) to one of the goals (world_from_tool), the first preferred.
 
         Along the shapes that the cable takes by itself where that is free, else straight or in a flat arch, else along
-        any free path. On all of them the cable reaches, sweeps through nothing and bends little (`Tether`); only where
-        there is none it may bend more, and at last it does not count; not so unless `forced`: then OUT_OF_REACH is
-        raised. Where possible there is room for a jaw that opens
-        on the way, as after a slip. From the goal the tool must also reach the poses `onward` (goal_from_tool) in
-        straight lines.
+        any free path. On all of them the cable reaches, sweeps through nothing and bends little (`Tether`). Where there
+        is none, or only one on which the arm touched something, OUT_OF_REACH is raised; if `forced` the arm goes on
+        such ways and feels only a harder touch, then on those where the cable bends more, and at last it does not
+        count. Where possible there is room for a jaw that opens on the way, as after a slip. From the goal the tool
+        must also reach the poses `onward` (goal_from_tool) in straight lines.
         """
         for pose in (*goals, held, *onward):
             finite_pose("a pose of the tool or the connector", pose)
         share("the speed", speed)
 
-        def steps(optimistic: bool, max_bend: float | None) -> Iterator[None]:
+        def steps(optimistic: bool, max_bend: float | None, limits: ContactLimits) -> Iterator[None]:
             spheres = self.held_spheres(held)
             model = self.start_model(arm, held=spheres, optimistic=optimistic)
             q, kin = self.joints(arm), self.kinematics[arm]
@@ -88,30 +88,31 @@ class CarryMotion(SearchMotion):
             if path is None:
                 ends = [end for end in kin.ik_of_all(goals, q) if can_continue(kin, end, onward, carry.step)]
                 path = yield from self._shortest_plan(tethered, q, np.array(ends).reshape(-1, len(kin)), carry.searched)
-            natural = max_bend is not None and np.isfinite(max_bend)
-            limits = self._along_cable(self._guard.carrying if natural else self._guard.pulling, held)
             try:
-                yield from self._follow(arm, path, min(speed, self._pace(optimistic)), model, limits)
+                allowed = self._along_cable(limits, held)
+                yield from self._follow(arm, path, min(speed, self._pace(optimistic)), model, allowed)
             except TouchError:
                 yield from self._while_open(arm)
                 raise
 
         def tries() -> Iterator[None]:
-            natural, *bent = self.parameters.tether.bends
-            for max_bend in (natural, *bent) if forced else (natural,):
+            natural, *more = self.parameters.tether.bends
+            levels: list[tuple[float | None, ContactLimits]] = [(natural, self._guard.carrying)]
+            if forced:
+                # What stopped it on its natural ways may have been its cable: there it may pull harder now.
+                levels += [(bend, self._guard.pulling) for bend in (natural, *more, None)]
+            for level, (max_bend, limits) in enumerate(levels, 1):
                 try:
-                    yield from self._tries(arm, partial(steps, max_bend=max_bend))
+                    tried = partial(steps, max_bend=max_bend, limits=limits)
+                    yield from self._tries(arm, tried, forgetting=level > 1)
                 except PlanningError as error:
-                    if error.code not in NO_WAY or isinstance(error, (TouchError, StoppedShortError)):
+                    last = level == len(levels) and forced
+                    if last or error.code not in NO_WAY or isinstance(error, (TouchError, StoppedShortError)):
                         raise
                     self._on_anomaly(f"{error}, with the cable bent by at most {max_bend:g}/m")
                 else:
                     return
-            if not forced:
-                raise PlanningError(
-                    CauseCode.OUT_OF_REACH, "it cannot be carried there without bending its cable by force"
-                )
-            yield from self._tries(arm, partial(steps, max_bend=None))
+            raise PlanningError(CauseCode.OUT_OF_REACH, "it cannot be carried there without bending its cable by force")
 
         return self.execution.request(arm, tries())
 
