@@ -8,10 +8,12 @@ from regrasp.behaviors.cable.keys import FOUND, HELD, VAIN_CARRIES
 from regrasp.behaviors.keys import Keys
 from regrasp.behaviors.leaf import LeafSteps
 from regrasp.interfaces.cause import CauseCode
-from regrasp.motion.failure import PlanningError
+from regrasp.motion.failure import NO_WAY, PlanningError
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import RigidTransform
+
+NO_GRASP = (CauseCode.NO_COLLISION_FREE_GOAL, CauseCode.OUT_OF_REACH)  # no jaw gets round the connector where it is
 
 
 @dataclass(frozen=True)
@@ -36,31 +38,32 @@ class Regrasp(HandLeaf):
 
     def steps(self) -> LeafSteps:
         """See the class."""
-        motion, connector = self.services.motion, self.read(FOUND).world_from_connector
-        motion.set_obstacles(*self.services.perception.obstacles_beside(connector))
+        connector = self.read(FOUND).world_from_connector
         try:
             yield from self._take(connector)
         except PlanningError as error:
-            no_grasp = error.code in (CauseCode.NO_COLLISION_FREE_GOAL, CauseCode.OUT_OF_REACH)
-            if not no_grasp or len(self.services.known.arms) == 1:
+            if error.code not in NO_GRASP or len(self.services.known.arms) == 1:
                 raise
             yield from self._take_by_cable(connector, error)
 
     def _take(self, connector: "RigidTransform", holds_cable: str | None = None) -> LeafSteps:
         """Grip the connector (world_from_connector) with the best arm, but for one that `holds_cable`."""
         motion = self.services.motion
+        motion.set_obstacles(*self.services.perception.obstacles_beside(connector))
         hands = yield from self.ask(motion.hands_for(connector, () if holds_cable is None else (holds_cable,)))
         yield from self.take(hands, lambda: motion.pick_loose(connector, point_cloud=self.overview_points))
         self.say("took it", arm=motion.hand)
         yield from self.grip_or_leave(connector)
 
     def _take_by_cable(self, connector: "RigidTransform", no_grasp: PlanningError) -> LeafSteps:
-        """Lift the connector out by its cable, and grip it with another arm. Raises `no_grasp` where that fails."""
+        """Lift the connector out by its cable, and grip it with another arm. Raises `no_grasp` where none can."""
         motion, perception = self.services.motion, self.services.perception
         try:
             arm = yield from self.ask(motion.pull_cable(connector))
         except PlanningError as error:
-            self.say("the cable is not to be had either", why=str(error))
+            if error.code not in (*NO_WAY, *NO_GRASP, CauseCode.GRASP_EMPTY):
+                raise
+            self.say("the cable cannot be taken, either", why=str(error))
             raise no_grasp from None
         self.say("lifted by its cable", arm=arm)
         yield from self.wait(self.parameters.hang_time)

@@ -84,6 +84,7 @@ class KnownCable(Model):
     clip: Clip
     connector: Connector
     length: Length  # of the flexible part
+    radius: Length = 0.0035  # of the flexible part, by which an arm that takes hold of it closes its jaw
     hand: str = "right"  # the arm that handles the cable
     overview: str = "rear"  # the camera that watches the hand
     search: str = "wrist"  # the camera, on another arm's wrist, that looks for a lost end

@@ -81,7 +81,7 @@ class CableMotionService(MotionService, Protocol):
         ...
 
     def carry_to_clip(self, held: "RigidTransform", *, forced: bool = True) -> Request[None]:
-        """Bring the held connector before the clip."""
+        """Bring the held connector before the clip; the cable is bent by force only if `forced`."""
         ...
 
     @property

@@ -10,17 +10,17 @@ from regrasp.interfaces.arrays import FloatArray
 
 @dataclass(frozen=True)
 class CableSection:
-    """A piece of the cable: implements `regrasp.motion.grasping.approach.Cylinder`. All values are choices."""
+    """A piece of the cable, in m: implements `regrasp.motion.grasping.approach.Cylinder`."""
 
-    length: float = 0.08  # m that count as straight
-    radius: float = 0.004  # m, that of the cable
+    length: float
+    radius: float
 
 
 @dataclass(frozen=True)
 class PullingParameters:
     """Where the cable is gripped, and how far it is lifted. All values are choices."""
 
-    section: CableSection = CableSection()
+    straight: float = 0.08  # m of the cable that count as straight
     # m along the cable from the connector; where it lies is known the less, the further
     places: tuple[float, ...] = (0.07, 0.09, 0.11, 0.13, 0.15, 0.17, 0.20, 0.23, 0.26)
     lifts: tuple[float, ...] = (0.25, 0.20, 0.15, 0.10, 0.05)  # m up; the first to which a way is free

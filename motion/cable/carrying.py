@@ -104,6 +104,7 @@ class CarryMotion(SearchMotion):
             for level, (max_bend, limits) in enumerate(levels, 1):
                 try:
                     tried = partial(steps, max_bend=max_bend, limits=limits)
+                    # Only where it may press harder is it worth while to go again where something was felt.
                     yield from self._tries(arm, tried, forgetting=level > 1)
                 except PlanningError as error:
                     last = level == len(levels) and forced

@@ -11,7 +11,7 @@ from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.request import Request
 from regrasp.motion.arguments import finite_pose
-from regrasp.motion.cable.cable_section import section_of_cable
+from regrasp.motion.cable.cable_section import CableSection, section_of_cable
 from regrasp.motion.cable.cable_shape import cable_course
 from regrasp.motion.cable.taking import TakingMotion
 from regrasp.motion.failure import PlanningError, TouchError
@@ -28,9 +28,9 @@ class PullingMotion(TakingMotion):
         `pick` and `close` do; then the arm sleeps.
         """
         finite_pose("the connector's pose", world_from_connector)
-        section = self.parameters.pulling.section
 
         def steps() -> Generator[None, None, str]:
+            section = self._section()
             arm, place, pose = yield from self._grasp_of_cable(world_from_connector)
             try:
                 yield from self._done(self.pick(arm, pose, section))
@@ -41,11 +41,18 @@ class PullingMotion(TakingMotion):
             yield from self._lift(arm, place)
             return arm
 
-        return Request(steps())
+        def stop() -> None:
+            for arm in self.arms:
+                self.execution.halt(arm)
+
+        return Request(steps(), stop)
 
     def let_go_of_cable(self, arm: str) -> Request[None]:
         """Open the jaw of an arm that holds the cable, and bring the arm to its sleep pose."""
-        return Request(self._leave_cable(arm))
+        return self._together(arm, self._leave_cable(arm))
+
+    def _section(self) -> CableSection:
+        return CableSection(self.parameters.pulling.straight, self.known.cable.radius)
 
     def _grasp_of_cable(self, connector: RigidTransform) -> Generator[None, None, tuple[str, float, RigidTransform]]:
         """The arm, m along the cable and the section's pose (world_from_section) of the best free grasp of the cable.
@@ -53,7 +60,7 @@ class PullingMotion(TakingMotion):
         Through seen space rather than past it, then near the connector, then with another arm than the cell's hand:
         that takes the connector then.
         """
-        section, hand = self.parameters.pulling.section, self.known.cable.hand
+        section, hand = self._section(), self.known.cable.hand
         for optimistic in (False, True):
             for place in self.parameters.pulling.places:
                 pose = section_of_cable(cable_course(self.known, connector, 0.005), place)
@@ -102,8 +109,6 @@ class PullingMotion(TakingMotion):
 
     def _leave_cable(self, arm: str) -> Iterator[None]:
         """Open a jaw, draw it straight back as far as is free, and bring the arm to its sleep pose."""
-        yield from self._done(
-            self.release(arm, 2 * self.parameters.pulling.section.radius + self.parameters.execution.jaw.slack)
-        )
+        yield from self._done(self.release(arm, 2 * self._section().radius + self.parameters.execution.jaw.slack))
         yield from self._draw_back(arm)
         yield from self._done(self.sleep(arm, pulling=True))

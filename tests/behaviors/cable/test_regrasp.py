@@ -105,7 +105,22 @@ def test_what_is_not_seen_once_lifted_is_let_go(stage: Stage) -> None:
     assert not motion.pulled
 
 
-def test_a_touch_on_the_way_to_the_connector_is_no_reason_to_pull_at_its_cable(stage: Stage) -> None:
+def test_where_there_is_a_grasp_but_no_way_to_it_nothing_pulls_at_the_cable(stage: Stage) -> None:
     hindered(stage, left=CauseCode.PLANNING_FAILED, right=CauseCode.PLANNING_FAILED)
     assert stage.run(stage.tree(REGRASP), 60.0) is Status.FAILURE
     assert not stage.log.of("lifted by its cable")
+
+
+def test_an_arm_that_breaks_as_it_pulls_is_the_cause_that_is_told(stage: Stage) -> None:
+    motion = hindered(stage, left=CauseCode.OUT_OF_REACH, right=CauseCode.OUT_OF_REACH)
+
+    def breaks(world_from_connector: RigidTransform) -> Request[str]:
+        def steps() -> Generator[None, None, str]:
+            yield
+            raise PlanningError(CauseCode.ARM_FAILED, "the left arm does not follow")
+
+        return Request(steps())
+
+    motion.pull_cable = breaks  # type: ignore[method-assign]
+    assert stage.run(stage.tree(REGRASP), 60.0) is Status.FAILURE
+    assert stage.causes[-1].code is CauseCode.ARM_FAILED

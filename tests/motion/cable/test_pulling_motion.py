@@ -9,7 +9,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.cause import CauseCode
-from regrasp.motion.cable.cable_section import CableSection, section_of_cable
+from regrasp.motion.cable.cable_section import section_of_cable
 from regrasp.motion.failure import PlanningError
 
 CONNECTOR = RigidTransform.from_components([0.38, 0.0, 0.15], Rotation.from_euler("z", 90, degrees=True))
@@ -19,7 +19,7 @@ CONNECTOR = RigidTransform.from_components([0.38, 0.0, 0.15], Rotation.from_eule
 def rig(known: CableKnown) -> Rig:
     rig = Rig(known)
     for gripper in rig.grippers.values():
-        gripper.inside = 2 * CableSection().radius
+        gripper.inside = 2 * known.cable.radius
     return rig
 
 
@@ -72,3 +72,12 @@ def test_a_cable_that_no_arm_reaches_is_a_named_cause(rig: Rig) -> None:
     with pytest.raises(PlanningError, match="no grasp of the cable is free") as failure:
         rig.run(rig.motion.pull_cable(far))
     assert failure.value.code is CauseCode.NO_COLLISION_FREE_GOAL
+
+
+def test_a_pull_that_is_cancelled_halts_the_arm(rig: Rig) -> None:
+    request = rig.motion.pull_cable(CONNECTOR)
+    while not any(arm.is_moving() for arm in rig.arms.values()):
+        assert not request.poll()
+        rig.clock.t += 0.05
+    request.cancel()
+    assert not any(arm.is_moving() for arm in rig.arms.values())
