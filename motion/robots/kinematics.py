@@ -16,6 +16,7 @@ from regrasp.motion.robots.ik_parameters import InverseKinematicsParameters
 from regrasp.motion.robots.numerical_ik import NumericalSolver
 from regrasp.motion.robots.poses import multiply
 
+_THREADS, _WORTH_THREADS = 2, 64  # below so many poses starting the threads takes longer than they save
 _STRAIGHT = 1e-3  # sine of the joint before the last at which a wrist is straight
 
 
@@ -35,10 +36,16 @@ class _ClosedForm:
         places[0] += base[:3, 3]
         # The package's own wrapper, HPRobot, takes no tool that is turned.
         robot = EaikRobot(turn @ chain.axes.T, places.T, turn @ chain.last_from_tool[:3, :3], [], True)
-        self.known, self._branches = bool(robot.has_known_decomposition()), robot.calculate_IK
+        self.known, self._robot = bool(robot.has_known_decomposition()), robot
 
     def solve(self, world_from_tool: FloatArray, near: FloatArray | None = None) -> FloatArray:
-        return self._branches(world_from_tool).Q
+        return self._robot.calculate_IK(world_from_tool).Q
+
+    def solve_all(self, world_from_tools: FloatArray) -> list[FloatArray]:
+        """The answers (k, n) for each of the poses (m, 4, 4), of which many are shared between threads."""
+        if len(world_from_tools) < _WORTH_THREADS:
+            return [self.solve(pose) for pose in world_from_tools]
+        return [found.Q for found in self._robot.calculate_IK_batched(world_from_tools, _THREADS)]
 
 
 class ArmKinematics:
@@ -145,8 +152,8 @@ class ArmKinematics:
             if isinstance(world_from_tools, np.ndarray)
             else np.array([pose.as_matrix() for pose in world_from_tools])
         )
-        if self.closed_form and not self._rail and len(poses):
-            raw = [self._solver.solve(pose, near) for pose in poses]
+        if isinstance(self._solver, _ClosedForm) and not self._rail and len(poses):
+            raw = self._solver.solve_all(poses)
             ends, start = np.cumsum([len(rows) for rows in raw]), self._zero if near is None else near
             rows, counts = answers_of_all(*self._arm, np.concatenate(raw), ends, poses, start)
             if not any(_any_straight(raw[n]) for n in np.flatnonzero(counts == 0)):
