@@ -7,6 +7,7 @@ Planning is in random clutter. Where coal is installed (extra `bench`) it checks
 the meshes of the URDF instead of our spheres.
 """
 
+import argparse
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -214,5 +215,14 @@ def clutter(kin: ArmKinematics, rng: np.random.Generator, parameters: RobotBench
     return boxes
 
 
+def _names() -> list[str]:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("robot", nargs="*", help=f"one of {', '.join(shipped('robot'))}; all of them by default")
+    names: list[str] = parser.parse_args().robot
+    if unknown := sorted(set(names) - set(shipped("robot"))):
+        parser.error(f"no shipped robot {', '.join(unknown)}; there are {', '.join(shipped('robot'))}")
+    return names
+
+
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    main(_names())

@@ -66,7 +66,7 @@ def answers(base, joints, last_from_tool, wrist, tolerances, raw, rail, target, 
     return rows[: keep_within(joints, rows, near)]
 
 
-@nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
+@nb.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
 def answers_of_all(base, joints, last_from_tool, wrist, tolerances, raw, ends, targets, near):  # type: ignore[no-untyped-def]
     """`answers` for the poses `targets` (m, 4, 4), one after the other, and how many each has (m,).
 

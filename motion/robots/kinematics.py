@@ -1,10 +1,12 @@
 """Forward and inverse kinematics: where the links are, and which joint positions bring the tool to a pose."""
 
 from collections.abc import Sequence
-from typing import Protocol
+from concurrent.futures import ThreadPoolExecutor
+from typing import Protocol, cast
 
 import numpy as np
 from eaik.pybindings.EAIK import Robot as EaikRobot
+from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import FloatArray
@@ -16,7 +18,8 @@ from regrasp.motion.robots.ik_parameters import InverseKinematicsParameters
 from regrasp.motion.robots.numerical_ik import NumericalSolver
 from regrasp.motion.robots.poses import multiply
 
-_THREADS, _WORTH_THREADS = 2, 64  # below so many poses starting the threads takes longer than they save
+_THREADS = 2
+_WORTH_THREADS, _WORTH_CHECKING = 64, 256  # below so many poses starting threads to solve, to check takes longer
 _STRAIGHT = 1e-3  # sine of the joint before the last at which a wrist is straight
 
 
@@ -155,10 +158,24 @@ class ArmKinematics:
         if isinstance(self._solver, _ClosedForm) and not self._rail and len(poses):
             raw = self._solver.solve_all(poses)
             ends, start = np.cumsum([len(rows) for rows in raw]), self._zero if near is None else near
-            rows, counts = answers_of_all(*self._arm, np.concatenate(raw), ends, poses, start)
+            rows, counts = self._checked(np.concatenate(raw), ends, poses, start)
             if not any(_any_straight(raw[n]) for n in np.flatnonzero(counts == 0)):
                 return np.asarray(rows)
         return np.concatenate([np.empty((0, len(self))), *(self.ik(pose, near) for pose in poses)])
+
+    def _checked(
+        self, raw: FloatArray, ends: NDArray[np.int64], poses: FloatArray, near: FloatArray
+    ) -> tuple[FloatArray, NDArray[np.int64]]:
+        """`answers_of_all`, whose poses (m, 4, 4) the threads share."""
+        parts = []
+        for some in np.array_split(np.arange(len(poses)), _THREADS if len(poses) >= _WORTH_CHECKING else 1):
+            begin, last = ends[some[0] - 1] if some[0] else 0, ends[some[-1]]
+            parts.append((raw[begin:last], ends[some] - begin, poses[some], near))
+        if len(parts) == 1:
+            return cast(tuple[FloatArray, NDArray[np.int64]], answers_of_all(*self._arm, *parts[0]))
+        with ThreadPoolExecutor(_THREADS) as pool:
+            rows, counts = zip(*pool.map(lambda part: answers_of_all(*self._arm, *part), parts), strict=True)
+        return np.concatenate(rows), np.concatenate(counts)
 
     def solve(self, world_from_tool: FloatArray) -> FloatArray:
         """All solutions (k, n) for the tool's pose (4, 4), wrapped, whatever the limits; with a rail at zero."""

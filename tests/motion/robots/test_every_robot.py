@@ -268,7 +268,7 @@ def _chain_at(chain: Chain, q: FloatArray) -> tuple[FloatArray, Rotation, FloatA
 
 
 @EVERY_KIN
-@pytest.mark.parametrize("count", [12, 100])  # the closed form shares 100 poses between threads
+@pytest.mark.parametrize("count", [12, 100, 300])  # the closed form shares 100 poses between threads
 def test_many_poses_have_the_answers_of_each(kin: ArmKinematics, count: int) -> None:
     straight = np.zeros(len(kin))
     near = drawn(kin, 1, seed=3)[0]
