@@ -15,9 +15,9 @@ class ContactPlaceParameters:
     """How well a force must explain what was felt, and how much round its place counts as occupied."""
 
     unexplained: float = 0.02  # share of a joint's greatest effort that may be left unexplained; choice
-    usual_force: float = 30.0  # N; of two forces that explain a touch as well the smaller is the likelier one; choice
+    usual_force: float = 10.0  # N; of two forces that explain a touch as well the smaller is the likelier one; choice
     map_error: float = 0.02  # m that a thing which is touched may be off the map; choice
-    off_map: float = 0.10  # m; what is further from all that is mapped is as unlikely, no more; choice
+    off_map: float = 0.04  # m; what is further from all that is mapped is as unlikely, no more; tuned
     radius: float = 0.04  # m of the disc that counts as the surface which was felt; choice
     depth: float = 0.02  # m behind that surface; choice
 
