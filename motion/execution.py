@@ -9,9 +9,10 @@ import numpy as np
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.devices import Arm, Clock, Gripper
+from regrasp.interfaces.evidence import Evidence
 from regrasp.interfaces.robot.chain import Chain
 from regrasp.interfaces.trajectory import Trajectory
-from regrasp.motion.failure import GraspEmptyError, PlanningError, StoppedShortError, TouchError
+from regrasp.motion.failure import GraspEmptyError, JawBlockedError, PlanningError, StoppedShortError, TouchError
 from regrasp.motion.grasping.gap_test import GapParameters, GripWatch
 from regrasp.motion.planning.timing import JointLimits, PathSpeed, TimingParameters, time_path
 from regrasp.motion.request import MotionRequest
@@ -33,6 +34,9 @@ class GripParameters:
     time: float = 1.0  # s; the jaw closes from 60 mm at 0.1 m/s a finger, and the readings settle
     attempts: int = 3  # times that a jaw which does not move is told to close; choice
     moved: float = 0.003  # m that a jaw must move to count as moved: three times the encoder's backlash
+    gentle_force: float = 5.0  # N a finger with which a jaw closes at first on a thing that lies free; choice
+    gentle_time: float = 0.6  # s that it has for that; choice
+    wider: float = 0.008  # m; one that then stands so much wider than the thing pinches something else too; choice
     gap: GapParameters = field(default_factory=GapParameters)
 
 
@@ -199,20 +203,21 @@ class Execution:
         message = f"the {arm} jaw stands {1e3 * gripper.reading().gap:.1f} mm open, told {jaw.attempts} times to open"
         raise self.give_up(arm, CauseCode.GRIPPER_FAILED, f"{message} to {1e3 * jaw.open_gap:.0f} mm")
 
-    def close_jaw(self, arm: str, thickness: float) -> Generator[None, None, float]:
-        """Steps that close a jaw on a thing of `thickness` m; returns the gap (m) at which it holds.
+    def close_jaw(self, arm: str, thickness: float, gently: bool = False) -> Generator[None, None, float]:
+        """Close a jaw on a thing of `thickness` m; returns the gap (m) at which it holds.
 
-        Raises GraspEmptyError when it closes on nothing, and PlanningError GRIPPER_FAILED when it does not move.
+        `gently`: with little force at first, and with all of it only once it stands about as wide as the thing.
+        Raises GraspEmptyError when it closes on nothing, JawBlockedError when it closes gently on something that is
+        wider, and PlanningError GRIPPER_FAILED when it does not move.
         """
         gripper, grip = self._grippers[arm], self.parameters.jaw.grip
         before = gripper.reading().gap
+        if gently:
+            gap = (yield from self._close(arm, thickness, grip.gentle_force, grip.gentle_time)).value
+            if thickness + grip.wider < gap < before - grip.moved:
+                raise JawBlockedError(f"the jaw met something beside: it stands {1e3 * gap:.1f} mm open", gap)
         for _ in range(grip.attempts):
-            gripper.close(grip.force)
-            watch = GripWatch(gripper, thickness, grip.gap)
-            end = self._clock.now() + grip.time
-            while self._clock.now() < end - 1e-9:
-                evidence = watch.evidence()
-                yield
+            evidence = yield from self._close(arm, thickness, grip.force, grip.time)
             stood = evidence.detected and evidence.value > before - grip.moved
             if not stood:
                 break
@@ -222,6 +227,16 @@ class Execution:
         if evidence.detected:
             raise GraspEmptyError(f"the jaw closed on nothing: {evidence.sentence}")
         return evidence.value
+
+    def _close(self, arm: str, thickness: float, force: float, seconds: float) -> Generator[None, None, Evidence]:
+        """Close a jaw with `force` N a finger; whether it holds nothing after these seconds, by the gap of its pads."""
+        self._grippers[arm].close(force)
+        watch = GripWatch(self._grippers[arm], thickness, self.parameters.jaw.grip.gap)
+        end = self._clock.now() + seconds
+        while self._clock.now() < end - 1e-9:
+            evidence = watch.evidence()
+            yield
+        return evidence
 
     def _from_command(self, arm: str, path: FloatArray) -> FloatArray:
         """The path from where the servos stand: a start by the encoders' reading jerks what the hand holds."""

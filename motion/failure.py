@@ -39,3 +39,11 @@ class GraspEmptyError(PlanningError):
 
     def __init__(self, message: str) -> None:
         super().__init__(CauseCode.GRASP_EMPTY, message)
+
+
+class JawBlockedError(GraspEmptyError):
+    """The jaw met something beside the thing that it was to close on: it stands at `gap` m."""
+
+    def __init__(self, message: str, gap: float) -> None:
+        super().__init__(message)
+        self.gap = gap

@@ -26,7 +26,7 @@ from regrasp.motion.cable.gentle_pull import GentlePullParameters
 from regrasp.motion.cable.plugging import PluggingParameters
 from regrasp.motion.cable.seating import SeatingParameters, poses_before
 from regrasp.motion.cable.tether import course_length
-from regrasp.motion.failure import GraspEmptyError, PlanningError, TouchError
+from regrasp.motion.failure import GraspEmptyError, JawBlockedError, PlanningError, TouchError
 from regrasp.motion.grasping.approach import pick_candidates
 from regrasp.motion.grasping.gap_test import GripWatch
 from regrasp.motion.grasping.grasps import Grasp
@@ -201,15 +201,23 @@ class TakingMotion(CarryMotion):
         self._keep_clear_but_near(cable_course(self.known, connector), connector.translation)
 
     def grip(self, world_from_connector: RigidTransform) -> Request[Grip]:
-        """Close the hand's jaw on the connector; the answer is what it holds then. It fails as `close` does."""
+        """Close the hand's jaw on the connector; the answer is what it holds then. It fails as `close` does.
+
+        The jaw closes gently at first, but with a grasp that has failed before.
+        """
         finite_pose("the connector's pose", world_from_connector)
 
         def steps() -> Generator[None, None, Grip]:
             held = self.tool(self.hand).inv() * world_from_connector
+            taken, near = held.inv().as_matrix(), self.parameters.same_grasp
+            gently = not any(_alike(taken, other, *near) for other in self._missed)
+            thickness = 2 * self.known.cable.connector.radius
             try:
-                gap = yield from self._done(self.close(self.hand, 2 * self.known.cable.connector.radius))
-            except GraspEmptyError:
-                self._missed.append(held.inv().as_matrix())
+                gap = yield from self._done(self.close(self.hand, thickness, gently=gently))
+            except GraspEmptyError as error:
+                self._missed.append(taken)
+                if isinstance(error, JawBlockedError):
+                    self.feel_in_jaw(self.hand, error.gap, thickness)
                 raise
             self._missed.clear()
             return Grip(gap, self.tool(self.hand).inv() * world_from_connector)

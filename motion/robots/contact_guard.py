@@ -44,7 +44,7 @@ class ContactGuardParameters:
     # One that is drawn out of its socket straightens its cable; this stops at 12 N at a ViperX's hand; choice
     drawing: ContactLimits = ContactLimits(0.3, elastic=True)
     # One that is bent, pressed together, or caught in the jaw changes them by up to half; choice
-    pulling: ContactLimits = ContactLimits(0.3, elastic=True, far=0.7)
+    pulling: ContactLimits = ContactLimits(0.3, adaptation=1.0, elastic=True, far=0.7)
     # A plug that is gripped askew jams in its socket up to what the drives can do: this stops at a blow only; choice
     pressing: ContactLimits = ContactLimits(2.0)
 
@@ -53,7 +53,8 @@ class ContactGuardParameters:
 class Touch:
     """What a guard felt at `stamp` s.
 
-    The joints (n,), their velocities (n,), and the efforts (n,), N m or N, of a force from outside on them.
+    The joints (n,), their velocities (n,), and the efforts (n,), N m or N, of a force from outside on them, without
+    those of a cable that pulls.
     """
 
     stamp: float
@@ -106,24 +107,28 @@ class ContactGuard:
         if self._usual is None:
             self._usual = outside
         change = outside - self._usual
-        if self._beyond(reading.positions, change, np.inf) > self._times_far or (
-            self._beyond(reading.positions, change, self._pull_near) > 1.0 and self._is_near(reading.positions)
-        ):
-            self.touch = Touch(reading.stamp, reading.positions, last.velocities, change)
+        felt = self._felt(reading.positions, change / self._limits)
+        if felt is not None:
+            self.touch = Touch(reading.stamp, reading.positions, last.velocities, felt * self._limits)
+            return True
         self._usual = self._usual + min(interval / self._adaptation, 1.0) * change
-        return self.touch is not None
+        return False
 
-    def _is_near(self, q: FloatArray) -> bool:
-        return self._near is None or self._near(q)
+    def _felt(self, q: FloatArray, shares: FloatArray) -> FloatArray | None:
+        """What is left of the efforts (n,), in shares of their limits, without a pull, if it is a touch."""
+        felt = self._without_pull(q, shares, np.inf)
+        if felt @ felt > self._times_far**2:
+            return felt
+        felt = self._without_pull(q, shares, self._pull_near)
+        return felt if felt @ felt > 1.0 and (self._near is None or self._near(q)) else None
 
-    def _beyond(self, q: FloatArray, efforts: FloatArray, most: float) -> float:
-        """The length of the efforts (n,), each in its joint's limits, less those of a pull of `most` N.
+    def _without_pull(self, q: FloatArray, shares: FloatArray, most: float) -> FloatArray:
+        """The efforts (n,), in shares of their limits, less those of a pull of `most` N.
 
-        The pull is the one that explains the efforts best, with the limits as weights.
+        The pull is the one that explains them best.
         """
-        efforts = efforts / self._limits
-        if self._pull is not None:
-            along = self._dynamics.efforts_of_pull(q, self._pull) / self._limits
-            force = float(along @ efforts) / max(float(along @ along), 1e-12)
-            efforts = efforts - min(max(force, -most), most) * along
-        return float(np.sqrt(efforts @ efforts))
+        if self._pull is None:
+            return shares
+        along = self._dynamics.efforts_of_pull(q, self._pull) / self._limits
+        force = float(along @ shares) / max(float(along @ along), 1e-12)
+        return np.asarray(shares - min(max(force, -most), most) * along)

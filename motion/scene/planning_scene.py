@@ -1,7 +1,7 @@
 """The planning scene: where the arms are, and what they must not touch."""
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.spatial.transform import RigidTransform
@@ -38,6 +38,7 @@ class PlanningSceneParameters:
     sight_samples: int = 24  # points on a line of sight that must be free; choice
     sight_range: tuple[float, float] = (0.15, 0.85)  # shares of a line of sight that are checked: not its ends; choice
     felt_time: float = 60.0  # s that a felt place stays on the map; what was felt may move, as a cable does; choice
+    pad_radius: float = 0.01  # m of the disc at a pad that counts as what a jaw met; choice
     contact: ContactPlaceParameters = field(default_factory=ContactPlaceParameters)
     collision: CollisionParameters = field(default_factory=CollisionParameters)
     kinematics: InverseKinematicsParameters = field(default_factory=InverseKinematicsParameters)
@@ -118,6 +119,18 @@ class PlanningScene:
         self._felt.append((touch.stamp, felt))
         self._forget_grids()
         return place
+
+    @counts_as("planning")
+    def feel_in_jaw(self, arm: str, gap: float, thickness: float) -> None:
+        """Keep clear of what a jaw may have met beside a thing of `thickness` m: one pad or both, `gap` m apart."""
+        reading, tool = self.arms[arm].reading(), self.kinematics[arm].tool_matrix(self.joints(arm))
+        pad = self._scene_parameters.pad_radius
+        disc = replace(self._scene_parameters.contact, radius=pad, depth=max(0.5 * (gap - thickness), 0.0))
+        for side in (-1.0, 1.0):
+            across = side * tool[:3, 1]
+            felt = felt_points(tool[:3, 3] + 0.5 * gap * across, -across, self._spacing, disc)
+            self._felt.append((reading.stamp, felt))
+        self._forget_grids()
 
     def forget_felt(self) -> bool:
         """Take what was felt off the map; whether there was any. Where a touch was is known to centimetres only."""

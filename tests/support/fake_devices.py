@@ -72,11 +72,13 @@ class FakeArm:
 
 @dataclass
 class FakeGripper:
-    """`inside` m is how thick what lies between the pads is."""
+    """`inside` m is how thick what lies between the pads is, `soft` m what a force below `yields` N leaves of it."""
 
     clock: Clock
     gap: float = 0.0
     inside: float = 0.0
+    soft: float = 0.0
+    yields: float = 0.0
     told: list[tuple[float, str, float]] = field(default_factory=list)
 
     def open(self, gap: float) -> None:
@@ -84,7 +86,7 @@ class FakeGripper:
         self.told.append((self.clock.t, "open", gap))
 
     def close(self, force: float) -> None:
-        self.gap = self.inside
+        self.gap = self.inside if force >= self.yields else self.soft
         self.told.append((self.clock.t, "close", force))
 
     def reading(self) -> GripperReading:

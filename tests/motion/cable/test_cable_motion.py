@@ -10,7 +10,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.cause import CauseCode
 from regrasp.motion.cable.carry_paths import CarryPathParameters
-from regrasp.motion.failure import GraspEmptyError, PlanningError
+from regrasp.motion.failure import GraspEmptyError, JawBlockedError, PlanningError
 from regrasp.motion.robots.spheres import sphere_distances
 from regrasp.motion.service import MotionParameters
 
@@ -148,6 +148,26 @@ def test_a_jaw_that_closes_on_nothing_says_so(rig: Rig) -> None:
     with pytest.raises(GraspEmptyError, match=r"closed on nothing: pads 0.0 mm apart") as error:
         rig.run(rig.motion.grip(rig.motion.tool("right")))
     assert error.value.code is CauseCode.GRASP_EMPTY
+
+
+def test_a_jaw_that_meets_something_beside_the_connector_does_not_squeeze_it_at_first(rig: Rig) -> None:
+    rig.arms["right"].at = READY
+    jaw = rig.grippers["right"]
+    jaw.gap, jaw.inside, jaw.soft, jaw.yields = 0.05, 0.0201, 0.031, 20.0
+    connector = rig.motion.tool("right")
+    pad = connector.apply([0.0, 0.0145, 0.0])
+    before = rig.motion.model("right").clearance(ASIDE)
+    with pytest.raises(JawBlockedError, match=r"met something beside: it stands 31\.0 mm open"):
+        rig.run(rig.motion.grip(connector))
+    assert max(force for _, _, force in jaw.told) < 10.0
+    mapped = rig.motion.all_seen()
+    assert mapped is not None
+    assert mapped.at(pad[None])[0] < 0.01
+    assert rig.motion.model("right").clearance(ASIDE) == pytest.approx(before)
+    jaw.gap = 0.05
+    task = rig.motion.grip(connector)  # the same grasp once more, since no other was taken
+    rig.run(task)
+    assert task.answer.gap == 0.0201
 
 
 def drawn_out(rig: Rig, plug: RigidTransform) -> tuple[float, float, Points]:

@@ -68,6 +68,18 @@ def test_of_two_places_that_explain_a_touch_the_one_beside_a_mapped_thing_is_tol
     assert np.linalg.norm(place - spheres[upper, :3]) == pytest.approx(spheres[upper, 3])
 
 
+def test_a_touch_is_not_told_beside_a_mapped_thing_where_the_force_would_be_far_greater() -> None:
+    q = np.zeros(6)
+    velocities = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    spheres, links = MODEL.spheres(q), MODEL.links
+    fore = np.flatnonzero(links == 4)[-1]
+    efforts = efforts_of(q, 4, spheres[fore, :3], np.array([0.0, -8.0, 0.0]))
+    clearances = np.full(len(spheres), 0.50)
+    clearances[links <= 2] = 0.005  # the shoulder stands beside its table
+    place, _ = contact_place(KIN, spheres, links, Touch(1.0, q, velocities, efforts), clearances)
+    assert place[0] > 0.25  # not at the shoulder, at x = 0
+
+
 def test_felt_points_are_a_disc_of_the_surface_and_what_lies_behind() -> None:
     parameters = ContactPlaceParameters(radius=0.04, depth=0.02)
     points = felt_points(np.array([0.3, 0.1, 0.2]), np.array([1.0, 0.0, 0.0]), 0.01, parameters) - [0.3, 0.1, 0.2]

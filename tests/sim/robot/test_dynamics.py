@@ -201,6 +201,28 @@ def test_what_is_carried_may_pull_along_its_axis_but_not_push_across(
     assert (guard.touch is not None) == touches
 
 
+def test_a_slow_push_that_turns_two_joints_a_little_is_felt(cell: CableCell, client: int) -> None:
+    dynamics, torques = ArmDynamics(VX300S, RigidTransform.identity()), VX300S.chain.torques
+    guard, seconds = ContactGuard(dynamics, np.zeros(3), torques, FREE), 0.4
+    felt = 0.9 * FREE.share * torques * [0.0, 1.0, 1.0, 0.0, 0.0, 0.0]  # neither joint's reaches its limit
+    for n in range(int(seconds * 480)):
+        guard(JointReading(n / 480, np.zeros(6), np.zeros(6), felt * n / (seconds * 480)))
+    assert guard.touch is not None
+
+
+def test_what_a_cable_pulls_is_no_part_of_a_touch() -> None:
+    dynamics = ArmDynamics(VX300S, RigidTransform.identity())
+    q, still = np.array([0.2, 0.1, 0.3, 0.4, 0.5, 0.0]), np.zeros(6)
+    limits = replace(ContactGuardParameters().pulling, pull=np.array([0.02, 0.0, 0.0, 0.0, 0.0, 1.0]))
+    guard = ContactGuard(dynamics, np.zeros(3), VX300S.chain.torques, limits, lambda _: True)
+    touch = 0.5 * VX300S.chain.torques * [0.0, 0.0, 0.0, 1.0, 0.0, 0.0]  # the pull does not turn the forearm
+    pulled = dynamics.efforts_of_pull(q, np.array([0.02, 0.0, 0.0, 0.0, 0.0, 12.0]))
+    for n in range(4):
+        guard(JointReading(n / 480, q, still, -(pulled + touch) if n > 1 else still))
+    assert guard.touch is not None
+    np.testing.assert_allclose(guard.touch.efforts, touch, atol=0.1)
+
+
 @pytest.mark.parametrize("near", [True, False])
 def test_what_is_carried_may_pull_harder_where_nothing_is_near(near: bool) -> None:
     dynamics = ArmDynamics(VX300S, RigidTransform.identity())
