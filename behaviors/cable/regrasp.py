@@ -54,6 +54,7 @@ class Regrasp(HandLeaf):
         yield from self.take(hands, lambda: motion.pick_loose(connector, point_cloud=self.overview_points))
         self.say("took it", arm=motion.hand)
         yield from self.grip_or_leave(connector)
+        self.services.take_over_map()  # what nobody has seen beside the connector counts again
 
     def _take_by_cable(self, connector: "RigidTransform", no_grasp: PlanningError) -> LeafSteps:
         """Lift the connector out by its cable, and grip it with another arm. Raises `no_grasp` where none can."""

@@ -38,15 +38,15 @@ class ContactGuardParameters:
     # and all come to their goals; the places are found 34, 27 and 27 mm beside in the median. With an adaptation of
     # 0.25 s, and the greatest effort instead of their length, a slow forearm pressed foam with 25 N (scene 7302).
     free: ContactLimits = ContactLimits(0.10, adaptation=1.0)
-    # The end of a cable that keeps to its natural shapes changes the efforts by 0.12 of the wrist's and 0.04 of the
-    # other joints', sometimes by more; a slow hand presses foam for half a second before that is felt; choice.
-    carrying: ContactLimits = ContactLimits(0.12, adaptation=1.0, far=0.4)
+    # The end of a cable that keeps to its natural shapes changes the efforts by 0.12 of the wrist's and 0.04 of each of
+    # the other joints', sometimes by more; a slow hand presses foam for half a second before that is felt; choice.
+    carrying: ContactLimits = ContactLimits(0.16, adaptation=1.0, far=0.5)
     # One that is drawn out of its socket straightens its cable; this stops at 12 N at a ViperX's hand; choice
-    drawing: ContactLimits = ContactLimits(0.3, elastic=True)
+    drawing: ContactLimits = ContactLimits(0.4, elastic=True)
     # One that is bent, pressed together, or caught in the jaw changes them by up to half; choice
-    pulling: ContactLimits = ContactLimits(0.3, adaptation=1.0, elastic=True, far=0.7)
+    pulling: ContactLimits = ContactLimits(0.4, elastic=True, far=0.9)
     # A plug that is gripped askew jams in its socket up to what the drives can do: this stops at a blow only; choice
-    pressing: ContactLimits = ContactLimits(2.0)
+    pressing: ContactLimits = ContactLimits(2.5)
 
 
 @dataclass(frozen=True, eq=False)
