@@ -203,14 +203,16 @@ class TakingMotion(CarryMotion):
     def grip(self, world_from_connector: RigidTransform) -> Request[Grip]:
         """Close the hand's jaw on the connector; the answer is what it holds then. It fails as `close` does.
 
-        The jaw closes gently at first, but with a grasp that has failed before.
+        A loose connector is gripped gently at first, but with a grasp that has failed before. One that a socket or the
+        clip holds does not give way to a hand that is a little beside.
         """
         finite_pose("the connector's pose", world_from_connector)
 
         def steps() -> Generator[None, None, Grip]:
             held = self.tool(self.hand).inv() * world_from_connector
             taken, near = held.inv().as_matrix(), self.parameters.same_grasp
-            gently = not any(_alike(taken, other, *near) for other in self._missed)
+            again = any(_alike(taken, other, *near) for other in self._missed)
+            gently = not again and not self._is_fixed(world_from_connector)
             thickness = 2 * self.known.cable.connector.radius
             try:
                 gap = yield from self._done(self.close(self.hand, thickness, gently=gently))
@@ -361,6 +363,12 @@ class TakingMotion(CarryMotion):
         clip = self.known.cable.clip
         off = float(np.linalg.norm(world_from_connector.translation - np.array(clip.seat)))
         return clip.bracket if off < self.parameters.pick.jaw_reach else ()
+
+    def _is_fixed(self, world_from_connector: RigidTransform) -> bool:
+        """Whether the connector is where the clip or a socket holds it."""
+        places = [self.known.cable.clip.seat, *(socket.center for socket in self.known.cable.sockets)]
+        offs = np.linalg.norm(np.array(places) - world_from_connector.translation, axis=1)
+        return bool(offs.min() < self.parameters.pick.jaw_reach)
 
     def _pick_connector(
         self,
