@@ -208,15 +208,14 @@ class Motion(PlanningScene):
         """
         return self._pick(arm, world_from_cylinder, cylinder, shallow, clear_of, without, point_cloud)
 
-    def close(self, arm: str, thickness: float, *, gently: bool = False) -> Request[float]:
+    def close(self, arm: str, thickness: float) -> Request[float]:
         """Close the jaw on a thing of `thickness` m; the answer is the gap (m) between the pads that hold it.
 
-        `gently`: with little force at first. It fails with GraspEmptyError when it closes on nothing, JawBlockedError
-        when it closes gently on something wider, GRIPPER_FAILED when it does not move. When it is cancelled the jaw
-        keeps its force.
+        It fails with GraspEmptyError when the jaw closes on nothing, and with GRIPPER_FAILED when it does not move.
+        When it is cancelled the jaw keeps its force.
         """
         positive("the thickness", thickness)
-        return Request(self.execution.close_jaw(arm, thickness, gently))
+        return Request(self.execution.close_jaw(arm, thickness))
 
     def open_jaw(self, arm: str) -> None:
         """Tell the jaw to open, without waiting for it."""

@@ -215,7 +215,7 @@ class TakingMotion(CarryMotion):
             gently = not again and not self._is_fixed(world_from_connector)
             thickness = 2 * self.known.cable.connector.radius
             try:
-                gap = yield from self._done(self.close(self.hand, thickness, gently=gently))
+                gap = yield from self.execution.close_jaw(self.hand, thickness, gently)
             except GraspEmptyError as error:
                 self._missed.append(taken)
                 if isinstance(error, JawBlockedError):
