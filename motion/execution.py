@@ -55,7 +55,8 @@ class JawParameters:
 class BackOffParameters:
     """How an arm goes back the way that it came after a touch."""
 
-    distance: float = 0.10  # m that its far end moves, where the elbow moves by less than half; choice
+    distance: float = 0.10  # m at least that its far end moves, where the elbow moves by less than half; choice
+    seconds: float = 1.0  # s of its way at least: so long a slow arm may press before that is felt; choice
     step: float = 0.02  # s of the way that it came between two waypoints
     speed: float = 0.3  # share of the joints' speed; choice
 
@@ -251,9 +252,10 @@ class Execution:
 
     def _back_off(self, arm: str, trajectory: Trajectory, elapsed: float) -> Iterator[None]:
         """Steps that bring an arm back the way that it came, as far as the parameters say."""
-        path, way, levers = [self._joints(arm)], 0.0, self._chains[arm].levers
-        while elapsed > 0.0 and way < self.parameters.back_off.distance:
-            elapsed -= self.parameters.back_off.step
+        path, way, levers, values = [self._joints(arm)], 0.0, self._chains[arm].levers, self.parameters.back_off
+        touched = elapsed
+        while elapsed > 0.0 and (way < values.distance or elapsed > touched - values.seconds):
+            elapsed -= values.step
             path.append(trajectory.sample(elapsed)[0])
             way += float(np.linalg.norm((path[-1] - path[-2]) * levers))
         if way > 0.0:

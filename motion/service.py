@@ -295,10 +295,12 @@ class Motion(PlanningScene):
         point_cloud: PointCloudSource | None,
         order: Callable[[list[Grasp]], list[Grasp]] = list,
         onward: Callable[[FloatArray], bool] = lambda q: True,
+        on_touch: Callable[[FloatArray], None] = lambda world_from_tool: None,
     ) -> MotionRequest:
         """`pick`; of the candidates, the cheapest first, those are tried that `order` keeps, in its order.
 
         Where there are any, it takes hold with joints (n,) that are well for what comes then, as `onward` says.
+        `on_touch` is told of a grasp (4, 4) on whose straight way in the arm touched something.
         """
         finite_pose("the cylinder's pose", world_from_cylinder)
         near_points = None if clear_of is None else rows("the points to keep clear of", clear_of, 3)
@@ -326,7 +328,11 @@ class Motion(PlanningScene):
             # With offsets the arm goes first to where it should stand now.
             approach = approach - offsets if offsets.any() else approach[1:]
             approach = np.vstack([self.joints(arm), approach])
-            yield from self._follow(arm, approach, self.parameters.approach_speed, model)
+            try:
+                yield from self._follow(arm, approach, self.parameters.approach_speed, model)
+            except TouchError:
+                on_touch(self.kinematics[arm].tool_matrix(approach[-1]))
+                raise
             self.keep_clear(NO_POINTS)
 
         return self.execution.request(arm, self._tries(arm, steps))

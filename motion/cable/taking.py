@@ -97,7 +97,7 @@ class TakingMotion(CarryMotion):
     ) -> None:
         super().__init__(known, arms, grippers, clock, seed, parameters, on_anomaly)
         self._hand = known.cable.hand
-        self._missed: list[FloatArray] = []  # grasps (4, 4), connector_from_tool, that closed on nothing
+        self._missed: list[FloatArray] = []  # grasps (4, 4), connector_from_tool, that failed
         # by arm: the pose (4, 4) of the connector, and whether it can be stowed with a grasp, see `_without_roll`
         # By arm, grasps (4, 4), connector_from_tool, with which the connector could not be carried to the clip
         self._vain: dict[str, list[FloatArray]] = {arm: [] for arm in self.arms}
@@ -379,7 +379,10 @@ class TakingMotion(CarryMotion):
         order: Callable[[list[Grasp]], list[Grasp]],
         onward: Callable[[FloatArray], bool] = lambda q: True,
     ) -> MotionRequest:
-        """`pick` the connector; what has closed on nothing is tried after all other grasps, which the `order` sorts."""
+        """`pick` the connector, with the grasps that the `order` sorts.
+
+        Those that closed on nothing or touched something on the way in are tried after all others.
+        """
         connector_from_world, near = inverse(world_from_connector.as_matrix()), self.parameters.same_grasp
 
         def missed(grasp: Grasp) -> bool:
@@ -395,6 +398,7 @@ class TakingMotion(CarryMotion):
             point_cloud,
             lambda candidates: sorted(order(candidates), key=missed),
             onward,
+            lambda world_from_tool: self._missed.append(connector_from_world @ world_from_tool),
         )
 
 
