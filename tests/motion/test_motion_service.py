@@ -12,7 +12,7 @@ from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.cell import KnownCell, pose_along
 from regrasp.interfaces.frame import Intrinsics, RgbdFrame
 from regrasp.motion.execution import ExecutionParameters, JawParameters
-from regrasp.motion.failure import PlanningError
+from regrasp.motion.failure import PlanningError, TouchError
 from regrasp.motion.request import MotionRequest
 from regrasp.motion.service import Motion, MotionParameters
 
@@ -413,3 +413,22 @@ def test_a_jaw_closes_on_a_thing_and_says_how_wide_it_holds(rig: Rig) -> None:
     assert task.answer == 0.031
     assert rig.clock.t == pytest.approx(1.0, abs=TICK)
     assert rig.grippers["left"].told == [(0.0, "close", 40.0)]
+
+
+@pytest.mark.parametrize("speed", [0.05, 1.0])
+def test_after_a_touch_an_arm_goes_back_as_far_as_it_may_have_pressed_before_that_was_felt(
+    rig: Rig, speed: float
+) -> None:
+    arm, motion, values = rig.arms["right"], rig.motion, rig.motion.parameters.execution.back_off
+    start, goal = np.array([0.4, -0.6, 0.6, 0.0, 0.3, 0.0]), np.array([-0.5, -0.6, 0.6, 0.0, 0.3, 0.0])
+    arm.at = start
+    arm.bumps.append(lambda q: bool(q[0] < -0.3))
+    steps = motion.execution.follow("right", np.array([start, goal]), speed)
+    with pytest.raises(TouchError) as error:
+        rig.run(motion.execution.request("right", steps))
+    begun, trajectory = arm.followed[0]
+    felt = error.value.touch.stamp - begun
+    ways = motion.kinematics["right"].chain.levers * (motion.joints("right") - error.value.touch.joints)
+    assert np.linalg.norm(ways) >= values.distance - 1e-6
+    earlier = trajectory.sample(felt - values.seconds)[0]
+    assert motion.joints("right")[0] >= earlier[0] - 1e-3

@@ -1,5 +1,6 @@
 """Arms and grippers that do exactly what they are told, on a clock that is turned by hand."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -13,6 +14,7 @@ from regrasp.interfaces.reading import GripperReading, JointReading
 from regrasp.interfaces.request import Request
 from regrasp.interfaces.trajectory import Trajectory
 from regrasp.motion.cable.service import CableMotion
+from regrasp.motion.robots.contact_guard import ContactGuard, Touch
 
 
 @dataclass
@@ -25,7 +27,10 @@ class Clock:
 
 @dataclass
 class FakeArm:
-    """`stuck` is the share of a trajectory after which the arm goes no further."""
+    """`stuck` is the share of a trajectory after which the arm goes no further.
+
+    Where it first meets the conditions `bumps` on its joints (6,), one after the other, it touches something and stops.
+    """
 
     name: str
     clock: Clock
@@ -33,9 +38,16 @@ class FakeArm:
     stuck: float = 1.0
     followed: list[tuple[float, Trajectory]] = field(default_factory=list)
     stops: int = 0
+    bumps: list[Callable[[NDArray[np.float64]], bool]] = field(default_factory=list)
+    _guard: Guard | None = None
     _begun: float | None = None
 
     def reading(self) -> JointReading:
+        if self._begun is not None and self.bumps and self.bumps[0](self._now()):
+            self.bumps.pop(0)
+            assert isinstance(self._guard, ContactGuard)
+            self._guard.touch = Touch(self.clock.t, self._now(), self._rate(), np.full(6, 3.0))
+            self.stop()
         return JointReading(self.clock.t, self._now(), self._rate(), np.zeros(6))
 
     def gravity(self) -> NDArray[np.float64]:
@@ -45,7 +57,7 @@ class FakeArm:
         assert np.abs(trajectory.positions[0] - self._now()).max() < 1e-6, "a trajectory begins where the arm is"
         self.at = self._now()
         self.followed.append((self.clock.t, trajectory))
-        self._begun = self.clock.t
+        self._begun, self._guard = self.clock.t, guard
 
     def stop(self) -> None:
         self.at, self._begun = self._now(), None

@@ -170,6 +170,28 @@ def test_a_jaw_that_meets_something_beside_the_connector_does_not_squeeze_it_at_
     assert task.answer.gap == 0.0201
 
 
+def test_a_grasp_whose_way_in_touched_something_is_tried_after_the_others(
+    rig: Rig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    motion, connector = rig.motion, natural_pose(rig.known, np.array([0.02, 0.0, 0.10]))
+    monkeypatch.setattr(motion, "feel", lambda arm, touch: touch.joints[:3])  # nothing is mapped
+    bumped = []
+
+    def on_its_way_in(q: Points) -> bool:
+        tool = motion.kinematics["right"].tool(q)
+        if np.linalg.norm(tool.translation - connector.translation) < 0.06:
+            bumped.append(tool)
+        return bool(bumped)
+
+    rig.arms["right"].bumps.append(on_its_way_in)
+    rig.run(motion.pick_loose(connector))
+    taken = motion.tool("right")
+    assert not rig.arms["right"].bumps
+    apart = np.linalg.norm(taken.translation - connector.translation)
+    assert apart < 0.03
+    assert (taken.rotation.inv() * bumped[0].rotation).magnitude() > 0.2
+
+
 def drawn_out(rig: Rig, plug: RigidTransform) -> tuple[float, float, Points]:
     """How far (m) the right hand draws a plug out along its axis, then itself back, and its displacement (3,) m."""
     start = rig.motion.tool("right")
