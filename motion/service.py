@@ -46,6 +46,7 @@ class MotionParameters:
     pulling_speed: float = 0.5  # share at most of one that pulls an elastic thing, and feels little else; choice
     arm_error: float = 0.005  # m that a tool may be off: the ViperX's accuracy by its maker
     touches: int = 6  # that end a motion; after each before it the arm goes on by another way; choice
+    same_touch: float = 0.1  # rad or m; a touch at joints so near to those of another is of the same thing; choice
     camera_timeout: float = 1.0  # s that a camera has to show the arm; a sound one needs 0.2
     clearances: Clearances = field(default_factory=Clearances)
     execution: ExecutionParameters = field(default_factory=ExecutionParameters)
@@ -356,18 +357,22 @@ class Motion(PlanningScene):
     ) -> Iterator[None]:
         """The steps, from the beginning after each touch, with what was felt on the map.
 
-        Raises the last TouchError after the `most` touches (default: as set).
+        Raises the last TouchError after the `most` touches (default: as set), or where the only way left meets again
+        what was felt and forgotten.
 
         They are told whether the map is to be read optimistically (see `model`): where nothing is found otherwise.
         Where nothing is found even so, what was felt is forgotten, if `forgetting`: it may have been a little beside.
         """
-        touches, optimistic = 0, False
+        touched: list[FloatArray] = []  # joints (n,)
+        optimistic, forgot = False, 0
         while True:
             try:
                 yield from steps(optimistic)
             except TouchError as error:
-                place, touches = self.feel(arm, error.touch), touches + 1
-                if touches == (self.parameters.touches if most is None else most):
+                place, q = self.feel(arm, error.touch), error.touch.joints
+                again = any(np.abs(q - other).max() < self.parameters.same_touch for other in touched[:forgot])
+                touched.append(q)
+                if again or len(touched) == (self.parameters.touches if most is None else most):
                     raise
                 self._on_anomaly(f"felt at {place.round(3).tolist()}: the {arm} arm looks for another way")
             except PlanningError as error:
@@ -375,6 +380,8 @@ class Motion(PlanningScene):
                     raise
                 if optimistic and not (forgetting and self.forget_felt()):
                     raise
+                if optimistic:
+                    forgot = len(touched)
                 optimistic = not optimistic
             else:
                 return

@@ -1,4 +1,4 @@
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
@@ -14,6 +14,7 @@ from regrasp.interfaces.frame import Intrinsics, RgbdFrame
 from regrasp.motion.execution import ExecutionParameters, JawParameters
 from regrasp.motion.failure import PlanningError, TouchError
 from regrasp.motion.request import MotionRequest
+from regrasp.motion.robots.contact_guard import Touch
 from regrasp.motion.service import Motion, MotionParameters
 
 Points = NDArray[np.float64]
@@ -432,3 +433,20 @@ def test_after_a_touch_an_arm_goes_back_as_far_as_it_may_have_pressed_before_tha
     assert np.linalg.norm(ways) >= values.distance - 1e-6
     earlier = trajectory.sample(felt - values.seconds)[0]
     assert motion.joints("right")[0] >= earlier[0] - 1e-3
+
+
+def test_an_arm_does_not_go_again_where_it_met_once_more_what_was_felt_and_forgotten(rig: Rig) -> None:
+    motion, went = rig.motion, []
+    q = np.array([0.4, -0.6, 0.6, 0.0, 0.3, 0.0])
+
+    def steps(optimistic: bool) -> Iterator[None]:
+        """The only way there is, which the touch blocks as long as it is on the map."""
+        if motion.all_seen() is not None:
+            raise PlanningError(CauseCode.PLANNING_FAILED, "no path")
+        went.append(optimistic)
+        yield
+        raise TouchError("touched", Touch(rig.clock.t, q + 0.01 * len(went), np.full(6, 0.5), np.full(6, -2.0)))
+
+    with pytest.raises(TouchError):
+        rig.run(MotionRequest(motion._tries("right", steps), lambda: None))
+    assert went == [False, False]  # once more after it was forgotten
