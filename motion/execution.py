@@ -1,6 +1,7 @@
 """Trajectory execution: lets arms follow and jaws open, watches them, and puts what does not follow out of order."""
 
 from collections.abc import Callable, Generator, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -171,7 +172,8 @@ class Execution:
             trouble, elapsed = yield from self._run(arm, trajectory, guard)
             if guard.touch is not None:
                 self._on_anomaly(felt := self._felt(arm, guard.touch))
-                yield from self._back_off(arm, trajectory, elapsed)
+                with suppress(StoppedShortError):
+                    yield from self._back_off(arm, trajectory, elapsed, contact.elastic)
                 raise TouchError(felt, guard.touch)
             if trouble is None:
                 break
@@ -250,8 +252,11 @@ class Execution:
         near = None if separation is None else separation.near
         return ContactGuard(self._dynamics[arm], self._arms[arm].gravity(), self._chains[arm].torques, contact, near)
 
-    def _back_off(self, arm: str, trajectory: Trajectory, elapsed: float) -> Iterator[None]:
-        """Steps that bring an arm back the way that it came, as far as the parameters say."""
+    def _back_off(self, arm: str, trajectory: Trajectory, elapsed: float, elastic: bool) -> Iterator[None]:
+        """Steps that bring an arm back the way that it came, as far as the parameters say.
+
+        `elastic`: see `ContactLimits`. Raises PlanningError as `follow` does.
+        """
         path, way, levers, values = [self._joints(arm)], 0.0, self._chains[arm].levers, self.parameters.back_off
         touched = elapsed
         while elapsed > 0.0 and (way < values.distance or elapsed > touched - values.seconds):
@@ -259,7 +264,7 @@ class Execution:
             path.append(trajectory.sample(elapsed)[0])
             way += float(np.linalg.norm((path[-1] - path[-2]) * levers))
         if way > 0.0:
-            yield from self._follow(arm, np.array(path), self.parameters.back_off.speed, ContactLimits(np.inf))
+            yield from self._follow(arm, np.array(path), values.speed, ContactLimits(np.inf, elastic=elastic))
 
     def _felt(self, arm: str, touch: Touch) -> str:
         joint = int(np.argmax(np.abs(touch.efforts) / self._chains[arm].torques))

@@ -14,7 +14,7 @@ from regrasp.interfaces.frame import Intrinsics, RgbdFrame
 from regrasp.motion.execution import ExecutionParameters, JawParameters
 from regrasp.motion.failure import PlanningError, TouchError
 from regrasp.motion.request import MotionRequest
-from regrasp.motion.robots.contact_guard import Touch
+from regrasp.motion.robots.contact_guard import ContactLimits, Touch
 from regrasp.motion.service import Motion, MotionParameters
 
 Points = NDArray[np.float64]
@@ -450,3 +450,31 @@ def test_an_arm_does_not_go_again_where_it_met_once_more_what_was_felt_and_forgo
     with pytest.raises(TouchError):
         rig.run(MotionRequest(motion._tries("right", steps), lambda: None))
     assert went == [False, False]  # once more after it was forgotten
+
+
+@pytest.mark.parametrize(("elastic", "cause"), [(True, CauseCode.MOTION_BLOCKED), (False, CauseCode.ARM_FAILED)])
+def test_an_arm_that_something_elastic_holds_as_it_goes_back_after_a_touch_is_not_broken(
+    rig: Rig, elastic: bool, cause: CauseCode
+) -> None:
+    arm, motion = rig.arms["right"], rig.motion
+    arm.at = np.array([0.4, -0.6, 0.6, 0.0, 0.3, 0.0])
+    goal = np.array([-0.5, -0.6, 0.6, 0.0, 0.3, 0.0])
+
+    def caught(q: NDArray[np.float64]) -> bool:
+        if q[0] < -0.2:
+            arm.stuck = 0.0
+        return bool(q[0] < -0.2)
+
+    arm.bumps.append(caught)
+    steps = motion.execution.follow("right", np.array([arm.at, goal]), 1.0, ContactLimits(0.1, elastic=elastic))
+    with pytest.raises(PlanningError) as error:
+        rig.run(motion.execution.request("right", steps))
+    assert error.value.code is cause
+    arm.stuck = 1.0
+    again = motion.move("right", goal[None])
+    if elastic:
+        rig.run(again)
+        assert motion.joints("right") == pytest.approx(goal, abs=1e-3)
+    else:
+        with pytest.raises(PlanningError, match="off its trajectory"):
+            rig.run(again)
