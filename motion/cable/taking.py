@@ -98,9 +98,9 @@ class TakingMotion(CarryMotion):
         super().__init__(known, arms, grippers, clock, seed, parameters, on_anomaly)
         self._hand = known.cable.hand
         self._missed: list[FloatArray] = []  # grasps (4, 4), connector_from_tool, that failed
-        # by arm: the pose (4, 4) of the connector, and whether it can be stowed with a grasp, see `_without_roll`
         # By arm, grasps (4, 4), connector_from_tool, with which the connector could not be carried to the clip
         self._vain: dict[str, list[FloatArray]] = {arm: [] for arm in self.arms}
+        # By arm, the pose (4, 4) of the connector, and whether it can be stowed with a grasp, see `_without_roll`
         self._stows: dict[str, tuple[FloatArray, dict[tuple[float, ...], bool]]] = {}
 
     @property
