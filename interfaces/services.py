@@ -19,6 +19,7 @@ class Obstacles(NamedTuple):
     points: FloatArray  # (n, 3) m, seen to be full
     spacing: float  # m, the voxels' edge
     unseen: FloatArray  # (m, 3) m, behind seen surfaces: assumed to be full until a camera shows them
+    shadow: FloatArray  # (k, 3) m, further behind them: assumed to be free, but a thing may reach there
 
 
 class MotionService(Protocol):
@@ -77,8 +78,17 @@ class MotionService(Protocol):
         """world_from_tool as read."""
         ...
 
-    def set_obstacles(self, points: FloatArray, spacing: float, unseen: FloatArray | None = None) -> None:
-        """Keep clear of these voxels from now on, see `Obstacles`; an unseen one is entered where no other way is."""
+    def set_obstacles(
+        self,
+        points: FloatArray,
+        spacing: float,
+        unseen: FloatArray | None = None,
+        shadow: FloatArray | None = None,
+    ) -> None:
+        """Keep clear of these voxels from now on, see `Obstacles`.
+
+        An arm enters the unseen ones where it finds no other way, and is slow and easily stopped in the shadow.
+        """
         ...
 
     def keep_clear(self, points: FloatArray) -> None:

@@ -173,7 +173,7 @@ class Execution:
             if guard.touch is not None:
                 self._on_anomaly(felt := self._felt(arm, guard.touch))
                 with suppress(StoppedShortError):
-                    yield from self._back_off(arm, trajectory, elapsed, contact.elastic)
+                    yield from self._back_off(arm, trajectory, elapsed)
                 raise TouchError(felt, guard.touch)
             if trouble is None:
                 break
@@ -252,10 +252,11 @@ class Execution:
         near = None if separation is None else separation.near
         return ContactGuard(self._dynamics[arm], self._arms[arm].gravity(), self._chains[arm].torques, contact, near)
 
-    def _back_off(self, arm: str, trajectory: Trajectory, elapsed: float, elastic: bool) -> Iterator[None]:
+    def _back_off(self, arm: str, trajectory: Trajectory, elapsed: float) -> Iterator[None]:
         """Steps that bring an arm back the way that it came, as far as the parameters say.
 
-        `elastic`: see `ContactLimits`. Raises PlanningError as `follow` does.
+        Raises as `follow` does; what the arm touched or the cable may hold it back, so it is never put out of order
+        for falling behind.
         """
         path, way, levers, values = [self._joints(arm)], 0.0, self._chains[arm].levers, self.parameters.back_off
         touched = elapsed
@@ -264,7 +265,7 @@ class Execution:
             path.append(trajectory.sample(elapsed)[0])
             way += float(np.linalg.norm((path[-1] - path[-2]) * levers))
         if way > 0.0:
-            yield from self._follow(arm, np.array(path), values.speed, ContactLimits(np.inf, elastic=elastic))
+            yield from self._follow(arm, np.array(path), values.speed, ContactLimits(np.inf, elastic=True))
 
     def _felt(self, arm: str, touch: Touch) -> str:
         joint = int(np.argmax(np.abs(touch.efforts) / self._chains[arm].torques))

@@ -6,7 +6,7 @@ refused with a ValueError at once; what an arm cannot do, with a PlanningError b
 """
 
 from collections.abc import Callable, Collection, Generator, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import product
 
 import numpy as np
@@ -148,8 +148,7 @@ class Motion(PlanningScene):
 
         def steps() -> Iterator[None]:
             try:
-                light = replace(self._guard.carrying, elastic=True)
-                yield from self._move_steps(arm, goals, contact=light, touches=2)
+                yield from self._move_steps(arm, goals, contact=self._guard.leaving, touches=2)
             except (TouchError, StoppedShortError) as error:
                 self._on_anomaly(f"{error}: something elastic may hold it")
                 self.forget_felt()
@@ -348,7 +347,7 @@ class Motion(PlanningScene):
         """
         if contact is not None and contact.elastic:
             speed = min(speed, self.parameters.pulling_speed)
-        surfaces = self.all_seen()
+        surfaces = self.all_mapped()
         allowed = None if surfaces is None else SpeedBySeparation(model, surfaces, self.parameters.separation)
         yield from self.execution.follow(arm, path, speed, contact, allowed)
 

@@ -25,9 +25,8 @@ from regrasp.perception.tracking.stillness import Stillness, StillnessParameters
 class PerceptionParameters:
     """The mapped region, what counts as a new obstacle, and the parameters of the parts."""
 
-    # World frame, m. Where obstacles may matter if the cell does not say: in the thesis's cell the space that the arms
-    # share with what they handle.
-    region_lower: tuple[float, float, float] = (0.16, -0.44, 0.01)
+    # World frame, m. Where obstacles may matter: in the thesis's cell from the arms' bases to the panel that they face.
+    region_lower: tuple[float, float, float] = (0.0, -0.44, 0.01)
     region_upper: tuple[float, float, float] = (0.50, 0.44, 0.62)
     min_new_voxels: int = 80  # of a new obstacle: the front of a piece of 9 cm
     mapped_distance: float = 0.03  # m; choice: what is so near to a mapped thing is the noise of its edges: 100 voxels
@@ -154,7 +153,9 @@ class Perception:
     def obstacles(self) -> Obstacles:
         """The mapped obstacles."""
         seen = self.occupancy.occupied_points(Voxel.INSIDE)
-        return Obstacles(seen, self.occupancy.voxel_size, self.occupancy.unseen_points())
+        return Obstacles(
+            seen, self.occupancy.voxel_size, self.occupancy.unseen_points(), self.occupancy.shadow_points()
+        )
 
     def watch_stillness(self, camera: str) -> StillnessWatch:
         """Begin to watch whether anything moves before a fixed camera."""

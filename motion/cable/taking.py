@@ -238,7 +238,7 @@ class TakingMotion(CarryMotion):
         for distance in self.parameters.retreats:
             back = self.tool(arm).rotation.apply([-distance, 0.0, 0.0])
             try:
-                yield from self._done(self._shift(arm, back, contact=self._guard.pulling))
+                yield from self._done(self._shift(arm, back, contact=self._guard.leaving))
             except PlanningError as error:
                 why = str(error)
             else:

@@ -41,6 +41,8 @@ class ContactGuardParameters:
     # The end of a cable that keeps to its natural shapes changes the efforts by 0.12 of the wrist's and 0.04 of each of
     # the other joints', sometimes by more; a slow hand presses foam for half a second before that is felt; choice.
     carrying: ContactLimits = ContactLimits(0.16, adaptation=1.0, far=0.5)
+    # A hand that has let go may still hook the cable
+    leaving: ContactLimits = ContactLimits(0.16, adaptation=1.0, elastic=True, far=0.5)
     # One that is drawn out of its socket straightens its cable; this stops at 12 N at a ViperX's hand; choice
     drawing: ContactLimits = ContactLimits(0.4, elastic=True)
     # One that is bent by force changes them by up to half, but mostly so slowly that it becomes the usual effort. In 96

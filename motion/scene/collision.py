@@ -125,18 +125,22 @@ def _clearances(q, base, joints, links, local, boxes, distance, lower, h):  # ty
 
 
 @nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
-def _along(path, slopes, base, joints, links, local, distance, lower, h):  # type: ignore[no-untyped-def]
+def _along(path, slopes, base, joints, links, local, boxes, distance, lower, h):  # type: ignore[no-untyped-def]
     """See `CollisionModel.along`."""
-    clearances, ways = np.empty((2, path.shape[0], local.shape[0]))
+    to_grid, to_boxes, ways = np.empty((3, path.shape[0], local.shape[0]))
     for k in range(path.shape[0]):
         step = 0.5 * _DIFFERENCE * slopes[k]
         before = world_spheres(base, joints, path[k] - step, links, local)
         after = world_spheres(base, joints, path[k] + step, links, local)
         for n in range(local.shape[0]):
             middle = 0.5 * (before[n, :3] + after[n, :3])
-            clearances[k, n] = grid_distance(middle, distance, lower, h) - local[n, 3]
+            to_grid[k, n] = grid_distance(middle, distance, lower, h) - local[n, 3]
+            to_box = np.inf
+            for b in range(boxes.shape[0]):
+                to_box = min(to_box, box_distance(middle, boxes[b]))
+            to_boxes[k, n] = to_box - local[n, 3]
             ways[k, n] = np.sqrt(square_distance(before[n, :3], after[n])) / _DIFFERENCE
-    return clearances, ways
+    return to_grid, to_boxes, ways
 
 
 @nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
@@ -302,16 +306,19 @@ class CollisionModel:
         base, joints, _, links, local, _, boxes, _, *grid = self._arguments[:-1]
         return np.asarray(_clearances(np.asarray(q, float), base, joints, links, local, boxes, *grid))
 
-    def along(self, path: FloatArray, slopes: FloatArray, grid: DistanceGrid) -> tuple[FloatArray, FloatArray]:
-        """The distances (k, m) m of the arm's m `spheres` to a grid's surfaces along a path (k, n) of the joints.
+    def along(
+        self, path: FloatArray, slopes: FloatArray, grid: DistanceGrid
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """The distances of the arm's m `spheres` along a path (k, n) of the joints, and how far each sphere moves.
 
-        And how far (k, m) m each moves for a unit of the parameter by which the path's derivatives are `slopes` (k, n).
+        Returns the distances to a grid's surfaces and to the boxes, (k, m) m each, and the ways (k, m) m for a unit of
+        the parameter by which the path's derivatives are `slopes` (k, n).
         """
-        base, joints, _, links, local = self._arguments[:5]
+        base, joints, _, links, local, _, boxes = self._arguments[:7]
         rows = np.ascontiguousarray(path, float), np.ascontiguousarray(slopes, float)
         surfaces = np.ascontiguousarray(grid.distance), grid.lower, float(grid.h)
-        clearances, ways = _along(*rows, base, joints, links, local, *surfaces)
-        return np.asarray(clearances), np.asarray(ways)
+        to_grid, to_boxes, ways = _along(*rows, base, joints, links, local, boxes, *surfaces)
+        return np.asarray(to_grid), np.asarray(to_boxes), np.asarray(ways)
 
     @property
     def links(self) -> NDArray[np.int64]:

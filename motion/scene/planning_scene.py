@@ -64,23 +64,31 @@ class PlanningScene:
         }
         self._boxes = known.solids()
         self._grids: dict[bool, DistanceGrid | None] = {}  # optimistic or not; made when asked for
-        self._all_seen: DistanceGrid | None = None  # made when asked for
+        self._all_mapped: DistanceGrid | None = None  # made when asked for
         self._points = self._unseen = self._more = self._all_points = NO_POINTS
         self._felt: list[tuple[float, FloatArray]] = []  # when, and points (n, 3) m
         self._spacing = 0.01  # m, until the first voxels come
 
     @counts_as("planning")
-    def set_obstacles(self, points: FloatArray, spacing: float, unseen: FloatArray | None = None) -> None:
+    def set_obstacles(
+        self,
+        points: FloatArray,
+        spacing: float,
+        unseen: FloatArray | None = None,
+        shadow: FloatArray | None = None,
+    ) -> None:
         """Keep clear of occupied voxels from now on: centres (n, 3) m in the world, and the edge `spacing` m.
 
         `unseen` (m, 3) m are voxels that no camera has seen, behind seen surfaces: an arm enters them only where it
-        finds no other way. Points where an arm is now, or sleeps, do not count: what was seen there was an arm. Nor do
-        points that no arm reaches. Raises ValueError for points that are not finite and a spacing that is not above 0.
+        finds no other way. In the `shadow` (k, 3) m, further behind, it moves slowly, as beside a surface. Points where
+        an arm is now, or sleeps, do not count: what was seen there was an arm. Nor do points that no arm reaches.
+        Raises ValueError for points that are not finite and a spacing that is not above 0.
         """
         margin = self._scene_parameters.arm_margin
         self._points, self._spacing = self._within_reach(points), positive("the spacing", spacing)
         self._unseen = self._within_reach(NO_POINTS if unseen is None else unseen)
-        seen = self._points
+        dark = self._within_reach(NO_POINTS if shadow is None else shadow)
+        self._all_points = np.vstack([self._points, self._unseen, dark])
         now = max((arm.reading().stamp for arm in self.arms.values()), default=0.0)
         self._felt = [(at, felt) for at, felt in self._felt if at > now - self._scene_parameters.felt_time]
         for spec in self.known.arms:
@@ -88,7 +96,6 @@ class PlanningScene:
                 spheres = self.model(spec.name, others=False).spheres(q)
                 self._points = _points_beyond(self._points, spheres, margin)
                 self._unseen = _points_beyond(self._unseen, spheres, margin)
-        self._all_points = seen
         self._forget_grids()
 
     @counts_as("planning")
@@ -140,7 +147,7 @@ class PlanningScene:
 
     def _forget_grids(self) -> None:
         self._grids.clear()
-        self._all_seen = None
+        self._all_mapped = None
 
     def _within_reach(self, points: FloatArray) -> FloatArray:
         """The points (n, 3) m as far from an arm's base as it reaches, and `beyond_reach`; the grid grows no larger."""
@@ -168,11 +175,11 @@ class PlanningScene:
         return DistanceGrid.from_points(points, lower, upper, self._spacing, least=not optimistic)
 
     @counts_as("planning")
-    def all_seen(self) -> DistanceGrid | None:
-        """The least distances to all points, those too that may be an arm itself, where it is now or sleeps."""
-        if self._all_seen is None and len(points := np.vstack([self._all_points, self._map(optimistic=False)])):
-            self._all_seen = self._grid_of(points, optimistic=False)
-        return self._all_seen
+    def all_mapped(self) -> DistanceGrid | None:
+        """The least distances to all points: the shadow's, and those that may be an arm itself, here or asleep."""
+        if self._all_mapped is None and len(points := np.vstack([self._all_points, self._map(optimistic=False)])):
+            self._all_mapped = self._grid_of(points, optimistic=False)
+        return self._all_mapped
 
     def _grid(self, optimistic: bool = False) -> DistanceGrid | None:
         """The least distances to all points, or the likely ones to those that were seen; None where there are none."""

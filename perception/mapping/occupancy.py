@@ -32,6 +32,7 @@ class OccupancyParameters:
     robot_margin: float = 0.02  # m; choice: arms are 5 mm off, depth scale 13 mm
     assumed_depth: float = 0.08  # m; choice: how far an obstacle reaches behind its surface until a view shows it
     least_depth: float = 0.03  # m; choice: so far every obstacle reaches behind its surface, until a view shows it
+    shadow_depth: float = 0.25  # m; choice: no obstacle reaches further behind its surface
     max_depth_step: float = 0.03  # m between neighbours; more is an edge, where readings fly between the surfaces
     max_cable_brightness: int = 45  # of 255; choice: the cable's 0.06 is 15 in full light
     cable_width: float = 0.0075  # m; choice: dark pixels nearer to lighter ones are cable (7 mm), or a dark thing's rim
@@ -54,9 +55,10 @@ class Voxel(IntEnum):
 
     UNSEEN = 0
     FREE = 1  # a ray passed through
-    BEHIND = 2  # behind a seen surface: assumed full
-    INSIDE = 3  # so near behind a seen surface that it belongs to the thing
-    SURFACE = 4  # seen
+    SHADOW = 2  # so far behind a seen surface that it is assumed free
+    BEHIND = 3  # behind a seen surface: assumed full
+    INSIDE = 4  # so near behind a seen surface that it belongs to the thing
+    SURFACE = 5  # seen
 
 
 class Occupancy:
@@ -90,6 +92,10 @@ class Occupancy:
     def unseen_points(self) -> FloatArray:
         """Centres (n, 3) m, world frame, of the voxels that may as well be empty: further behind a seen surface."""
         return np.asarray(self._centers[self._state == Voxel.BEHIND])
+
+    def shadow_points(self) -> FloatArray:
+        """Centres (n, 3) m, world frame, of the voxels still further behind a seen surface, where a thing may reach."""
+        return np.asarray(self._centers[self._state == Voxel.SHADOW])
 
     def integrate(
         self,
@@ -139,16 +145,20 @@ class Occupancy:
         surface = solid & (np.abs(z - reading) <= self.voxel_size)
         state = self._state[seen]
         near_enough = z <= self._parameters.overrule_range * self._range[seen]
-        may_change = (state == Voxel.UNSEEN) | (state == Voxel.BEHIND) | (state == Voxel.INSIDE) | near_enough
+        may_change = (state != Voxel.FREE) & (state != Voxel.SURFACE) | near_enough
         for shown, value in ((free, Voxel.FREE), (surface, Voxel.SURFACE)):
             chosen = seen[shown & may_change]
             self._state[chosen] = value
             self._range[chosen] = z[shown & may_change]
         if guess_behind:
             values = self._parameters
-            for depth, value in ((values.assumed_depth, Voxel.BEHIND), (values.least_depth, Voxel.INSIDE)):
+            for depth, value in (
+                (values.shadow_depth, Voxel.SHADOW),
+                (values.assumed_depth, Voxel.BEHIND),
+                (values.least_depth, Voxel.INSIDE),
+            ):
                 behind = solid & (z > reading + self.voxel_size) & (z <= reading + depth)
-                self._state[seen[behind & (state <= Voxel.BEHIND) & (state != Voxel.FREE)]] = value
+                self._state[seen[behind & (state <= value) & (state != Voxel.FREE)]] = value
 
     def _spared(self, rgb: ColorImage) -> NDArray[np.uint8]:
         """255 where the colour is that of the spared thing, else 0; (H, W)."""

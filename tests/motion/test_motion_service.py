@@ -435,13 +435,25 @@ def test_after_a_touch_an_arm_goes_back_as_far_as_it_may_have_pressed_before_tha
     assert motion.joints("right")[0] >= earlier[0] - 1e-3
 
 
+def test_an_arm_is_slow_in_the_shadow_of_a_thing(rig: Rig) -> None:
+    rig.arms["right"].at = ASIDE
+    rig.run(rig.motion.move("right", READY[None]))
+    quick = rig.arms["right"].followed[-1][1]
+    rig.run(rig.motion.move("right", ASIDE[None]))
+    place = rig.motion.kinematics["right"].tool(READY).translation
+    rig.motion.set_obstacles(np.empty((0, 3)), 0.01, shadow=cube(place))
+    rig.run(rig.motion.move("right", READY[None]))
+    slow = rig.arms["right"].followed[-1][1]
+    assert slow.duration > 1.2 * quick.duration
+
+
 def test_an_arm_does_not_go_again_where_it_met_once_more_what_was_felt_and_forgotten(rig: Rig) -> None:
     motion, went = rig.motion, []
     q = np.array([0.4, -0.6, 0.6, 0.0, 0.3, 0.0])
 
     def steps(optimistic: bool) -> Iterator[None]:
         """The only way there is, which the touch blocks as long as it is on the map."""
-        if motion.all_seen() is not None:
+        if motion.all_mapped() is not None:
             raise PlanningError(CauseCode.PLANNING_FAILED, "no path")
         went.append(optimistic)
         yield
@@ -452,10 +464,8 @@ def test_an_arm_does_not_go_again_where_it_met_once_more_what_was_felt_and_forgo
     assert went == [False, False]  # once more after it was forgotten
 
 
-@pytest.mark.parametrize(("elastic", "cause"), [(True, CauseCode.MOTION_BLOCKED), (False, CauseCode.ARM_FAILED)])
-def test_an_arm_that_something_elastic_holds_as_it_goes_back_after_a_touch_is_not_broken(
-    rig: Rig, elastic: bool, cause: CauseCode
-) -> None:
+@pytest.mark.parametrize("elastic", [True, False])
+def test_an_arm_that_is_held_as_it_goes_back_after_a_touch_is_not_broken(rig: Rig, elastic: bool) -> None:
     arm, motion = rig.arms["right"], rig.motion
     arm.at = np.array([0.4, -0.6, 0.6, 0.0, 0.3, 0.0])
     goal = np.array([-0.5, -0.6, 0.6, 0.0, 0.3, 0.0])
@@ -467,14 +477,8 @@ def test_an_arm_that_something_elastic_holds_as_it_goes_back_after_a_touch_is_no
 
     arm.bumps.append(caught)
     steps = motion.execution.follow("right", np.array([arm.at, goal]), 1.0, ContactLimits(0.1, elastic=elastic))
-    with pytest.raises(PlanningError) as error:
+    with pytest.raises(TouchError):
         rig.run(motion.execution.request("right", steps))
-    assert error.value.code is cause
     arm.stuck = 1.0
-    again = motion.move("right", goal[None])
-    if elastic:
-        rig.run(again)
-        assert motion.joints("right") == pytest.approx(goal, abs=1e-3)
-    else:
-        with pytest.raises(PlanningError, match="off its trajectory"):
-            rig.run(again)
+    rig.run(motion.move("right", goal[None]))
+    assert motion.joints("right") == pytest.approx(goal, abs=1e-3)

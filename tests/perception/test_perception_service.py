@@ -180,7 +180,7 @@ def test_without_a_task_the_connector_is_an_obstacle_like_another(known: CableKn
     eyes = Perception(cell, {"rear": eye}, Clock(), believed, list)
     assert eyes.fixed_cameras == ("rear",)
     found = eyes.look_around()
-    points, edge, unseen = eyes.obstacles()
+    points, edge, unseen, _ = eyes.obstacles()
     assert len(points) + len(unseen) == found
     assert np.linalg.norm(points - PLACE, axis=1).min() < 0.04
     assert edge == eyes.parameters.occupancy.voxel_size

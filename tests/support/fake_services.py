@@ -168,7 +168,9 @@ class FakeMotion:
     def tool(self, arm: str) -> RigidTransform:
         return self.tool_pose
 
-    def set_obstacles(self, points: Vector, spacing: float, unseen: Vector | None = None) -> None:
+    def set_obstacles(
+        self, points: Vector, spacing: float, unseen: Vector | None = None, shadow: Vector | None = None
+    ) -> None:
         pass
 
     def keep_clear(self, points: Vector) -> None:
@@ -354,7 +356,7 @@ class FakePerception:
         return 0
 
     def obstacles(self) -> Obstacles:
-        return Obstacles(np.empty((0, 3)), 0.01, np.empty((0, 3)))
+        return Obstacles(np.empty((0, 3)), 0.01, np.empty((0, 3)), np.empty((0, 3)))
 
     def watch_stillness(self, camera: str) -> FakeStillness:
         return FakeStillness(lambda: self.frame(camera), self.clock.t)

@@ -160,7 +160,7 @@ def test_a_jaw_that_meets_something_beside_the_connector_does_not_squeeze_it_at_
     with pytest.raises(JawBlockedError, match=r"met something beside: it stands 31\.0 mm open"):
         rig.run(rig.motion.grip(connector))
     assert max(force for _, _, force in jaw.told) < 10.0
-    mapped = rig.motion.all_seen()
+    mapped = rig.motion.all_mapped()
     assert mapped is not None
     assert mapped.at(pad[None])[0] < 0.01
     assert rig.motion.model("right").clearance(ASIDE) == pytest.approx(before)

@@ -53,11 +53,11 @@ def test_what_was_felt_is_on_the_map_until_it_is_forgotten(rig: Rig) -> None:
     assert not motion.forget_felt()
     q = np.array([0.4, -0.6, 0.6, 0.0, 0.3, 0.0])
     place = motion.feel("right", Touch(0.0, q, np.array([0.5, 0, 0, 0, 0, 0]), np.array([-2.0, 0, 0, 0, 0, 0])))
-    grid = motion.all_seen()
+    grid = motion.all_mapped()
     assert grid is not None
     assert grid.at(place[None])[0] < 0.03
     assert motion.forget_felt()
-    assert motion.all_seen() is None
+    assert motion.all_mapped() is None
 
 
 def test_nothing_is_felt_in_the_place_of_a_sleeping_arm(rig: Rig) -> None:

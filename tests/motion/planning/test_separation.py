@@ -6,6 +6,7 @@ from robots import VX300S
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import FloatArray
+from regrasp.interfaces.cell import Box
 from regrasp.motion.planning.separation import SeparationParameters, SpeedBySeparation
 from regrasp.motion.robots.kinematics import ArmKinematics
 from regrasp.motion.scene.collision import ArmBody, CollisionModel
@@ -38,7 +39,7 @@ def rate(model: CollisionModel, grid: DistanceGrid, slope: FloatArray) -> float:
 
 @given(st.floats(-0.1, 0.2))
 def test_the_speed_grows_with_the_clearance(clearance: float) -> None:
-    speed, further = VALUES.speeds(np.array([clearance, clearance + 0.01]))
+    speed, further = VALUES.speeds(np.array([clearance, clearance + 0.01]), VALUES.slow)
     assert VALUES.slow <= speed <= further
     assert (speed == np.inf) == (clearance >= VALUES.separation)
     if clearance <= VALUES.touching:
@@ -56,11 +57,21 @@ def test_the_part_that_is_near_moves_at_the_speed_of_its_clearance() -> None:
     assert rate(model, beside(model, 0.01), 0.5 * TURN) == pytest.approx(2 * near)
 
 
+def test_a_known_box_is_met_more_slowly_than_a_seen_surface() -> None:
+    spheres = moving(CollisionModel(KIN, []))
+    wall, tip = (spheres[:, 0] + spheres[:, 3]).max() + 0.01, spheres[spheres[:, [0, 3]].sum(axis=1).argmax(), :3]
+    box = Box(name="wall", center=(wall + 0.05, 0.0, tip[2]), size=(0.1, 2.0, 0.5))
+    model = CollisionModel(KIN, [box])
+    assert rate(model, beside(model, 0.5), TURN) * np.linalg.norm(tip[:2]) == pytest.approx(
+        VALUES.slow_at_boxes, rel=0.1
+    )
+
+
 def test_what_does_not_move_may_be_near() -> None:
     model = CollisionModel(KIN, [])
     base = model.spheres(HOME)[model.links == 0][:1]  # the stand that is deep below the joints
     grid = DistanceGrid.from_points(base[:, :3], base[:, :3].min(0) - 0.1, base[:, :3].max(0) + 0.1, 0.01)
-    clearances, ways = model.along(HOME[None], TURN[None], grid)
+    clearances, _, ways = model.along(HOME[None], TURN[None], grid)
     assert clearances[ways == 0.0].min() < 0.0
     assert clearances[ways > 0.0].min() > VALUES.separation
     assert rate(model, grid, TURN) == np.inf

@@ -123,6 +123,17 @@ def test_a_thing_is_three_centimetres_deep_at_least_and_beyond_that_it_may_end()
     assert len(sure) + len(perhaps) == len(occupancy.occupied_points())
 
 
+def test_a_thing_may_reach_still_further_into_its_shadow() -> None:
+    deep = Block(np.array([0.20, -0.08, 0.0]), np.array([0.40, 0.08, 0.36]), PURPLE)
+    occupancy = empty(CONNECTOR)
+    integrate(occupancy, [deep], REAR_POSE)
+    unmapped = inside(deep)
+    unmapped = unmapped[cKDTree(occupancy.occupied_points()).query(unmapped)[0] > 0.02]
+    assert len(unmapped) > 1000
+    assert farthest(occupancy.shadow_points(), unmapped) < 2 * occupancy.voxel_size
+    assert occupancy.shadow_points()[:, 0].max() < 0.20 + PARAMETERS.shadow_depth + 0.02
+
+
 def test_a_look_from_the_side_clears_what_was_assumed_behind() -> None:
     thin = Block(np.array([0.30, -0.06, 0.0]), np.array([0.32, 0.06, 0.36]), PURPLE)
     occupancy = empty(CONNECTOR)
