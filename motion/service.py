@@ -80,6 +80,7 @@ class Motion(PlanningScene):
         )
         self._on_anomaly, self._guard = on_anomaly, parameters.execution.guard
         self._clock, self._seed = clock, seed
+        self._ways_in: dict[str, FloatArray] = {}  # an arm's joints (k, n) on its last way in for a grasp
 
     def warm_up(self) -> None:
         """Load the compiled functions of collision checks and of the timing now, so that no tick waits for it."""
@@ -333,6 +334,7 @@ class Motion(PlanningScene):
             except TouchError:
                 on_touch(self.kinematics[arm].tool_matrix(approach[-1]))
                 raise
+            self._ways_in[arm] = approach
             self.keep_clear(NO_POINTS)
 
         return self.execution.request(arm, self._tries(arm, steps))

@@ -122,7 +122,7 @@ class HandLeaf(CableLeaf):
             self.services.motion.open_jaw(self.hand)
             yield from self.wait(self.leaving.open_time)
             yield from self.draw_back()
-            yield from self.go_to_sleep(self.hand)
+            yield from self.go_to_sleep(self.hand, pulling=True)
             raise
 
     def draw_back(self) -> LeafSteps:

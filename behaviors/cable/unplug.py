@@ -8,7 +8,7 @@ from regrasp.behaviors.cable.hand import HandLeaf
 from regrasp.behaviors.cable.keys import HELD, VAIN_CARRIES
 from regrasp.behaviors.keys import Keys
 from regrasp.behaviors.leaf import LeafPort, LeafSteps
-from regrasp.motion.failure import GraspEmptyError
+from regrasp.motion.failure import GraspEmptyError, TouchError
 
 
 @dataclass(frozen=True)
@@ -21,9 +21,9 @@ class UnplugParameters:
 class Unplug(HandLeaf):
     """Grips the connector in the `socket` of that name, draws it out along its axis, and goes back the way it came in.
 
-    A hand that closes on nothing tries again, with another grasp where there is one. Every other try goes by the
-    encoders alone: where things stand beside the arm, what a camera sees of it misleads. Where the cell's hand finds
-    no way, another arm tries.
+    A hand that closes on nothing, or touches something each time, tries again, with another grasp where there is one.
+    Every other try goes by the encoders alone: where things stand beside the arm, what a camera sees of it misleads.
+    Where the cell's hand finds no way, another arm tries.
     """
 
     WRITES: ClassVar[Keys] = (HELD, VAIN_CARRIES)
@@ -49,7 +49,7 @@ class Unplug(HandLeaf):
                 yield from self.take(arms, partial(motion.pick_plug, plug, point_cloud=points))
                 yield from self.grip_or_leave(plug)
                 break
-            except GraspEmptyError as error:
+            except (GraspEmptyError, TouchError) as error:
                 if not left:
                     raise
                 self.say("tries again", why=str(error))

@@ -233,17 +233,34 @@ class TakingMotion(CarryMotion):
         )
 
     def _draw_back(self, arm: str) -> Generator[None, None, str]:
-        """Steps that draw a hand straight back as far as is free. They return '', or why no distance was."""
+        """Steps that draw a hand straight back as far as is free. They return '', or why no distance was.
+
+        Where none is free, a hand that has just come in for a grasp goes back the way that it came. One that touches
+        something goes no further; what it felt is on the map then.
+        """
         why = ""
-        for distance in self.parameters.retreats:
-            back = self.tool(arm).rotation.apply([-distance, 0.0, 0.0])
+        for way in self._ways_back(arm):
             try:
-                yield from self._done(self._shift(arm, back, contact=self._guard.leaving))
+                yield from self._done(way)
             except PlanningError as error:
                 why = str(error)
+                if isinstance(error, TouchError):
+                    self.feel(arm, error.touch)
+                    break
             else:
                 return ""
         return why
+
+    def _ways_back(self, arm: str) -> Iterator[MotionRequest]:
+        """The motions straight back, the longest first, and the way on which the arm came in where it has just done."""
+        for distance in self.parameters.retreats:
+            back = self.tool(arm).rotation.apply([-distance, 0.0, 0.0])
+            yield self._shift(arm, back, contact=self._guard.leaving)
+        way_in = self._ways_in.get(arm)
+        tolerance = self.parameters.execution.goal_tolerance
+        if way_in is not None and np.abs(way_in[-1] - self.joints(arm)).max() < tolerance:
+            model, speed = self.start_model(arm, optimistic=True), self.parameters.approach_speed
+            yield self.execution.request(arm, self._follow(arm, way_in[::-1], speed, model, self._guard.leaving))
 
     def _ease(self, arm: str, connector: RigidTransform) -> Generator[None, None, int | None]:
         """How easily an arm takes the loose connector, from 0 for best; None: not at all. See `hands_for`."""

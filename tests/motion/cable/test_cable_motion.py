@@ -11,6 +11,7 @@ from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.cause import CauseCode
 from regrasp.motion.cable.carry_paths import CarryPathParameters
 from regrasp.motion.failure import GraspEmptyError, JawBlockedError, PlanningError
+from regrasp.motion.planning.straight import straight_line
 from regrasp.motion.robots.spheres import sphere_distances
 from regrasp.motion.service import MotionParameters
 
@@ -223,6 +224,33 @@ def test_the_hand_draws_back_as_far_as_is_free(rig: Rig) -> None:
     assert task.answer == ""
     back = start.inv().apply(rig.motion.tool("right").translation)
     assert back == pytest.approx([-0.10, 0.0, 0.0], abs=1e-3)
+
+
+def test_a_hand_that_touches_something_as_it_draws_back_leaves_it_at_that(rig: Rig) -> None:
+    rig.arms["right"].at = READY
+    start = rig.motion.tool("right")
+    rig.arms["right"].bumps.append(lambda q: bool(np.abs(q - READY).max() > 0.02))
+    task = rig.motion.draw_back()
+    rig.run(task)
+    assert "touched something" in task.answer
+    assert len(rig.arms["right"].followed) == 2  # and back again
+    assert rig.motion.tool("right").translation == pytest.approx(start.translation, abs=2e-3)
+    assert rig.motion.all_mapped() is not None
+
+
+def test_a_hand_that_came_in_where_the_map_now_shows_something_goes_back_as_it_came(rig: Rig) -> None:
+    plug = rig.known.cable.socket("back_1").world_from_plug(rig.known.cable.connector.length)
+    rig.run(rig.motion.pick_plug(plug))
+    grasp, hand = rig.motion.tool("right"), rig.arms["right"]
+    before = rig.motion.kinematics["right"].tool(hand.followed[-1][1].sample(0.0)[0])
+    rig.motion.parameters = replace(rig.motion.parameters, retreats=(0.10,))
+    behind = RigidTransform.from_components(grasp.apply([-0.06, 0.0, 0.0]), grasp.rotation)
+    back = straight_line(rig.motion.kinematics["right"], hand.at, behind)[-1]
+    rig.motion.set_obstacles(rig.motion.model("right", others=False).spheres(back)[:, :3], 0.01)
+    task = rig.motion.draw_back()
+    rig.run(task)
+    assert task.answer == ""
+    assert rig.motion.tool("right").translation == pytest.approx(before.translation, abs=2e-3)
 
 
 def test_where_no_way_back_is_free_the_answer_says_why(rig: Rig) -> None:
