@@ -260,7 +260,7 @@ class TakingMotion(CarryMotion):
         tolerance = self.parameters.execution.goal_tolerance
         if way_in is not None and np.abs(way_in[-1] - self.joints(arm)).max() < tolerance:
             model, speed = self.start_model(arm, optimistic=True), self.parameters.approach_speed
-            yield self.execution.request(arm, self._follow(arm, way_in[::-1], speed, model, self._guard.leaving))
+            yield self.execution.request(arm, self._follow(arm, way_in[::-1], speed, model, self._guard.pulling))
 
     def _ease(self, arm: str, connector: RigidTransform) -> Generator[None, None, int | None]:
         """How easily an arm takes the loose connector, from 0 for best; None: not at all. See `hands_for`."""
