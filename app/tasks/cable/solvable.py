@@ -106,8 +106,8 @@ class TrueScene:
             self._grid = DistanceGrid.of_boxes(places[:, 0], places[:, 1], yaws, parameters.voxel, parameters.border)
 
     def hemmed_in(self) -> str:
-        """The name of an arm that sleeps nearer to something than a motion with room to spare may begin, or ''."""
-        margin = self._parameters.motion.clearances.margin
+        """The name of an arm that sleeps nearer to something than any planned motion may begin, or ''."""
+        margin = self._parameters.motion.clearances.tight_margin
         arms = self._known.arms
         return next((a.name for a in arms if not self._model(a.name).free(np.array(a.sleep), margin)), "")
 
