@@ -207,7 +207,12 @@ class Motion(PlanningScene):
         straight way it may touch the boxes `without`. Before that it is corrected by the `point_cloud` that a camera
         sees of it.
         """
-        return self._pick(arm, world_from_cylinder, cylinder, shallow, clear_of, without, point_cloud)
+        widest = self.known.arm(arm).robot.gripper.opening
+
+        def grasps() -> list[list[Grasp]]:
+            return [pick_candidates(world_from_cylinder, cylinder, shallow, widest, self.parameters.pick)]
+
+        return self._pick(arm, world_from_cylinder, grasps, clear_of, without, point_cloud)
 
     def close(self, arm: str, thickness: float) -> Request[float]:
         """Close the jaw on a thing of `thickness` m; the answer is the gap (m) between the pads that hold it.
@@ -289,16 +294,14 @@ class Motion(PlanningScene):
         self,
         arm: str,
         world_from_cylinder: RigidTransform,
-        cylinder: Cylinder,
-        shallow: float,
+        grasps: Callable[[], Sequence[Sequence[Grasp]]],
         clear_of: FloatArray | None,
         without: Collection[Box],
         point_cloud: PointCloudSource | None,
-        order: Callable[[list[Grasp]], list[Grasp]] = list,
         onward: Callable[[FloatArray], bool] = lambda q: True,
         on_touch: Callable[[FloatArray], None] = lambda world_from_tool: None,
     ) -> MotionRequest:
-        """`pick`; of the candidates, the cheapest first, those are tried that `order` keeps, in its order.
+        """`pick` with one of the `grasps`, which come in groups: of the first group in which any is free.
 
         Where there are any, it takes hold with joints (n,) that are well for what comes then, as `onward` says.
         `on_touch` is told of a grasp (4, 4) on whose straight way in the arm touched something.
@@ -310,10 +313,8 @@ class Motion(PlanningScene):
             q, jaw = self.joints(arm), self.parameters.execution.jaw
             self._keep_clear_but_near(near_points, world_from_cylinder.translation)
             model = self.start_model(arm, opening=jaw.open_gap, optimistic=optimistic)
-            widest = self.known.arm(arm).robot.gripper.opening
-            candidates = order(pick_candidates(world_from_cylinder, cylinder, shallow, widest, self.parameters.pick))
             try:
-                approaches = self._approaches(arm, model, candidates, without, optimistic)
+                approaches = self._first_approaches(arm, model, grasps(), without, optimistic)
             except PlanningError as error:
                 if error.code is not CauseCode.OUT_OF_REACH:
                     raise
@@ -431,6 +432,23 @@ class Motion(PlanningScene):
                 return joint_offsets(self.kinematics[arm], q, gap, points, self.parameters.joint_offsets)
             yield
         return np.zeros(len(self.kinematics[arm]))
+
+    def _first_approaches(
+        self,
+        arm: str,
+        model: CollisionModel,
+        groups: Sequence[Sequence[Grasp]],
+        without: Collection[Box],
+        optimistic: bool,
+    ) -> list[FloatArray]:
+        """`_approaches` of the first group that has any; where none has, raises the error of the first one."""
+        errors: list[PlanningError] = []
+        for candidates in filter(len, groups):
+            try:
+                return self._approaches(arm, model, candidates, without, optimistic)
+            except PlanningError as error:
+                errors.append(error)
+        raise errors[0]
 
     def _approaches(
         self,

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Collection, Generator, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from functools import partial
 from typing import TypeVar, cast
 
 import numpy as np
@@ -62,12 +61,15 @@ class CableMotionParameters(CarryMotionParameters):
     """Those of every task, of carrying, of taking hold, and of what is done with the cable then."""
 
     # Two grasps nearer than so many m and rad are one: what closed on nothing is tried again after all others; choice
-    same_grasp: tuple[float, float] = (0.015, 0.35)
+    same_grasp: tuple[float, float] = (0.007, 0.35)
     # m and rad between grasps that are both in vain, if the connector could not be carried with one; choice
     alike_in_vain: tuple[float, float] = (0.03, 0.7)
     # m of clearance in the straight way in, from which on an arm has room: one that has less leaves it to another
     # that has; choice, of the near margins
     roomy: float = 0.014
+    # m by which a loose connector lies nearer to the finger tips than the pads' middle, where no deeper grasp is free:
+    # the fingers end 12 mm past that middle; choice
+    shallow: float = 0.008
     per_step: int = 12  # kinds of grasps of which it is asked in a tick whether they can stow it; choice: 50 ms
     stow_rolls: int = 12  # angles about the connector that are tried for that: every 30 degrees
     # m straight back from where something was held; the first that is free; choice
@@ -144,8 +146,8 @@ class TakingMotion(CarryMotion):
         finite_pose("the plug's pose", plug)
         room = self._room_to_draw_out(plug)
 
-        def order(candidates: list[Grasp]) -> list[Grasp]:
-            return sorted(candidates, key=room)
+        def grasps() -> list[list[Grasp]]:
+            return [sorted(self._candidates(self.hand, plug, self.parameters.unplug.shallow), key=room)]
 
         kin, axis = self.kinematics[self.hand], plug.rotation.apply([1.0, 0.0, 0.0])
 
@@ -154,7 +156,7 @@ class TakingMotion(CarryMotion):
             out[:3, 3] -= self.parameters.unplug.draw_outs[0] * axis
             return straight_lines(kin, q, [out]) is not None
 
-        return self._pick_connector(plug, self.parameters.unplug.shallow, None, point_cloud, order, can_draw_out)
+        return self._pick_connector(plug, grasps, None, point_cloud, can_draw_out)
 
     def pick_loose(
         self,
@@ -171,16 +173,22 @@ class TakingMotion(CarryMotion):
 
         def steps() -> Iterator[None]:
             stows = _at_once(self._stowing(self.hand, world_from_connector))
+            deep, shallow = (
+                self._candidates(self.hand, world_from_connector, depth) for depth in (0.0, self.parameters.shallow)
+            )
+            # What can be done with the one can be done with the other.
+            kept = [(one, other) for one, other in zip(deep, shallow, strict=True) if stows(one)]
             try:
-                if any(map(stows, self._candidates(self.hand, world_from_connector))):
-                    keep = partial(_only, stows)
-                    yield from self._done(self._pick_connector(world_from_connector, 0.0, cable, point_cloud, keep))
+                if kept:
+                    some = [[one for one, _ in kept], [other for _, other in kept]]
+                    yield from self._done(self._pick_connector(world_from_connector, lambda: some, cable, point_cloud))
                     return
             except PlanningError as error:
                 if error.code not in NO_GRASP or isinstance(error, TouchError):
                     raise
                 self._on_anomaly(f"of the grasps from which the clip can be reached: {error}")
-            yield from self._done(self._pick_connector(world_from_connector, 0.0, cable, point_cloud, list))
+            every = [deep, shallow]
+            yield from self._done(self._pick_connector(world_from_connector, lambda: every, cable, point_cloud))
 
         return self._together(self.hand, steps())
 
@@ -294,10 +302,10 @@ class TakingMotion(CarryMotion):
             return bool(self._approaches(arm, model, candidates, self._bracket_near(connector), optimistic, clearances))
         return False
 
-    def _candidates(self, arm: str, connector: RigidTransform) -> list[Grasp]:
-        """Grasps of the loose connector, see `pick_candidates`."""
+    def _candidates(self, arm: str, connector: RigidTransform, shallow: float = 0.0) -> list[Grasp]:
+        """Grasps of the connector, see `pick_candidates`."""
         widest = self.known.arm(arm).robot.gripper.opening
-        return pick_candidates(connector, self.known.cable.connector, 0.0, widest, self.parameters.pick)
+        return pick_candidates(connector, self.known.cable.connector, shallow, widest, self.parameters.pick)
 
     def _stowing(self, arm: str, connector: RigidTransform) -> Generator[None, None, Callable[[Grasp], bool]]:
         """Steps that find which grasps of a connector let an arm bring it into the clip.
@@ -390,13 +398,12 @@ class TakingMotion(CarryMotion):
     def _pick_connector(
         self,
         world_from_connector: RigidTransform,
-        shallow: float,
+        grasps: Callable[[], Sequence[Sequence[Grasp]]],
         cable: FloatArray | None,
         point_cloud: PointCloudSource | None,
-        order: Callable[[list[Grasp]], list[Grasp]],
         onward: Callable[[FloatArray], bool] = lambda q: True,
     ) -> MotionRequest:
-        """`pick` the connector, with the grasps that the `order` sorts.
+        """`pick` the connector with one of the `grasps`, of which those of an earlier group are tried first.
 
         Those that closed on nothing or touched something on the way in are tried after all others.
         """
@@ -405,15 +412,18 @@ class TakingMotion(CarryMotion):
         def missed(grasp: Grasp) -> bool:
             return any(_alike(connector_from_world @ grasp.pose, other, *near) for other in self._missed)
 
+        def fresh_first() -> list[list[Grasp]]:
+            groups = grasps()
+            fresh = [[grasp for grasp in group if not missed(grasp)] for group in groups]
+            return [*fresh, [grasp for group in groups for grasp in group if missed(grasp)]]
+
         return self._pick(
             self.hand,
             world_from_connector,
-            self.known.cable.connector,
-            shallow,
+            fresh_first,
             cable,
             self._bracket_near(world_from_connector),
             point_cloud,
-            lambda candidates: sorted(order(candidates), key=missed),
             onward,
             lambda world_from_tool: self._missed.append(connector_from_world @ world_from_tool),
         )
@@ -426,10 +436,6 @@ def _at_once(steps: Generator[None, None, T]) -> T:
             next(steps)
         except StopIteration as end:
             return cast(T, end.value)
-
-
-def _only(wanted: Callable[[Grasp], bool], candidates: list[Grasp]) -> list[Grasp]:
-    return list(filter(wanted, candidates))
 
 
 def _without_roll(connector_from_tool: FloatArray) -> tuple[float, ...]:

@@ -3,7 +3,9 @@
 The effort is limited by a count of checks, never by time: the same seed gives the same path.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import count
 
 import numpy as np
 import ompl.base as ob
@@ -24,7 +26,11 @@ ou.setLogLevel(ou.LOG_NONE)
 class PlannerParameters:
     """The planner's effort."""
 
-    max_checks: int = 40000  # configurations that all searches together may check; choice
+    # Configurations that all searches together may check. 20000 take 40 ms
+    max_checks: int = 120000
+    # of these, after which a search that has found nothing begins again from another seed: RRTConnect mostly finds a
+    # path soon or, with an unlucky tree, very late; choice
+    restart: int = 20000
     searches: int = 4  # while the fine check of a path fails, another search begins; a last one checks finely; choice
     # m, each joint's rad times its lever, of a search's longest edge. OMPL's default, a fifth of the space's extent, is
     # 1.2 for the ViperX and 4.5 for the UR5e: most edges of that length collide, and a folded arm finds no way out.
@@ -70,10 +76,10 @@ def plan(
     for goal in free_goals:
         if model.path_free(np.array([escape[-1], goal]), margin):
             return _joined(escape, np.array([escape[-1], goal]))
-    budget = _Budget(parameters.max_checks)
+    budget, seeds = _Budget(parameters.max_checks), count(seed)
     for search in range(parameters.searches + 1):
         edges = _Edges(model, margin, fine=search == parameters.searches)
-        found = _search(edges, escape[-1], free_goals, seed + search, budget, parameters.longest_edge)
+        found = _restarted(edges, escape[-1], free_goals, seeds, budget, parameters)
         path = _shortened(edges, found, np.random.default_rng([seed, search]), parameters.shortcuts)
         if model.path_free(path, max(0.0, margin - parameters.fine_slack)):
             return _joined(escape, path)
@@ -85,7 +91,7 @@ class _Budget:
     """Configurations that may still be checked."""
 
     def __init__(self, limit: int) -> None:
-        self.limit = self.left = limit
+        self.left = limit
 
     def spent(self) -> bool:
         return self.left <= 0
@@ -128,23 +134,39 @@ def _joints(state: ob.State, levers: FloatArray) -> FloatArray:
     return np.array(state[0 : len(levers)]) / levers  # iterating over a state crashes the process (OMPL 2.0.1)
 
 
-def _search(
+def _restarted(
     edges: _Edges,
     start: FloatArray,
     goals: FloatArray,
-    seed: int,
+    seeds: Iterator[int],
     budget: _Budget,
-    longest_edge: float,
+    parameters: PlannerParameters,
 ) -> FloatArray:
-    """Waypoints (k, n) by RRTConnect (Kuffner and LaValle 2000); PlanningError when the budget runs out.
+    """Waypoints (k, n) of the first search that finds a way; PlanningError when the budget runs out."""
+    while budget.left > 0:
+        part = _Budget(most := min(parameters.restart, budget.left))
+        path = _search(edges, start, goals, next(seeds), part, parameters.longest_edge)
+        if path is not None:
+            budget.left -= most - part.left
+            return path
+        budget.left -= most
+    margin, checks = f"{edges.margin * 1e3:.0f} mm", parameters.max_checks
+    message = f"no path to {len(goals)} goals at {margin} margin in {checks} checked configurations"
+    raise PlanningError(CauseCode.PLANNING_FAILED, message)
+
+
+def _search(
+    edges: _Edges, start: FloatArray, goals: FloatArray, seed: int, budget: _Budget, longest_edge: float
+) -> FloatArray | None:
+    """Waypoints (k, n) by RRTConnect (Kuffner and LaValle 2000), or None when the budget runs out.
 
     Distances between states are those of the joints, each times its lever: big joints count more.
     """
     model, margin, kin = edges.model, edges.margin, edges.model.kinematics
-    levers, count = kin.chain.levers, len(kin)
-    space = ob.RealVectorStateSpace(count)
-    bounds = ob.RealVectorBounds(count)
-    for i in range(count):
+    levers, joints = kin.chain.levers, len(kin)
+    space = ob.RealVectorStateSpace(joints)
+    bounds = ob.RealVectorBounds(joints)
+    for i in range(joints):
         bounds.setLow(i, float(kin.lower[i] * levers[i]))
         bounds.setHigh(i, float(kin.upper[i] * levers[i]))
     space.setBounds(bounds)
@@ -160,12 +182,12 @@ def _search(
     setup.setStateValidityChecker(valid)
     information.setMotionValidator(check)
     first = space.allocState()
-    first[0:count] = (start * levers).tolist()
+    first[0:joints] = (start * levers).tolist()
     setup.addStartState(first)
     targets = ob.GoalStates(information)
     for goal in goals:
         target = space.allocState()
-        target[0:count] = (goal * levers).tolist()
+        target[0:joints] = (goal * levers).tolist()
         targets.addState(target)
     setup.setGoal(targets)
     planner = og.RRTConnect(information)
@@ -173,10 +195,7 @@ def _search(
     setup.setPlanner(planner)
     setup.solve(ob.PlannerTerminationCondition(budget.spent))
     if not setup.haveExactSolutionPath():  # a status is true for an approximate solution, too
-        raise PlanningError(
-            CauseCode.PLANNING_FAILED,
-            f"no path to {len(goals)} goals at {margin * 1e3:.0f} mm margin in {budget.limit} checked configurations",
-        )
+        return None
     path = np.array([_joints(state, levers) for state in setup.getSolutionPath().getStates()])
     path[0] = start
     path[-1] = goals[np.argmin(np.abs(goals - path[-1]).max(axis=1))]  # as given, without the rounding of the levers
@@ -250,7 +269,9 @@ def _shortened(edges: _Edges, path: FloatArray, rng: np.random.Generator, tries:
             break
         i, j = np.sort(rng.uniform(0, len(path) - 1, 2))
         a, b = _at(path, i), _at(path, j)
-        if int(j) > int(i) and edges.free(a, b):
+        # What is left of the two edges is checked anew: with other steps, it may graze something.
+        ways = [(a, b), (path[int(i)], a), (b, path[int(j) + 1])]
+        if int(j) > int(i) and all(edges.free(*way) for way in ways):
             path = np.vstack([path[: int(i) + 1], a, b, path[int(j) + 1 :]])
             path = path[np.append(True, np.abs(np.diff(path, axis=0)).max(axis=1) > 1e-6)]
             path = _without_needless(edges, path)

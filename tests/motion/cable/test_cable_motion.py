@@ -193,6 +193,25 @@ def test_a_grasp_whose_way_in_touched_something_is_tried_after_the_others(
     assert (taken.rotation.inv() * bumped[0].rotation).magnitude() > 0.2
 
 
+def test_what_lies_before_something_is_taken_nearer_to_the_finger_tips(rig: Rig) -> None:
+    """One direction of grasp is left, and behind the connector stands a wall."""
+    one_way = replace(rig.motion.parameters.pick.grasp, rolls=(0.0,), yaws=(np.deg2rad(15.0),))
+    rig.motion.parameters = replace(
+        rig.motion.parameters, pick=replace(rig.motion.parameters.pick, grasp=one_way, grip_offsets=(-0.02,))
+    )
+    connector = natural_pose(rig.known, np.array([0.02, 0.0, 0.10]))
+    forward = min(rig.motion._candidates("right", connector), key=lambda grasp: grasp.cost).pose[:3, 0]
+    depths = []
+    for behind in (0.03, 0.018):
+        rig.motion.set_obstacles(cube(connector.translation + (behind + 0.03) * forward, 0.06, 0.005), 0.005)
+        rig.run(rig.motion.pick_loose(connector))
+        taken = rig.motion.tool("right")
+        depths.append(float(taken.inv().apply(connector.translation)[0]))
+        rig.run(rig.motion.draw_back())
+        rig.arms["right"].at = np.array(rig.known.arm("right").sleep)
+    assert depths[1] - depths[0] == pytest.approx(rig.motion.parameters.shallow, abs=1e-4)
+
+
 def drawn_out(rig: Rig, plug: RigidTransform) -> tuple[float, float, Points]:
     """How far (m) the right hand draws a plug out along its axis, then itself back, and its displacement (3,) m."""
     start = rig.motion.tool("right")

@@ -7,7 +7,7 @@ from regrasp.app.tasks.cable.cells import cable_cell
 from regrasp.app.tasks.cable.studies.motion.birrt import birrt_in
 from regrasp.app.tasks.cable.studies.motion.queries import KINDS, Query, draw_queries
 from regrasp.app.tasks.cable.studies.motion.reference import ReferenceParameters, reference_path
-from regrasp.app.tasks.cable.studies.motion.trial import mesh_check, touched_by
+from regrasp.app.tasks.cable.studies.motion.trial import QueryRow, TrialParameters, mesh_check, run_trial, touched_by
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.motion.planning.planner import plan
 
@@ -64,6 +64,14 @@ def test_meshes_touch_the_foam_on_the_straight_way_only_and_none_on_a_planned_on
         key=lambda q: float(np.linalg.norm(kin.tool_matrix(q)[:3, 3] - middle)),
     )
     assert mesh_check(blocked).touches(np.array([inside, inside]))
+
+
+@pytest.mark.parametrize("seed", [20, 29])
+def test_narrow_ways_are_found(seed: int) -> None:
+    """20: every shortened path grazed the arm itself. 29: a search finds its way early, or not in a long time."""
+    (row,) = run_trial(CELL, seed, TrialParameters(birrt=False, coal=False))
+    assert isinstance(row, QueryRow)
+    assert row.why == ""
 
 
 def test_birrt_answers_with_free_paths_by_either_check(blocked: Query) -> None:
