@@ -18,14 +18,24 @@ class SeparationParameters:
 
     slow: float = 0.15  # m/s at `touching` and nearer to a seen surface; choice
     slow_at_boxes: float = 0.10  # m/s at `touching` and nearer to a known box, which is rigid; choice
+    # m/s where a known box is nearer than `box_error`. With 0.10, a panel was met with 100 N; choice
+    slowest_at_boxes: float = 0.03
+    box_error: float = 0.005  # m; by so much the arm errs
     touching: float = 0.015  # m; by so much a map of 10 mm voxels may err
     fast: float = 1.0  # m/s just within `separation`: about an arm's full speed; choice
     separation: float = 0.05  # m from which on the speed is free; choice
 
-    def speeds(self, clearances: FloatArray, slow: float) -> FloatArray:
-        """The speeds (...) m/s allowed at these clearances (...) m: from `slow`, linear between the two distances."""
-        ramp = np.interp(clearances, [self.touching, self.separation], [slow, self.fast])
-        return np.asarray(np.where(clearances < self.separation, ramp, np.inf))
+    def at_surfaces(self, clearances: FloatArray) -> FloatArray:
+        """The speeds (...) m/s allowed at these clearances (...) m from seen surfaces, linear between the distances."""
+        return self._ramp(clearances, [self.touching, self.separation], [self.slow, self.fast])
+
+    def at_boxes(self, clearances: FloatArray) -> FloatArray:
+        """The speeds (...) m/s allowed at these clearances (...) m from known boxes, linear between the distances."""
+        distances = [self.box_error, self.touching, self.separation]
+        return self._ramp(clearances, distances, [self.slowest_at_boxes, self.slow_at_boxes, self.fast])
+
+    def _ramp(self, clearances: FloatArray, distances: list[float], speeds: list[float]) -> FloatArray:
+        return np.asarray(np.where(clearances < self.separation, np.interp(clearances, distances, speeds), np.inf))
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +53,7 @@ class SpeedBySeparation:
         """See `PathSpeed`."""
         to_surfaces, to_boxes, ways = self.model.along(path, slopes, self.surfaces)
         values = self.parameters
-        speeds = np.minimum(values.speeds(to_surfaces, values.slow), values.speeds(to_boxes, values.slow_at_boxes))
+        speeds = np.minimum(values.at_surfaces(to_surfaces), values.at_boxes(to_boxes))
         with np.errstate(divide="ignore"):  # what does not move is free to
             return np.asarray((speeds / ways).min(axis=1))
 

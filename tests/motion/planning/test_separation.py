@@ -39,11 +39,15 @@ def rate(model: CollisionModel, grid: DistanceGrid, slope: FloatArray) -> float:
 
 @given(st.floats(-0.1, 0.2))
 def test_the_speed_grows_with_the_clearance(clearance: float) -> None:
-    speed, further = VALUES.speeds(np.array([clearance, clearance + 0.01]), VALUES.slow)
-    assert VALUES.slow <= speed <= further
-    assert (speed == np.inf) == (clearance >= VALUES.separation)
-    if clearance <= VALUES.touching:
-        assert speed == VALUES.slow
+    clearances = np.array([clearance, clearance + 0.01])
+    for speeds, slow, distance in (
+        (VALUES.at_surfaces, VALUES.slow, VALUES.touching),
+        (VALUES.at_boxes, VALUES.slowest_at_boxes, VALUES.box_error),
+    ):
+        speed, further = speeds(clearances)
+        assert slow <= speed <= further
+        assert (speed == np.inf) == (clearance >= VALUES.separation)
+        assert (speed == slow) == (clearance <= distance)
 
 
 def test_the_part_that_is_near_moves_at_the_speed_of_its_clearance() -> None:
@@ -59,7 +63,10 @@ def test_the_part_that_is_near_moves_at_the_speed_of_its_clearance() -> None:
 
 def test_a_known_box_is_met_more_slowly_than_a_seen_surface() -> None:
     spheres = moving(CollisionModel(KIN, []))
-    wall, tip = (spheres[:, 0] + spheres[:, 3]).max() + 0.01, spheres[spheres[:, [0, 3]].sum(axis=1).argmax(), :3]
+    wall, tip = (
+        (spheres[:, 0] + spheres[:, 3]).max() + VALUES.touching,
+        spheres[spheres[:, [0, 3]].sum(axis=1).argmax(), :3],
+    )
     box = Box(name="wall", center=(wall + 0.05, 0.0, tip[2]), size=(0.1, 2.0, 0.5))
     model = CollisionModel(KIN, [box])
     assert rate(model, beside(model, 0.5), TURN) * np.linalg.norm(tip[:2]) == pytest.approx(
