@@ -36,7 +36,8 @@ class ClutterParameters:
     # counts as the arm
     clear: float = 0.07
     voxel: float = 0.01  # edge of the voxels in which the pieces are seen, as in a run
-    tries: int = 1000  # to place the pieces
+    tries: int = 1000  # to place the pieces, after which all are placed anew: some leave no room for the last one
+    starts: int = 10
 
 
 def draw_pieces(
@@ -47,14 +48,15 @@ def draw_pieces(
     Raises ValueError where there is no room for them.
     """
     count = int(rng.integers(parameters.pieces[0], parameters.pieces[1] + 1))
-    pieces: list[Obstacle] = []
-    for _ in range(parameters.tries):
-        if len(pieces) == count:
-            return tuple(pieces)
-        piece = _draw(f"piece_{len(pieces)}", rng, parameters)
-        if _has_room(piece, cell, pieces, parameters.clear):
-            pieces.append(piece)
-    raise ValueError(f"no room for {count} pieces of foam in {parameters.tries} tries")
+    for _ in range(parameters.starts):
+        pieces: list[Obstacle] = []
+        for _ in range(parameters.tries):
+            if len(pieces) == count:
+                return tuple(pieces)
+            piece = _draw(f"piece_{len(pieces)}", rng, parameters)
+            if _has_room(piece, cell, pieces, parameters.clear):
+                pieces.append(piece)
+    raise ValueError(f"no room for {count} pieces of foam in {parameters.starts} times {parameters.tries} tries")
 
 
 def surface(piece: Obstacle, voxel: float) -> FloatArray:

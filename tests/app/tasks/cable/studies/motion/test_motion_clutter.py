@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -58,5 +60,12 @@ def test_a_raised_piece_stands_on_a_post() -> None:
 
 
 def test_no_room_is_an_error() -> None:
-    with pytest.raises(ValueError, match=r"no room for \d pieces of foam in 5 tries"):
+    with pytest.raises(ValueError, match=r"no room for \d pieces of foam in 10 times 5 tries"):
         draw_pieces(CELL, np.random.default_rng(0), ClutterParameters(edges=(2.0, 2.0), tries=5))
+
+
+def test_pieces_that_leave_no_room_for_the_last_one_are_placed_anew() -> None:
+    few = ClutterParameters(pieces=(4, 4), tries=60)
+    assert len(draw_pieces(CELL, np.random.default_rng(1), few)) == 4
+    with pytest.raises(ValueError, match="no room"):
+        draw_pieces(CELL, np.random.default_rng(1), replace(few, starts=1))
