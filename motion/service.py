@@ -8,6 +8,7 @@ refused with a ValueError at once; what an arm cannot do, with a PlanningError b
 from collections.abc import Callable, Collection, Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
+from typing import TypeVar
 
 import numpy as np
 from scipy.spatial.transform import RigidTransform
@@ -35,6 +36,8 @@ from regrasp.motion.scene.planning_scene import NO_POINTS, PlanningScene, Planni
 
 # Points (n, 3) m in the world that a camera saw from that second on; None while there is no such picture.
 PointCloudSource = Callable[[float], FloatArray | None]
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -77,6 +80,7 @@ class Motion(PlanningScene):
         self.planner = plan
         chains = {name: kin.chain for name, kin in self.kinematics.items()}
         dynamics = {spec.name: ArmDynamics(spec.robot, spec.world_from_base) for spec in known.arms}
+        self._dynamics = dynamics
         self.execution = Execution(
             arms, grippers, chains, dynamics, clock, known.latencies.plan, parameters.execution, on_anomaly
         )
@@ -242,6 +246,16 @@ class Motion(PlanningScene):
     def give_up(self, arm: str, code: str, message: str) -> PlanningError:
         """Disable an arm or its jaw: every later request to it fails with this cause. Returns the error to raise."""
         return self.execution.give_up(arm, code, message)
+
+    def _together(self, arm: str, steps: Generator[None, None, T] | Iterator[None]) -> Request[T]:
+        """Steps that do other requests to `arm`, as one. Each of those fails if the arm is out of order."""
+        return Request(steps, lambda: self.execution.halt(arm))
+
+    def _done(self, request: Request[T]) -> Generator[None, None, T]:
+        """Steps that do a request and return its answer."""
+        while not request.poll():
+            yield
+        return request.answer
 
     def _move_steps(
         self,

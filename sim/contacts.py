@@ -6,17 +6,19 @@ import pybullet as p
 
 from regrasp.sim.robot.arm import SimArm
 
+BodyOrLink = int | tuple[int, int]  # a body's id, or that and a link (-1: the base)
+
 
 class ContactWatch:
     """Notes the largest normal force of each arm against each body that it must not touch.
 
-    `forbidden` gives the names of those bodies by their ids; an arm must not touch another one either. `peaks` holds
-    the forces in N by "NAME arm - OTHER". `take_recent` tells the forces of late.
+    `forbidden` gives the names of those bodies and links by their ids; an arm must not touch another one either.
+    `peaks` holds the forces in N by "NAME arm - OTHER". `take_recent` tells the forces of late.
     """
 
-    def __init__(self, client: int, arms: Mapping[str, SimArm], forbidden: Mapping[int, str]) -> None:
+    def __init__(self, client: int, arms: Mapping[str, SimArm], forbidden: Mapping[BodyOrLink, str]) -> None:
         self._client, self._arms = client, arms
-        self._named = {**forbidden, **{arm.body: name for name, arm in arms.items()}}
+        self._named: dict[BodyOrLink, str] = {**forbidden, **{arm.body: name for name, arm in arms.items()}}
         self.peaks: dict[str, float] = {}
         self._recent = dict.fromkeys(arms, (0.0, 0.0))
 
@@ -26,7 +28,8 @@ class ContactWatch:
             sums: dict[str, float] = {}
             allowed = 0.0
             for contact in p.getContactPoints(arm.body, physicsClientId=self._client):
-                other = self._named.get(contact[2] if contact[1] == arm.body else contact[1])
+                body, link = (contact[2], contact[4]) if contact[1] == arm.body else (contact[1], contact[3])
+                other = self._named.get(body) or self._named.get((body, link))
                 if other is not None and other != name:
                     sums[other] = sums.get(other, 0.0) + contact[9]
                 else:

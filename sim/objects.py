@@ -41,8 +41,8 @@ class TaskObjects:
         way to the beginning it may step the engine, whose clock starts afterwards; the arms hold still.
         """
 
-    def forbidden(self) -> Mapping[int, str]:
-        """The task's bodies that no arm must touch: names by ids."""
+    def forbidden(self) -> Mapping[int, str] | Mapping[tuple[int, int], str]:
+        """The task's bodies that no arm must touch: names by ids, or by the ids of a body and its link."""
         return {}
 
     def effects(self) -> TaskEffects:

@@ -15,7 +15,7 @@ from regrasp.interfaces.cell import Cell
 from regrasp.interfaces.fault import Fault
 from regrasp.interfaces.scene import Gravity, SceneSetup
 from regrasp.interfaces.wall_time import counts_as
-from regrasp.sim.contacts import ContactWatch
+from regrasp.sim.contacts import BodyOrLink, ContactWatch
 from regrasp.sim.devices import DeviceParameters, Devices
 from regrasp.sim.engine import Engine
 from regrasp.sim.faults.effects import FaultParameters, effect_of
@@ -65,7 +65,8 @@ class World(Generic[ObjectsT]):
         objects.build_moving(self._engine, self.arms)
         self._stand_arms_on_floor()
         objects.lay_out(self._engine, self.fixed_bodies)
-        forbidden = {**self._scene.forbidden, **objects.forbidden()}
+        named = (self._scene.forbidden, objects.forbidden())
+        forbidden: dict[BodyOrLink, str] = {body: name for names in named for body, name in names.items()}
         self._contacts = ContactWatch(self.client, self.arms, forbidden)
         self.contact_peaks = self._contacts.peaks
         self._devices.add_cameras(renderer)

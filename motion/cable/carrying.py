@@ -4,14 +4,12 @@ from collections.abc import Generator, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import TypeVar
 
 import numpy as np
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cause import CauseCode
-from regrasp.interfaces.request import Request
 from regrasp.motion.arguments import finite_pose, share
 from regrasp.motion.cable.cable_shape import cable_course
 from regrasp.motion.cable.carry_paths import CarryPathParameters, carry_paths, first_free
@@ -24,8 +22,6 @@ from regrasp.motion.planning.straight import can_continue
 from regrasp.motion.request import MotionRequest
 from regrasp.motion.robots.contact_guard import ContactLimits
 from regrasp.motion.scene.collision import CollisionModel
-
-T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -162,16 +158,6 @@ class CarryMotion(SearchMotion):
             with suppress(PlanningError):
                 shortest = min(shortest, self._plan(model, start, goals), key=lambda path: _length(path, levers))
         return shortest
-
-    def _together(self, arm: str, steps: Generator[None, None, T] | Iterator[None]) -> Request[T]:
-        """Steps that do other requests to `arm`, as one. Each of those fails if the arm is out of order."""
-        return Request(steps, lambda: self.execution.halt(arm))
-
-    def _done(self, request: Request[T]) -> Generator[None, None, T]:
-        """Steps that do a request and return its answer."""
-        while not request.poll():
-            yield
-        return request.answer
 
 
 def _length(path: FloatArray, levers: FloatArray) -> float:

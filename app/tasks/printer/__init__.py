@@ -1,0 +1,20 @@
+"""The printer task: a robot on a rail fetches a printed part; so far it opens the printer's door."""
+
+from regrasp.app.task.part import Part
+from regrasp.app.task.task import Task
+
+_HERE = "regrasp.app.tasks.printer"
+
+TASK = Task(
+    name="printer",
+    about="Open the door of a habitat's 3D printer with a robot on a rail.",
+    objects=Part("regrasp.sim.printer.objects:PrinterObjects"),
+    cell=Part("regrasp.interfaces.printer.cell:PrinterCell"),
+    expect=Part(f"{_HERE}.expectations:Expect"),
+    when=Part("regrasp.interfaces.printer.fault:PrinterWhen"),
+    faults=Part("regrasp.interfaces.printer.fault:FAULTS"),
+    service_calls=("motion.reach", "motion.slide_door"),
+    services=Part(f"{_HERE}.services:printer_services"),
+    judge=Part(f"{_HERE}.judge:PrinterJudge"),
+    words=Part(f"{_HERE}.words:WORDS"),
+)

@@ -1,0 +1,16 @@
+"""The expectations of a printer scenario as a pydantic model."""
+
+from typing import Annotated
+
+from pydantic import Field
+
+from regrasp.app.task import expect
+from regrasp.interfaces.fields import NotNegative
+
+
+class Expect(expect.Expect):
+    """What must come out, by ground truth; what is left out is not looked at."""
+
+    door_open: Annotated[
+        NotNegative | None, Field(description="Metres at least that the door stands open then.", examples=[0.41])
+    ] = None

@@ -1,0 +1,1 @@
+"""What crosses rooms in the printer task: its sections of a cell file."""

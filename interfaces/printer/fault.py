@@ -1,0 +1,31 @@
+"""The faults of the printer task, and what its faults may wait for."""
+
+from typing import Annotated, ClassVar, Literal
+
+from pydantic import Field
+
+from regrasp.interfaces.fault import Fault, FractionRange, Lasting, When
+
+
+class PrinterWhen(When):
+    """When a fault begins: exactly one of `at`, `opened` and `node`. Each fault begins once."""
+
+    SHARES: ClassVar[tuple[str, ...]] = ("opened",)
+
+    opened: FractionRange | None = Field(
+        default=None,
+        description="Share of its travel that the door has been opened; drawn from this range.",
+        examples=[[0.3, 0.6]],
+    )
+
+
+class DoorJams(Lasting):
+    """The slide of the door jams: its friction grows."""
+
+    type: Literal["door_jams"] = Field(description="This fault.", examples=["door_jams"])
+    friction: Annotated[float, Field(gt=0, le=2000)] = Field(
+        default=300.0, description="Newtons that the slide resists with then.", examples=[300.0]
+    )
+
+
+FAULTS: tuple[type[Fault], ...] = (DoorJams,)

@@ -1,0 +1,38 @@
+"""What the printer's leaves ask of the robot's services, besides what those of every task do."""
+
+from typing import TYPE_CHECKING, Protocol
+
+from regrasp.interfaces.request import Request
+from regrasp.interfaces.services import MotionService
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import RigidTransform
+
+
+class PrinterMotionService(MotionService, Protocol):
+    """Motions of an arm on a rail at a printer whose door it opens."""
+
+    @property
+    def door_opening(self) -> float:
+        """How far, m, the door is believed to stand open."""
+        ...
+
+    def handle(self, opening: float) -> "RigidTransform":
+        """world_from_tool of a hand that takes the handle of a door that stands `opening` m open."""
+        ...
+
+    def move_rail(self, arm: str, position: float) -> Request[None]:
+        """Bring an arm's rail to a position (m along it), and let the arm's other joints stand."""
+        ...
+
+    def reach(self, arm: str, goal: "RigidTransform", standoff: float) -> Request[None]:
+        """Bring the tool along a free path `standoff` m before a pose (world_from_tool), then straight into it."""
+        ...
+
+    def take_handle(self, arm: str) -> Request[float]:
+        """Close the jaw on the handle and give way to it; the answer is the gap (m) between the pads."""
+        ...
+
+    def slide_door(self, arm: str, position: float) -> Request[None]:
+        """Bring the rail of an arm that holds the handle to a position (m along it): the door goes along."""
+        ...

@@ -1,0 +1,1 @@
+"""What is in the world of the printer task."""
