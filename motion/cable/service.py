@@ -182,9 +182,11 @@ class CableMotion(PullingMotion):
             if pull.detected:
                 yield from go(np.zeros(3))
             else:
+                # The way in was free, whatever the map says of it since.
                 before = tool.apply([-self.parameters.seating.clear, 0.0, 0.0])
                 way = before - self.tool(self.hand).translation
-                yield from self._done(self._shift_held(self.hand, way, held))
+                limits = self._along_cable(self._guard.pulling, held)
+                yield from self._done(self._shift(self.hand, way, checked=False, contact=limits))
             return pull
 
         return self._together(self.hand, steps())

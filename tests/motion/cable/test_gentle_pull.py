@@ -15,6 +15,8 @@ from regrasp.interfaces.request import Request
 from regrasp.interfaces.scene import Gravity
 from regrasp.motion.cable.gentle_pull import across_the_cable, pull_gently
 from regrasp.motion.cable.service import CableMotion
+from regrasp.motion.planning.straight import straight_line
+from regrasp.motion.robots.spheres import sphere_distances
 from regrasp.sim.cable.objects import CableObjects, CableObjectsParameters
 from regrasp.sim.world import NOTHING_ADDED, World
 
@@ -92,4 +94,28 @@ def test_in_the_world_a_connector_in_the_clip_is_told_from_one_before_or_behind_
     moved = before.inv().apply(motion.tool(motion.hand).translation)
     distance = 0.0 if seated else motion.parameters.seating.clear
     assert moved == pytest.approx([-distance, 0.0, 0.0], abs=2e-3)
+    world.close()
+
+
+def test_the_hand_comes_back_out_of_the_clip_although_the_map_shows_something_there(cell: CableCell) -> None:
+    """What a camera sees beside a held connector may be the connector: the way in was free."""
+    stand = RigidTransform.from_translation([0.035, 0.0, 0.0]) * cell.known.cable.clip.world_from_seat
+    world = World(cell, "zero", 1, CableObjects(cell, stand, STRONG_STAND), NOTHING_ADDED)
+    motion, _ = settled(world)
+    held = motion.tool(motion.hand).inv() * world.objects.connector_pose()
+    before = motion.tool(motion.hand)
+    back, kin = motion.parameters.seating.clear, motion.kinematics[motion.hand]
+    end = straight_line(kin, motion.joints(motion.hand), before * RigidTransform.from_translation([-back, 0.0, 0.0]))[
+        -1
+    ]
+    model = motion.model(motion.hand)
+    spheres = model.spheres(end)
+    behind = spheres[:, :3] + spheres[:, 3:] * before.rotation.apply([-1.0, 0.0, 0.0])
+    in_the_way = sphere_distances(behind, model.spheres(motion.joints(motion.hand)))[0] > 0.025
+    assert in_the_way.any()
+    motion.set_obstacles(behind[in_the_way], 0.01)
+    pull = done(world, motion.pull_at_clip(held))
+    assert not pull.detected
+    moved = before.inv().apply(motion.tool(motion.hand).translation)
+    assert moved == pytest.approx([-back, 0.0, 0.0], abs=2e-3)
     world.close()
