@@ -168,13 +168,13 @@ def print_schema(
     \b
     With the YAML language server (VS Code, Neovim, Emacs) an editor completes
     and checks scenario files:
-      regrasp scenarios schema > scenario.schema.json
+      regrasp scenarios schema --task cable > scenario.schema.json
     and as the first line of your scenario, with the path from it to that file:
       # yaml-language-server: $schema=scenario.schema.json
 
     \b
     To read it yourself:
-      regrasp scenarios schema --markdown
+      regrasp scenarios schema --task cable --markdown
     """
     from regrasp.app.files.schema_doc import markdown
     from regrasp.app.scenario.schema import json_schema, scenario_model
@@ -182,7 +182,7 @@ def print_schema(
 
     known = find.names()
     if task is None and len(known) > 1:
-        message = f"there are the tasks {' and '.join(known)}, and each has a schema of its own; name one"
+        message = f"there are the tasks {' and '.join(known)}, and each has its own schema: write --task {known[0]}"
         raise Findings([Finding("--task", 0, message)])
     chosen = find.task_named(task or known[0], ("--task", 0))
     if as_markdown:

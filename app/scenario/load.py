@@ -26,6 +26,7 @@ from regrasp.app.scenario.tree_file import check_tree_for
 from regrasp.app.task import find
 from regrasp.interfaces.cell import Cell
 from regrasp.interfaces.quote import MAX_QUOTE, cut, nearest, quoted
+from regrasp.trees.leaf_sets import task_of
 
 if TYPE_CHECKING:
     from regrasp.app.task.task import Task
@@ -219,10 +220,21 @@ class _Source:
         return None
 
     def _model(self, task: "Task | None") -> type[ScenarioFile]:
-        """The model of the task's files; while that is not known and there are several, that of any task."""
-        if task is None and len(found := [*find.tasks()]) == 1:
-            task = found[0]
+        """The model of the task's files; while that is not known, that of its tree's task, or of any task."""
+        if task is None:
+            found = [*find.tasks()]
+            task = found[0] if len(found) == 1 else self._trees_task()
         return unknown_task_model() if task is None else scenario_model(task)
+
+    def _trees_task(self) -> "Task | None":
+        """The task whose leaves the file's tree names; None if it names another's, too, or is no tree."""
+        name = value_at(self._document.value, ("tree",))
+        if not isinstance(name, str):
+            return None
+        with contextlib.suppress(Findings, OSError, ValueError):
+            task = task_of(resolve("tree", name, self.path.parent))
+            return None if task is None else find.task_named(task)
+        return None
 
     def _read(
         self, case: str, document: Document, changed: Collection[str | int], model: type[ScenarioFile]

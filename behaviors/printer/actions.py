@@ -2,8 +2,10 @@
 
 from typing import Any, ClassVar
 
-from regrasp.behaviors.leaf import LeafPort, LeafSteps, StepsLeaf
+from regrasp.behaviors.leaf import LeafFailed, LeafPort, LeafSteps, StepsLeaf
 from regrasp.behaviors.printer.services import PrinterServices
+from regrasp.interfaces.cause import CauseCode
+from regrasp.interfaces.printer.cause import PrinterCause
 
 
 class PrinterLeaf(StepsLeaf):
@@ -51,6 +53,34 @@ class RailToHandle(PrinterLeaf):
         yield motion.move_rail(self.hand, float(handle[1] + self.get_input("beside") - base[1]))
 
 
+class LookAtHandle(PrinterLeaf):
+    """Brings the camera before the handle, and takes the handle to be where it is seen.
+
+    The tool stands `standoff` m before where the handle is believed to be; the leaf fails if no frame of the next
+    `seconds` shows it.
+    """
+
+    INPUT_PORTS: ClassVar[dict[str, Any]] = {
+        "standoff": LeafPort(data_type=float, above=0.0, description="m before the handle, from where it is looked at"),
+        "seconds": LeafPort(data_type=float, above=0.0, description="simulated seconds of looking"),
+    }
+
+    def steps(self) -> LeafSteps:
+        """See the class."""
+        motion, known, perception = self.services.motion, self.services.known.printer, self.services.perception
+        yield motion.go_before(self.hand, motion.handle(motion.door_opening), self.get_input("standoff"))
+        begin = self.services.clock.now()
+        while (place := perception.see_handle(known.camera, begin)) is None:
+            if self.services.clock.now() > begin + self.get_input("seconds"):
+                trouble = perception.trouble(known.camera)
+                why = f"the {known.camera} camera did not show the handle in {self.get_input('seconds'):g} s"
+                code = PrinterCause.HANDLE_NOT_FOUND if trouble is None else CauseCode.CAMERA_FAILED
+                raise LeafFailed(code, why if trouble is None else f"{why}: {trouble}")
+            yield None
+        off = motion.believe_handle(place)
+        self.say("saw the handle", position=place.round(4).tolist(), off=off.round(4).tolist())
+
+
 class ReachHandle(PrinterLeaf):
     """Brings the open gripper `standoff` m before the handle, then straight round it."""
 
@@ -82,9 +112,9 @@ class ArmBack(PrinterLeaf):
     """Draws the gripper back straight, by `distance` m."""
 
     INPUT_PORTS: ClassVar[dict[str, Any]] = {
-        "distance": LeafPort(data_type=float, above=0.0, description="m away from the printer")
+        "distance": LeafPort(data_type=float, above=0.0, description="m back along the hand")
     }
 
     def steps(self) -> LeafSteps:
         """See the class."""
-        yield self.services.motion.shift(self.hand, [self.get_input("distance"), 0.0, 0.0], checked=False)
+        yield self.services.motion.draw_back(self.hand, self.get_input("distance"))

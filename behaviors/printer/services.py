@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from regrasp.behaviors.services import Services
-from regrasp.interfaces.printer.services import PrinterMotionService
+from regrasp.interfaces.printer.services import PrinterMotionService, PrinterPerceptionService
 
 if TYPE_CHECKING:
     from regrasp.interfaces.printer.cell import PrinterKnown
@@ -16,3 +16,4 @@ class PrinterServices(Services):
 
     known: "PrinterKnown"
     motion: PrinterMotionService
+    perception: PrinterPerceptionService

@@ -1,8 +1,8 @@
 """The printer task's sections of a cell file, `known.printer` and `hidden.printer`. Units are SI."""
 
-from typing import Self
+from typing import Annotated, Self
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from regrasp.interfaces.cell import Box, Cell, KnownCell, Name
 from regrasp.interfaces.fields import Color, Force, Friction, Length, Mass, Model, Size, Vector
@@ -14,7 +14,7 @@ class Handle(Model):
 
     center: Vector  # where the door is closed
     size: Size
-    color: Color = (0.15, 0.15, 0.17)
+    color: Color = (0.90, 0.60, 0.10)  # one that no other thing of the cell has: it is found by that
 
 
 class Door(Model):
@@ -64,7 +64,11 @@ class KnownPrinter(Model):
     """What the robot is told about the printer, and which arm works at it."""
 
     hand: Name
+    camera: Name  # on the hand's arm
     door: Door
+
+
+Offset = Annotated[float, Field(ge=-0.1, le=0.1)]  # metres
 
 
 class HiddenPrinter(Model):
@@ -73,6 +77,7 @@ class HiddenPrinter(Model):
     door_mass: Mass
     door_friction: Force  # Coulomb's, of the slide
     handle_friction: Friction  # coefficient
+    handle_off: tuple[Offset, Offset] = (0.0, 0.0)  # m along y and z from where the robot believes it
 
 
 class PrinterKnown(KnownCell):

@@ -2,11 +2,20 @@
 
 from typing import TYPE_CHECKING, Protocol
 
+from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.request import Request
-from regrasp.interfaces.services import MotionService
+from regrasp.interfaces.services import MotionService, PerceptionService
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import RigidTransform
+
+
+class PrinterPerceptionService(PerceptionService, Protocol):
+    """What is seen of a printer."""
+
+    def see_handle(self, camera: str, since: float) -> FloatArray | None:
+        """The middle (3,) m, world, of the handle's front; None while no frame from `since` (s) on shows enough."""
+        ...
 
 
 class PrinterMotionService(MotionService, Protocol):
@@ -21,12 +30,24 @@ class PrinterMotionService(MotionService, Protocol):
         """world_from_tool of a hand that takes the handle of a door that stands `opening` m open."""
         ...
 
+    def believe_handle(self, place: FloatArray) -> FloatArray:
+        """Take the handle to be at a place (3,) m, of which y and z count; returns how far (3,) m it was off."""
+        ...
+
+    def go_before(self, arm: str, goal: "RigidTransform", standoff: float) -> Request[None]:
+        """Bring the tool along a free path `standoff` m before a pose (world_from_tool)."""
+        ...
+
     def move_rail(self, arm: str, position: float) -> Request[None]:
         """Bring an arm's rail to a position (m along it), and let the arm's other joints stand."""
         ...
 
     def reach(self, arm: str, goal: "RigidTransform", standoff: float) -> Request[None]:
         """Bring the tool along a free path `standoff` m before a pose (world_from_tool), then straight into it."""
+        ...
+
+    def draw_back(self, arm: str, distance: float) -> Request[None]:
+        """Draw the hand straight back by `distance` m."""
         ...
 
     def take_handle(self, arm: str) -> Request[float]:

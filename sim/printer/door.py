@@ -20,6 +20,8 @@ class SimDoor:
     def __init__(self, client: int, door: Door, hidden: HiddenPrinter) -> None:
         self._client = client
         panel, handle = door.parts(0.0)
+        x, y, z = handle.center
+        handle = handle.model_copy(update={"center": (x, y + hidden.handle_off[0], z + hidden.handle_off[1])})
         # What holds the handle is as thick as the handle and reaches from it to the door's front.
         gap = handle.center[0] - panel.center[0] - 0.5 * (panel.size[0] + handle.size[0])
         away = [b - a for a, b in zip(panel.center, handle.center, strict=True)]

@@ -14,6 +14,7 @@ from regrasp.app.scenario.load import cases
 
 LINES = """\
 description: a foam block hides the end of the cable
+task: cable
 cell: thesis
 tree: tree.xml
 gravity: zero

@@ -20,7 +20,7 @@ COMMANDS = [
     "explain run",
     "replay run",
     "scenarios list",
-    "scenarios schema",
+    "scenarios schema --task cable",
     "scenarios show short_obstacle",
     "trees check recovery",
     "trees export recovery --format svg",

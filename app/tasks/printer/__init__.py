@@ -11,6 +11,7 @@ TASK = Task(
     objects=Part("regrasp.sim.printer.objects:PrinterObjects"),
     cell=Part("regrasp.interfaces.printer.cell:PrinterCell"),
     expect=Part(f"{_HERE}.expectations:Expect"),
+    causes=Part("regrasp.interfaces.printer.cause:PrinterCause"),
     when=Part("regrasp.interfaces.printer.fault:PrinterWhen"),
     faults=Part("regrasp.interfaces.printer.fault:FAULTS"),
     service_calls=("motion.reach", "motion.slide_door"),

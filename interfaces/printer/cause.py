@@ -1,0 +1,9 @@
+"""Why a leaf of the printer task fails, besides what every task knows."""
+
+from enum import StrEnum
+
+
+class PrinterCause(StrEnum):
+    """The causes."""
+
+    HANDLE_NOT_FOUND = "handle_not_found"  # no camera showed the handle of the door

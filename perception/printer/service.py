@@ -1,0 +1,60 @@
+"""Perception at a printer: where the handle of its door is."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import RigidTransform
+
+from regrasp.interfaces.arrays import FloatArray
+from regrasp.interfaces.devices import Camera, Clock
+from regrasp.interfaces.frame import RgbdFrame
+from regrasp.interfaces.printer.cell import PrinterKnown
+from regrasp.interfaces.wall_time import counts_as
+from regrasp.perception.camera.color import SegmentationParameters, color_mask
+from regrasp.perception.camera.model import deproject
+from regrasp.perception.mapping.occupancy import Spheres
+from regrasp.perception.service import Perception, PerceptionParameters
+
+
+@dataclass(frozen=True)
+class PrinterPerceptionParameters(PerceptionParameters):
+    """Those of every task, and of the handle."""
+
+    least_points: int = 200  # pixels of the handle with depth; choice: it has 2000 at 0.35 m
+    span: tuple[float, float] = (0.5, 99.5)  # percentiles of its points between which its middle lies; choice
+
+
+class PrinterPerception(Perception):
+    """Sees the handle of the door."""
+
+    parameters: PrinterPerceptionParameters
+
+    def __init__(
+        self,
+        known: PrinterKnown,
+        cameras: Mapping[str, Camera],
+        clock: Clock,
+        pose_of: Callable[[RgbdFrame], RigidTransform],
+        arm_spheres: Callable[[], list[Spheres]],
+        parameters: PrinterPerceptionParameters = PrinterPerceptionParameters(),
+    ) -> None:
+        super().__init__(known, cameras, clock, pose_of, arm_spheres, parameters)
+        self._color = SegmentationParameters.for_color(known.printer.door.handle.color)
+
+    @counts_as("perception")
+    def see_handle(self, camera: str, since: float) -> FloatArray | None:
+        """The middle (3,) m, world, of the handle as the newest frame shows it.
+
+        x is that of its front. None while there is no frame from the time `since` (s) on, in trouble, or where too
+        little of the handle's colour has a depth.
+        """
+        frame = self.frame(camera)
+        if frame is None or frame.stamp < since or self.trouble(camera) is not None:
+            return None
+        points = deproject(frame.depth, color_mask(frame.rgb, self._color) > 0, frame.intrinsics)
+        if len(points) < self.parameters.least_points:
+            return None
+        world = self.pose_of(frame).apply(points)
+        low, high = np.percentile(world, self.parameters.span, axis=0)
+        return np.array([np.median(world[:, 0]), *(0.5 * (low + high))[1:]])
