@@ -10,17 +10,18 @@ from regrasp.behaviors.keys import Keys
 from regrasp.behaviors.leaf import LeafFailed, LeafSteps
 from regrasp.interfaces.cable.cause import CableCause
 from regrasp.interfaces.cause import CauseCode
-from regrasp.motion.failure import NO_WAY, PlanningError
+from regrasp.motion.failure import PlanningError
 
 
 @dataclass(frozen=True)
 class InsertParameters:
-    """How long the connector is looked at in the hand, and how long its insertion takes."""
+    """How long the connector is looked at in the hand, how long its insertion takes, and how often it is tried."""
 
     look_time: float = 0.8  # s of looking; choice
     seat_time: float = 0.6  # s of waiting; the clip's lips take 0.2 s to close
     # before which try the other arm's camera looks where the hand hides the connector; that takes 7 to 10 s; choice
     other_look: int = 0
+    blocked: int = 2  # insertions that were blocked, or carries in vain, before the hand lets it fall; choice
 
 
 @dataclass(frozen=True)
@@ -49,11 +50,7 @@ class Carry(HandLeaf):
         try:
             yield from self.ask(self.services.motion.carry_to_clip(self.held(), forced=self._was_let_fall()))
         except PlanningError as error:
-            failed = self.read(VAIN_CARRIES) + 1
-            self.write(VAIN_CARRIES, failed)
-            again = error.code in NO_WAY and failed < self.parameters.carries
-            if not again and error.code in (*NO_WAY, CauseCode.OUT_OF_REACH):
-                yield from self.let_fall()
+            yield from self.count_vain(error, self.parameters.carries)
             raise
 
     def _was_let_fall(self) -> bool:
@@ -65,12 +62,13 @@ class Insert(LookInHand, LookLeaf):
 
     Where the hand hides it from the overview camera, the other arm's camera looks, if it can. Where the clip does not
     hold it, the hand comes back out, looks again, and tries as if it lay a little otherwise. When no try is left, it
-    lies in the hand in an unknown way: the hand lets it fall, and the leaf fails.
+    lies in the hand in an unknown way: the hand lets it fall, and the leaf fails. So it does where the way in or back
+    out was blocked, the second time.
     """
 
     NEEDS: ClassVar[Keys] = (HELD,)
-    READS: ClassVar[Keys] = (NOTICES,)
-    WRITES: ClassVar[Keys] = (HELD, NOTICES)
+    READS: ClassVar[Keys] = (NOTICES, VAIN_CARRIES)
+    WRITES: ClassVar[Keys] = (HELD, NOTICES, VAIN_CARRIES)
     CLEARS: ClassVar[Keys] = (HELD,)
     parameters: ClassVar[InsertParameters] = InsertParameters()
 
@@ -83,13 +81,14 @@ class Insert(LookInHand, LookLeaf):
                 yield from self._look_with_the_other_arm()
             try:
                 yield from self.ask(motion.insert(self.held(), attempt))
+                yield from self.wait(self.parameters.seat_time)
+                pull = yield from self.ask(motion.pull_at_clip(self.held()))
             except PlanningError as error:
                 if error.code is not CauseCode.OUT_OF_REACH:
+                    yield from self.count_vain(error, self.parameters.blocked)
                     raise
                 why = why or str(error)
                 continue
-            yield from self.wait(self.parameters.seat_time)
-            pull = yield from self.ask(motion.pull_at_clip(self.held()))
             self.say("pulled at the clip", stiffness=round(pull.value), holds=pull.detected)
             if pull.detected:
                 return

@@ -88,6 +88,16 @@ class HandLeaf(CableLeaf):
         self.clear(HELD)
         self.note_loss("hand")
 
+    def count_vain(self, error: PlanningError, most: int) -> LeafSteps:
+        """Count that the held connector could not be delivered; let it fall where it cannot be, or the `most`-th time.
+
+        The leaf READS and WRITES the key VAIN_CARRIES, besides what `let_fall` needs.
+        """
+        failed = self.read(VAIN_CARRIES) + 1
+        self.write(VAIN_CARRIES, failed)
+        if error.code is CauseCode.OUT_OF_REACH or (error.code in NO_WAY and failed >= most):
+            yield from self.let_fall()
+
     def take(self, arms: Sequence[str], pick: Callable[[], Request[None]]) -> LeafSteps:
         """Let the first of the `arms` that finds a way bring its jaw round the connector: the hand from now on.
 

@@ -12,7 +12,9 @@ from regrasp.behaviors.cable.keys import NOTICES
 from regrasp.behaviors.keys import value_of
 from regrasp.interfaces.cable.cause import CableCause
 from regrasp.interfaces.cable.cell import CableKnown
+from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.cell import pose_along
+from regrasp.motion.failure import PlanningError
 from regrasp.perception.pose.estimate import Estimate
 
 
@@ -94,6 +96,19 @@ def test_when_no_try_is_left_it_fails_and_lets_it_fall(stage: Stage) -> None:
     assert value_of(HELD_KEY, None) is None
     assert [word for word, _ in stage.motion.grippers[stage.motion.hand].told] == ["open"]
     assert [notice.by for notice in value_of(NOTICES)] == ["hand"]
+
+
+def test_where_the_way_is_blocked_again_it_is_let_fall_and_taken_otherwise(stage: Stage) -> None:
+    stage.belief.held = HELD
+    stage.perception.shows = lambda _, t: lying(t, stage.motion.tool_pose * HELD)
+    stage.motion.error = PlanningError(CauseCode.MOTION_BLOCKED, "the arm touched something")
+    # The jaw opens whatever becomes of the arm.
+    stage.motion.let_go = lambda: stage.motion.release(stage.motion.hand, 0.025)  # type: ignore[method-assign]
+    told = []
+    for _ in range(2):
+        assert stage.run(stage.tree(INSERT), 60.0) is Status.FAILURE
+        told.append([word for word, _ in stage.motion.grippers[stage.motion.hand].told])
+    assert told == [[], ["open"]]
 
 
 def test_where_the_hand_hides_it_the_other_arm_looks_and_goes_back_to_sleep(stage: Stage) -> None:
