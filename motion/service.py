@@ -47,9 +47,7 @@ class MotionParameters:
     approach_speed: float = 0.3  # share of the joints' speed on straight paths near things; choice
     optimistic_speed: float = 0.3  # share of the joints' speed on a path that may touch something; choice
     pulling_speed: float = 0.5  # share at most of one that pulls an elastic thing, and feels little else; choice
-    # m from known boxes, which are rigid, in turn: the ViperX is off by 5 mm (its maker), and its hand stands out of
-    # its spheres by up to 6 mm
-    box_margins: tuple[float, ...] = (0.011, 0.005)
+    arm_error: float = 0.005  # m that a tool may be off: the ViperX's accuracy by its maker
     touches: int = 6  # that end a motion; after each before it the arm goes on by another way; choice
     same_touch: float = 0.1  # rad or m; a touch at joints so near to those of another is of the same thing; choice
     camera_timeout: float = 1.0  # s that a camera has to show the arm; a sound one needs 0.2
@@ -477,15 +475,14 @@ class Motion(PlanningScene):
     ) -> list[FloatArray]:
         """Joint paths (k, n) from standoff to grasp; `model` counts away from what is grasped.
 
-        They touch the boxes `without` only if there are no others. Known boxes are rigid: nearer to them than the last
-        of the margins they lead only where the map is read optimistically and there are no others. `clearances`:
-        default as set.
+        They touch the boxes `without` only if there are no others. Known boxes are rigid: nearer to them than the arm
+        errs they lead only where the map is read optimistically and there are no others. `clearances`: default as set.
         """
         clearances, pick = clearances or self.parameters.clearances, self.parameters.pick
         gap, q = self.parameters.execution.jaw.open_gap, self.joints(arm)
         spared = ((), without) if without else ((),)
-        margins = (*self.parameters.box_margins, 0.0) if optimistic else self.parameters.box_margins
-        for grown, boxes in product(margins, spared):
+        errors = (self.parameters.arm_error, 0.0)[: 1 + optimistic]
+        for grown, boxes in product(errors, spared):
             near = self.model(arm, without=boxes, opening=gap, optimistic=optimistic, grown=grown)
             try:
                 return find_approaches(model, near, q, candidates, clearances, pick)
