@@ -22,7 +22,7 @@ class PrinterPerceptionParameters(PerceptionParameters):
     """Those of every task, and of the handle."""
 
     least_points: int = 200  # pixels of the handle with depth; choice: it has 2000 at 0.35 m
-    span: tuple[float, float] = (0.5, 99.5)  # percentiles of its points between which its middle lies; choice
+    span: tuple[float, float] = (0.5, 99.5)  # percentiles of its pixels between which its middle lies; choice
 
 
 class PrinterPerception(Perception):
@@ -44,17 +44,18 @@ class PrinterPerception(Perception):
 
     @counts_as("perception")
     def see_handle(self, camera: str, since: float) -> FloatArray | None:
-        """The middle (3,) m, world, of the handle as the newest frame shows it.
+        """The middle (3,) m, world, of the handle's front as the newest frame shows it.
 
-        x is that of its front. None while there is no frame from the time `since` (s) on, in trouble, or where too
-        little of the handle's colour has a depth.
+        It is the middle of what has the handle's colour, at the median of the depths there: these are missing in parts.
+        None while there is no frame from the time `since` (s) on, in trouble, or where too few pixels have a depth.
         """
         frame = self.frame(camera)
         if frame is None or frame.stamp < since or self.trouble(camera) is not None:
             return None
-        points = deproject(frame.depth, color_mask(frame.rgb, self._color) > 0, frame.intrinsics)
-        if len(points) < self.parameters.least_points:
+        mask = color_mask(frame.rgb, self._color) > 0
+        depths = deproject(frame.depth, mask, frame.intrinsics)[:, 2]
+        if len(depths) < self.parameters.least_points:
             return None
-        world = self.pose_of(frame).apply(points)
-        low, high = np.percentile(world, self.parameters.span, axis=0)
-        return np.array([np.median(world[:, 0]), *(0.5 * (low + high))[1:]])
+        v, u = np.percentile(np.argwhere(mask), self.parameters.span, axis=0).mean(axis=0)
+        k, depth = frame.intrinsics, float(np.median(depths))
+        return self.pose_of(frame).apply([depth * (u - k.cx) / k.fx, depth * (v - k.cy) / k.fy, depth])

@@ -1,5 +1,6 @@
 """The habitat's first job, end to end."""
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -59,11 +60,13 @@ def test_what_goes_wrong_for_good_ends_in_a_safe_stop_with_its_cause(
 
 def test_a_handle_that_is_not_where_the_robot_believes_it_is_found_by_looking(tmp_path: Path) -> None:
     cell = yaml.safe_load(shipped("cell")["habitat"].read_text(encoding="utf-8"))
-    cell["hidden"]["printer"]["handle_off"] = [0.02, 0.0]
+    cell["hidden"]["printer"]["handle_off"] = [0.02, -0.015]
     (tmp_path / "cell.yaml").write_text(yaml.safe_dump(cell))
     result = run([f"cell={tmp_path / 'cell.yaml'}"], tmp_path)
     assert result.succeeded, [str(e) for e in result.expectations]
-    assert "saw the handle" in (tmp_path / "run" / "events.jsonl").read_text()
+    events = map(json.loads, (tmp_path / "run" / "events.jsonl").read_text().splitlines())
+    off = next(event["off"] for event in events if event["event"] == "saw the handle")
+    assert off == pytest.approx([0.0, 0.02, -0.015], abs=6e-3)  # as far as arm and camera are off
 
 
 def test_the_same_seed_gives_the_same_bytes(tmp_path: Path) -> None:
