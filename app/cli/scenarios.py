@@ -158,7 +158,7 @@ def print_schema(
         bool, typer.Option("--markdown", help="A reference to read: each field, its meaning and an example.")
     ] = False,
     task: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Of which task; not needed while there is only one.")
+        str | None, typer.Option(metavar="NAME", help="Of which task; needed where several are installed.")
     ] = None,
 ) -> None:
     """Print what a scenario file may say.
@@ -168,13 +168,13 @@ def print_schema(
     \b
     With the YAML language server (VS Code, Neovim, Emacs) an editor completes
     and checks scenario files:
-      regrasp scenarios schema --task cable > scenario.schema.json
+      regrasp scenarios schema --task NAME > scenario.schema.json
     and as the first line of your scenario, with the path from it to that file:
       # yaml-language-server: $schema=scenario.schema.json
 
     \b
     To read it yourself:
-      regrasp scenarios schema --task cable --markdown
+      regrasp scenarios schema --task NAME --markdown
     """
     from regrasp.app.files.schema_doc import markdown
     from regrasp.app.scenario.schema import json_schema, scenario_model
