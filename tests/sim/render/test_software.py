@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pybullet as p
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
@@ -81,13 +81,17 @@ def depth_range(image: Image) -> NDArray[np.float32]:
 
 
 @settings(max_examples=150)
+@example(
+    [(0.0, 0.0, 0.0, 0.0, 0.0, 0.5), (-0.0766790360212326, 0.0, 0.03515625, 0.0004, -0.5319495797157288, 0.0)]
+    + [(0.0,) * 6] * 3
+)
 @given(POSES)
 def test_both_renderers_draw_the_same(
     software: SoftwareRenderer, opengl: GlRenderer, places: list[tuple[float, ...]]
 ) -> None:
     poses = placed(places)
     ours, theirs = (r.render(poses, RigidTransform.identity(), K, LIGHT) for r in (software, opengl))
-    inside = away_from_edges(theirs)
+    inside = away_from_edges(ours) & away_from_edges(theirs)  # a plate seen edge-on is a line that either may end first
     assert np.array_equal(ours.ids[inside], theirs.ids[inside])
     assert (ours.ids != theirs.ids).mean() < 2e-3
     # OpenGL moves corners by up to 1/512 of a pixel
