@@ -1,4 +1,6 @@
-"""Bodies that do not move by themselves: boxes, and props without a collision shape."""
+"""Bodies: a link of one, and those that do not move by themselves: boxes, and props without a collision shape."""
+
+from dataclasses import dataclass
 
 import numpy as np
 import pybullet as p
@@ -9,6 +11,15 @@ from regrasp.interfaces.scene import Prop
 
 # Where bodies are that nobody shall see: below the floor, and near, since the shadow map must span all bodies.
 OUT_OF_SIGHT = RigidTransform.from_translation([0.2, 0.0, -0.4])
+
+
+@dataclass(frozen=True)
+class BodyLink:
+    """A link of a body in a PyBullet client; -1 is the base."""
+
+    client: int
+    body: int
+    link: int = -1
 
 
 def build_box(client: int, box: Box, turn: Rotation | None = None, friction: float = 0.5) -> int:

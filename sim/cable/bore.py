@@ -9,8 +9,8 @@ import pybullet as p
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import FloatArray
+from regrasp.sim.bodies import BodyLink
 from regrasp.sim.cable.cable import BodyState
-from regrasp.sim.cable.fixtures import BodyLink
 
 
 @dataclass(frozen=True)

@@ -1,34 +1,21 @@
-"""Holders of the connector in the cell, and their bodies: a socket with a pull-out force, and a snap-in clip.
+"""What holds the connector in the cell: the bodies of sockets and clip, and the model of a snap-in clip.
 
-Both are physical models with stated numbers. Neither depends on the gripper, so neither helps the robot.
+The model has stated numbers, and does not depend on the gripper, so it does not help the robot.
 """
 
 import math
-import operator
-from collections import deque
 from dataclasses import dataclass
 
 import numba
 import numpy as np
 import pybullet as p
-from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cable.cell import Clip, KnownCable
 from regrasp.interfaces.cell import Box
-from regrasp.sim.bodies import build_box
+from regrasp.sim.bodies import BodyLink, build_box
 from regrasp.sim.cable.cable import BodyState
 from regrasp.sim.render.fiducials import compound_visual, tag_boxes
-
-
-@dataclass(frozen=True)
-class HoldParameters:
-    """The constraint that fixes a plugged connector."""
-
-    constraint_force: float = 1e4  # N, limit of the constraint itself: far above the forces at which it is released
-    force_window: int = (
-        5  # physics steps over which the force is averaged, so that a solver's spike does not release it
-    )
 
 
 @dataclass(frozen=True)
@@ -53,93 +40,6 @@ def build_fixtures(client: int, cable: KnownCable) -> dict[str, int]:
         world_from_tag = cable.clip.world_from_seat * tag.body_from_tag
         p.createMultiBody(0, -1, compound_visual(client, tag_boxes(tag), world_from_tag), physicsClientId=client)
     return bodies
-
-
-@dataclass(frozen=True)
-class BodyLink:
-    """A link of a body in a PyBullet client; -1 is the base."""
-
-    client: int
-    body: int
-    link: int
-
-
-class Hold:
-    """A fixed constraint between the world and a link at the pose `at`, world_from_link."""
-
-    def __init__(self, link: BodyLink, at: RigidTransform, parameters: HoldParameters = HoldParameters()) -> None:
-        self._client, self._max_force = link.client, parameters.constraint_force
-        # Child frame in the world; the parent frame is the link's centre.
-        self._constraint: int | None = p.createConstraint(
-            link.body,
-            link.link,
-            -1,
-            -1,
-            p.JOINT_FIXED,
-            [0, 0, 0],
-            [0, 0, 0],
-            at.translation.tolist(),
-            [0, 0, 0, 1],
-            at.rotation.as_quat().tolist(),
-            physicsClientId=link.client,
-        )
-        p.changeConstraint(self._constraint, maxForce=self._max_force, physicsClientId=link.client)
-        self._forces: deque[tuple[float, float, float]] = deque(maxlen=parameters.force_window)
-
-    def move(self, position: list[float], quaternion: list[float]) -> None:
-        """Move the constraint to that pose in the world, and the link with it; for laying the cable before a run."""
-        p.changeConstraint(
-            self._constraint,
-            position,
-            jointChildFrameOrientation=quaternion,
-            maxForce=self._max_force,
-            physicsClientId=self._client,
-        )
-
-    def force(self) -> list[float]:
-        """Add the last step's constraint force, and return the mean (3,) N over the window, in the world frame."""
-        self._forces.append(p.getConstraintState(self._constraint, physicsClientId=self._client)[:3])
-        return [sum(along) / len(self._forces) for along in zip(*self._forces, strict=True)]
-
-    def release(self) -> None:
-        """Remove the constraint."""
-        if self._constraint is not None:
-            p.removeConstraint(self._constraint, physicsClientId=self._client)
-            self._constraint = None
-
-
-class SocketHold:
-    """A socket with a plug in it. It releases the plug when this is pulled against `axis` (3,) with `pull_out_force` N.
-
-    `axis` is the direction in which the plug goes in. A force across it, as a closing gripper makes, does not release
-    the plug. With `axis` None, for a stand, a force of that size in any direction does. `getConstraintState` gives the
-    constraint's reaction in the world frame (measured), so a pull along -axis reads as a force along +axis.
-    """
-
-    def __init__(self, hold: Hold, axis: FloatArray | None, pull_out_force: float) -> None:
-        self._hold: Hold | None = hold
-        self._axis = None if axis is None else (axis / np.linalg.norm(axis)).tolist()
-        self._limit = pull_out_force
-
-    @property
-    def holds(self) -> bool:
-        """Whether the plug is still in."""
-        return self._hold is not None
-
-    def release(self) -> None:
-        """Let the plug go."""
-        if self._hold is not None:
-            self._hold.release()
-            self._hold = None
-
-    def step(self) -> None:
-        """Check the force; call after every physics step."""
-        if self._hold is None:
-            return
-        force = self._hold.force()
-        pull = math.hypot(*force) if self._axis is None else sum(map(operator.mul, force, self._axis))
-        if pull > self._limit:
-            self.release()
 
 
 class ClipHold:

@@ -5,9 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation, Slerp
 
+from regrasp.sim.bodies import BodyLink
 from regrasp.sim.cable.cable import CableBody
-from regrasp.sim.cable.fixtures import BodyLink, Hold
 from regrasp.sim.engine import Engine
+from regrasp.sim.hold import Hold
 
 
 @dataclass(frozen=True)

@@ -25,9 +25,10 @@ import pybullet as p
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cable.cell import Connector, Socket
 from regrasp.interfaces.cell import pose_along
+from regrasp.sim.bodies import BodyLink
 from regrasp.sim.cable.bore import Bore, BoreParameters
 from regrasp.sim.cable.cable import BodyState
-from regrasp.sim.cable.fixtures import BodyLink, x_axis
+from regrasp.sim.cable.fixtures import x_axis
 
 
 @dataclass(frozen=True)

@@ -12,15 +12,17 @@ from scipy.spatial.transform import RigidTransform
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cable.cell import PLUGGED_INTO, CableCell
 from regrasp.interfaces.scene import Gravity, SceneSetup
+from regrasp.sim.bodies import BodyLink
 from regrasp.sim.cable.cable import BodyState, CableBody, CableParameters, build_cable
 from regrasp.sim.cable.effects import effects_on
-from regrasp.sim.cable.fixtures import BodyLink, ClipHold, ClipParameters, SocketHold, build_fixtures
+from regrasp.sim.cable.fixtures import ClipHold, ClipParameters, build_fixtures
 from regrasp.sim.cable.laying import LayingParameters, lay_cable
 from regrasp.sim.cable.mouth import MouthParameters, SocketMouth
 from regrasp.sim.cable.phase import PhaseParameters, PhaseWatch
 from regrasp.sim.engine import Engine
 from regrasp.sim.faults.effects import TaskEffects
 from regrasp.sim.faults.faults import TriggerState
+from regrasp.sim.hold import Catch
 from regrasp.sim.objects import TaskObjects
 from regrasp.sim.render.renderer import RendererName
 from regrasp.sim.robot.arm import SimArm
@@ -52,7 +54,7 @@ class CableObjects(TaskObjects):
     """
 
     cable: CableBody
-    socket: SocketHold
+    socket: Catch
     clip: ClipHold
     mouths: dict[str, SocketMouth]
 
@@ -188,15 +190,15 @@ class CableObjects(TaskObjects):
             for body in clamp:
                 engine.let_pass(cable.body, link, body)
 
-    def _plug(self, engine: Engine) -> SocketHold:
+    def _plug(self, engine: Engine) -> Catch:
         """Lay the straight cable into its socket or on its stand, before the run's time begins."""
         known = self.cell.known.cable
         socket, stand = known.socket(PLUGGED_INTO), self._stand
         goal = socket.world_from_plug(known.connector.length) if stand is None else stand
         hold = lay_cable(engine, self.cable, goal, self._parameters.laying)
         if stand is None:
-            return SocketHold(hold, np.asarray(socket.axis), socket.pull_out_force)
-        return SocketHold(hold, None, self._parameters.stand_force)
+            return Catch(hold, np.asarray(socket.axis), socket.pull_out_force)
+        return Catch(hold, None, self._parameters.stand_force)
 
     def _open_mouths(self) -> dict[str, SocketMouth]:
         known, link = self.cell.known.cable, BodyLink(self._client, self.cable.body, self.cable.connector_link)

@@ -8,8 +8,9 @@ from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cable.cell import CableCell
+from regrasp.sim.bodies import BodyLink
 from regrasp.sim.cable.cable import BodyState
-from regrasp.sim.cable.fixtures import BodyLink, ClipHold
+from regrasp.sim.cable.fixtures import ClipHold
 from regrasp.sim.cable.mouth import SocketMouth
 
 

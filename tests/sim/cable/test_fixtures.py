@@ -6,8 +6,9 @@ from free_plug import FreePlug, free_plug
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from regrasp.interfaces.cable.cell import CableCell
-from regrasp.sim.cable.fixtures import ClipHold, ClipParameters, Hold, SocketHold
+from regrasp.sim.cable.fixtures import ClipHold, ClipParameters
 from regrasp.sim.cable.objects import CableObjectsParameters
+from regrasp.sim.hold import Catch, Hold
 
 STAND_FORCE = CableObjectsParameters().stand_force
 RAMP = 2.0  # N/s
@@ -134,7 +135,7 @@ def test_what_was_pulled_out_is_taken_again_only_after_it_left(cell: CableCell, 
 
 @pytest.mark.parametrize(("force", "stays"), [(5.0, True), (9.5, True), (10.5, False), (15.0, False)])
 def test_a_socket_lets_go_at_its_pull_out_force(plug: FreePlug, force: float, stays: bool) -> None:
-    socket = SocketHold(Hold(plug.link, RigidTransform.identity()), np.array([0.0, 1.0, 0.0]), 10.0)
+    socket = Catch(Hold(plug.link, RigidTransform.identity()), np.array([0.0, 1.0, 0.0]), 10.0)
     for _ in range(480):
         plug.advance(plug.step, force=np.array([0.0, -force, 0.0]))
         socket.step()
@@ -144,7 +145,7 @@ def test_a_socket_lets_go_at_its_pull_out_force(plug: FreePlug, force: float, st
 
 
 def test_a_single_steps_spike_does_not_unplug(plug: FreePlug) -> None:
-    socket = SocketHold(Hold(plug.link, RigidTransform.identity()), np.array([0.0, 1.0, 0.0]), 10.0)
+    socket = Catch(Hold(plug.link, RigidTransform.identity()), np.array([0.0, 1.0, 0.0]), 10.0)
     for i in range(100):
         plug.advance(plug.step, force=np.array([40.0 if i == 50 else 0.0, 0.0, 0.0]))
         socket.step()
@@ -156,7 +157,7 @@ def test_a_single_steps_spike_does_not_unplug(plug: FreePlug) -> None:
 def test_a_stand_lets_go_at_its_force_whichever_way(
     plug: FreePlug, direction: tuple[float, float, float], share: float, stays: bool
 ) -> None:
-    stand = SocketHold(Hold(plug.link, RigidTransform.identity()), None, STAND_FORCE)
+    stand = Catch(Hold(plug.link, RigidTransform.identity()), None, STAND_FORCE)
     for _ in range(480):
         plug.advance(plug.step, force=share * STAND_FORCE * np.asarray(direction))
         stand.step()
