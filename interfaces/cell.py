@@ -167,3 +167,5 @@ class Cell(Model):
 
     known: KnownCell
     hidden: HiddenWorld
+    # from where a run is filmed: behind and above the right one of two arms at the origin, unless a file says otherwise
+    viewpoint: FixedMount = FixedMount(position=(-0.55, -0.75, 0.85), pitch_down_deg=30.0, yaw_deg=38.0)

@@ -27,13 +27,19 @@ def build_box(client: int, box: Box, turn: Rotation | None = None, friction: flo
 
     `friction` is its coefficient.
     """
-    half = [s / 2 for s in box.size]
-    collision = p.createCollisionShape(p.GEOM_BOX, halfExtents=half, physicsClientId=client)
-    visual = p.createVisualShape(p.GEOM_BOX, halfExtents=half, rgbaColor=[*box.color, 1], physicsClientId=client)
+    collision, visual = box_shapes(client, box)
     turn = Rotation.identity() if turn is None else turn
     body = p.createMultiBody(0, collision, visual, box.center, turn.as_quat().tolist(), physicsClientId=client)
     p.changeDynamics(body, -1, lateralFriction=friction, physicsClientId=client)
     return int(body)
+
+
+def box_shapes(client: int, box: Box) -> tuple[int, int]:
+    """The ids of a box's collision shape and of its visual shape."""
+    half = [s / 2 for s in box.size]
+    collision = p.createCollisionShape(p.GEOM_BOX, halfExtents=half, physicsClientId=client)
+    visual = p.createVisualShape(p.GEOM_BOX, halfExtents=half, rgbaColor=[*box.color, 1], physicsClientId=client)
+    return int(collision), int(visual)
 
 
 def build_prop(client: int, prop: Prop) -> int:

@@ -5,7 +5,7 @@ from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regrasp.app.run.video import OVERVIEW_SIZE, RgbImage, VideoWriter, compose
-from regrasp.interfaces.cell import FixedMount
 from regrasp.interfaces.frame import Intrinsics
 from regrasp.interfaces.wall_time import counts_as
 from regrasp.sim.render.picture import LightState
@@ -29,9 +28,6 @@ class FilmParameters:
     """How a run is filmed."""
 
     rate: int = 10  # frames per simulated second; choice: every other tick
-    overview: FixedMount = field(  # behind and above the right arm
-        default_factory=lambda: FixedMount(position=(-0.55, -0.75, 0.85), pitch_down_deg=30.0, yaw_deg=38.0)
-    )
     cameras: int = 2  # that are shown, at most; the picture has room for two
     shrink: int = 2  # of the cameras' pictures, which are shown this much smaller
     overview_fov: float = 0.95  # rad, horizontal; the whole cell is in the picture
@@ -108,7 +104,13 @@ class Film:
     ) -> None:
         renderer = self._renderer.result()
         cameras = [(name, None if preview is None else preview(renderer)) for name, preview in previews]
-        writer.write(compose(render_overview(renderer, poses(), light, self._parameters), cameras, lines))
+        writer.write(compose(self._overview(renderer, poses(), light), cameras, lines))
+
+    def _overview(self, renderer: Renderer, poses: NDArray[np.float32], light: LightState) -> RgbImage:
+        """The cell from its viewpoint: (480, 856, 3) uint8 RGB; `poses` are a `Visuals.snapshot`."""
+        intrinsics = Intrinsics.from_fov(*OVERVIEW_SIZE, self._parameters.overview_fov)
+        viewpoint = self._world.cell.viewpoint.world_from_camera
+        return np.asarray(renderer.render_color(poses, viewpoint, intrinsics, light))
 
     def _wait(self, count: int) -> None:
         """Wait until no more than `count` frames wait to be drawn. Raises, once, what went wrong in the thread."""
@@ -123,11 +125,3 @@ class Film:
         """Close the renderer in the thread that made it, as OpenGL wants it."""
         with suppress(Exception):  # if it could not be made, a frame has raised that
             self._thread.submit(lambda: self._renderer.result().close()).result()
-
-
-def render_overview(
-    renderer: Renderer, poses: NDArray[np.float32], light: LightState, parameters: FilmParameters = FilmParameters()
-) -> RgbImage:
-    """The whole cell from behind and above the right arm: (480, 856, 3) uint8 RGB; `poses` are a `Visuals.snapshot`."""
-    intrinsics = Intrinsics.from_fov(*OVERVIEW_SIZE, parameters.overview_fov)
-    return np.asarray(renderer.render_color(poses, parameters.overview.world_from_camera, intrinsics, light))

@@ -53,7 +53,7 @@ class PrinterMotion(Motion):
         on_anomaly: Callable[[str], None] = lambda sentence: None,
     ) -> None:
         super().__init__(known, arms, grippers, clock, seed, parameters, on_anomaly)
-        self._fixed, self._door = list(self._boxes), known.printer.door
+        self._fixed, self._door = [*self._boxes, *known.printer.fixtures()], known.printer.door
         self._off, self._slid = np.zeros(3), False  # m from where the handle should be on the door; was it pulled?
         self.believe_door(0.0)
 

@@ -1,4 +1,4 @@
-"""The printer's objects in the world: its door."""
+"""The printer's objects in the world: its door, the part on its plate, and the clamp on the desk."""
 
 from collections.abc import Mapping
 
@@ -8,19 +8,27 @@ from regrasp.sim.engine import Engine
 from regrasp.sim.faults.effects import Effect, TaskEffects
 from regrasp.sim.faults.faults import TriggerState
 from regrasp.sim.objects import TaskObjects
+from regrasp.sim.printer.clamp import SimClamp
 from regrasp.sim.printer.door import SimDoor
+from regrasp.sim.printer.part import SimPart
 from regrasp.sim.robot.arm import SimArm
 
 
 class PrinterObjects(TaskObjects):
-    """The door. An arm may touch its handle, and nothing else of it."""
+    """The door, the part on its plate, and the clamp.
+
+    An arm may touch the door's handle and the part's gripping section, and nothing else of them.
+    """
 
     def __init__(self, cell: PrinterCell) -> None:
         self.cell = cell
 
     def build_moving(self, engine: Engine, arms: Mapping[str, SimArm]) -> None:
         """See `TaskObjects`."""
-        self.door = SimDoor(engine.client, self.cell.known.printer.door, self.cell.hidden.printer)
+        known, hidden = self.cell.known.printer, self.cell.hidden.printer
+        self.part = SimPart(engine, known, hidden)
+        self.clamp = SimClamp(engine.client, known, hidden)
+        self.door = SimDoor(engine.client, known.door, hidden)
 
     def effects(self) -> TaskEffects:
         """See `TaskObjects`."""
@@ -31,10 +39,19 @@ class PrinterObjects(TaskObjects):
 
         return {DoorJams: jams}
 
+    def after_step(self) -> None:
+        """See `TaskObjects`: the catch or the bond may let go."""
+        self.part.step()
+
     def update_triggers(self, now: float, triggers: TriggerState) -> None:
         """See `TaskObjects`: the share of its travel that the door has been opened."""
         triggers.shares["opened"] = self.door.opening / self.cell.known.printer.door.travel
 
     def forbidden(self) -> Mapping[tuple[int, int], str]:
-        """See `TaskObjects`: the door without its handle."""
-        return {(self.door.body, self.door.panel_link): "door"}
+        """See `TaskObjects`: the door without its handle, the part without its gripping section, plate and clamp."""
+        return {
+            (self.door.body, self.door.panel_link): "door",
+            (self.part.part, -1): "part",
+            (self.part.plate, -1): "plate",
+            **{(self.clamp.body, jaw): "clamp" for jaw in self.clamp.jaws},
+        }

@@ -1,0 +1,74 @@
+"""The clamp on the desk: two jaws that press on a plate between them."""
+
+import pybullet as p
+
+from regrasp.interfaces.cell import Box
+from regrasp.interfaces.printer.cell import HiddenPrinter, KnownPrinter
+from regrasp.sim.bodies import box_shapes
+
+
+class SimClamp:
+    """Two jaws on slides along y, each with a drive of its own; they begin open.
+
+    Nothing but the jaws' force and friction holds the plate. `jaws` are their links.
+    """
+
+    jaws = (0, 1)  # the first closes towards +y, the second towards -y
+
+    def __init__(self, client: int, known: KnownPrinter, hidden: HiddenPrinter) -> None:
+        self._client, self._hidden = client, hidden
+        clamp, plate = known.clamp, known.plate
+        size = clamp.jaw_size
+        out = 0.5 * (plate.size[1] + size[1]) + clamp.stroke
+        up = 0.5 * (plate.size[2] - size[2]) + clamp.above
+        jaw = Box(name="jaw", center=(0.0, 0.0, 0.0), size=size, color=clamp.color)
+        shapes = [box_shapes(client, jaw) for _ in self.jaws]
+        level = [0.0, 0.0, 0.0, 1.0]
+        self.body = int(
+            p.createMultiBody(
+                baseMass=0,
+                basePosition=list(clamp.center),
+                linkMasses=[0.2, 0.2],
+                linkCollisionShapeIndices=[shape[0] for shape in shapes],
+                linkVisualShapeIndices=[shape[1] for shape in shapes],
+                linkPositions=[[0.0, -out, up], [0.0, out, up]],
+                linkOrientations=[level, level],
+                linkInertialFramePositions=[[0.0, 0.0, 0.0]] * 2,
+                linkInertialFrameOrientations=[level, level],
+                linkParentIndices=[0, 0],
+                linkJointTypes=[p.JOINT_PRISMATIC] * 2,
+                linkJointAxis=[[0, 1, 0], [0, -1, 0]],
+                physicsClientId=client,
+            )
+        )
+        most = clamp.stroke + 0.25 * plate.size[1]  # where nothing lies between them
+        for link in self.jaws:
+            p.changeDynamics(
+                self.body,
+                link,
+                lateralFriction=1.0,  # PyBullet multiplies it with the plate's
+                jointLowerLimit=0.0,
+                jointUpperLimit=most,
+                physicsClientId=client,
+            )
+        self.open()
+
+    def close(self) -> None:
+        """Close the jaws, and press with their force from now on."""
+        self._drive(0.02, self._hidden.clamp_force)
+
+    def open(self) -> None:
+        """Open the jaws."""
+        self._drive(-0.02, self._hidden.clamp_force)
+
+    def travel(self) -> tuple[float, float]:
+        """How far, m, each jaw has gone in from where it is open."""
+        first, second = p.getJointStates(self.body, self.jaws, physicsClientId=self._client)
+        return float(first[0]), float(second[0])
+
+    def _drive(self, speed: float, force: float) -> None:
+        """Let each jaw go in with a speed (m/s) and at most a force (N)."""
+        for link in self.jaws:
+            p.setJointMotorControl2(
+                self.body, link, p.VELOCITY_CONTROL, targetVelocity=speed, force=force, physicsClientId=self._client
+            )

@@ -1,0 +1,131 @@
+"""The printed part on its build plate: what bonds it there, and the catch that holds the plate."""
+
+import math
+
+import numpy as np
+import pybullet as p
+from scipy.spatial.transform import RigidTransform, Rotation
+
+from regrasp.interfaces.cell import Box
+from regrasp.interfaces.printer.cell import Bond, HiddenPrinter, KnownPrinter
+from regrasp.sim.bodies import BodyLink, box_shapes
+from regrasp.sim.engine import Engine
+from regrasp.sim.hold import Catch, Hold
+
+_OUT = (1.0, 0.0, 0.0)  # the way out of the printer, world
+
+
+class PartBond:
+    """The bond between a part and the plate under it. It breaks once it bears more than `limits`, and stays broken.
+
+    `hold` is a constraint between the two whose link has the plate's axes and whose pivot lies in the middle of the
+    bond. A pressure breaks nothing.
+    """
+
+    def __init__(self, hold: Hold, limits: Bond) -> None:
+        self._hold: Hold | None = hold
+        self._limits = limits
+
+    @property
+    def holds(self) -> bool:
+        """Whether the part is still bonded."""
+        return self._hold is not None
+
+    def step(self, normal: tuple[float, float, float]) -> bool:
+        """Whether it breaks now; call after every physics step with the plate's normal in the world's axes."""
+        if self._hold is None:
+            return False
+        x, y, z, about_x, about_y, about_z = self._hold.wrench()
+        along = x * normal[0] + y * normal[1] + z * normal[2]
+        limits = self._limits
+        # The part is the constraint's parent: a pull up on it reads as a force down.
+        over = (
+            math.sqrt(max(x * x + y * y + z * z - along * along, 0.0)) > limits.shear
+            or -along > limits.normal
+            or math.hypot(about_x, about_y) > limits.tilt
+            or abs(about_z) > limits.twist
+        )
+        if over:
+            self._hold.release()
+            self._hold = None
+        return over
+
+
+class SimPart:
+    """The part with its gripping section, bonded to the plate, and the plate in its catch.
+
+    `section_link` is the section's link of the body `part`. The catch lets the plate go out of the printer, along x.
+    """
+
+    section_link = 0
+
+    def __init__(self, engine: Engine, known: KnownPrinter, hidden: HiddenPrinter) -> None:
+        self._engine = engine
+        self.plate = self._build_plate(known, hidden)
+        self.part = self._build_part(known, hidden)
+        engine.let_pass(self.part, -1, self.plate)  # as long as it is bonded
+        plate_at, part_at = (RigidTransform.from_translation(at) for at in (known.plate.center, known.part.center))
+        self.catch = Catch(Hold(BodyLink(engine.client, self.plate), plate_at), -np.array(_OUT), hidden.catch_force)
+        foot = (0.0, 0.0, -0.5 * known.part.size[2])
+        hold = Hold(BodyLink(engine.client, self.part), plate_at.inv() * part_at, base=self.plate, pivot=foot)
+        self.bond = PartBond(hold, hidden.bond)
+
+    def pose(self, body: int) -> RigidTransform:
+        """The true pose of the plate's or the part's middle, world_from_body."""
+        position, quaternion = p.getBasePositionAndOrientation(body, physicsClientId=self._engine.client)
+        return RigidTransform.from_components(position, Rotation.from_quat(quaternion))
+
+    def step(self) -> None:
+        """Check what holds the two; call after every physics step."""
+        self.catch.step()
+        if self.bond.holds:
+            x, y, z, w = p.getBasePositionAndOrientation(self.plate, physicsClientId=self._engine.client)[1]
+            if self.bond.step((2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y))):
+                self._engine.let_meet(self.part, -1, self.plate)
+
+    def _build_plate(self, known: KnownPrinter, hidden: HiddenPrinter) -> int:
+        plate, client = known.plate, self._engine.client
+        box = Box(name="plate", center=plate.center, size=plate.size, color=plate.color)
+        collision, visual = box_shapes(client, box)
+        body = int(p.createMultiBody(hidden.plate_mass, collision, visual, box.center, physicsClientId=client))
+        self._loose(body, -1, hidden.plate_friction)
+        return body
+
+    def _build_part(self, known: KnownPrinter, hidden: HiddenPrinter) -> int:
+        part, section = known.part.blocks()
+        client, level = self._engine.client, [0.0, 0.0, 0.0, 1.0]
+        shapes = [box_shapes(client, block) for block in (part, section)]
+        volumes = np.prod([part.size, section.size], axis=1)
+        masses = hidden.part_mass * volumes / volumes.sum()
+        body = int(
+            p.createMultiBody(
+                float(masses[0]),
+                *shapes[0],
+                part.center,
+                linkMasses=[float(masses[1])],
+                linkCollisionShapeIndices=[shapes[1][0]],
+                linkVisualShapeIndices=[shapes[1][1]],
+                linkPositions=[np.subtract(section.center, part.center).tolist()],
+                linkOrientations=[level],
+                linkInertialFramePositions=[[0.0, 0.0, 0.0]],
+                linkInertialFrameOrientations=[level],
+                linkParentIndices=[0],
+                linkJointTypes=[p.JOINT_FIXED],
+                linkJointAxis=[[0, 0, 1]],
+                physicsClientId=client,
+            )
+        )
+        for link in (-1, self.section_link):
+            self._loose(body, link, hidden.part_friction)
+        return body
+
+    def _loose(self, body: int, link: int, friction: float) -> None:
+        """What moves without air about it: no damping."""
+        p.changeDynamics(
+            body,
+            link,
+            lateralFriction=friction,
+            linearDamping=0.0,
+            angularDamping=0.0,
+            physicsClientId=self._engine.client,
+        )
