@@ -12,6 +12,7 @@ import pytest
 from regrasp.app.run import film as film_module
 from regrasp.app.run.film import Film, FilmParameters
 from regrasp.app.run.video import OVERVIEW_SIZE, SIZE
+from regrasp.interfaces.cell import FixedMount
 from regrasp.sim.world import World
 
 TICK = 0.05
@@ -24,6 +25,7 @@ def a_world() -> Any:
     world.visuals = SimpleNamespace(deferred_snapshot=lambda: partial(float, world.t))
     world.cameras = {name: SimpleNamespace(deferred_preview=lambda shrink: None) for name in ("rear", "wrist")}
     world.renderer = SimpleNamespace(name="toy")
+    world.cell = SimpleNamespace(viewpoint=FixedMount(position=(0.0, 0.0, 0.0), pitch_down_deg=0.0))
     return world
 
 
