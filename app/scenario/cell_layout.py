@@ -18,7 +18,7 @@ from regrasp.app.scenario.shapes import (
     sleeping_arm_cubes,
 )
 from regrasp.interfaces.arrays import FloatArray
-from regrasp.interfaces.cell import Box, KnownCell
+from regrasp.interfaces.cell import ArmSpec, Box, KnownCell
 from regrasp.interfaces.quote import cut
 
 
@@ -132,3 +132,23 @@ def box_parts(path: Path, boxes: Sequence[Box]) -> list[Part]:
     return [
         Part((*path, i), box.name, np.array(box.center), half_edges(np.eye(3), box.size)) for i, box in enumerate(boxes)
     ]
+
+
+def out_of_reach(arm: ArmSpec, place: FloatArray) -> str | None:
+    """How far a place (3,) m is from an arm's shoulder, in words, if that is further than its links; None if not.
+
+    The shoulder of an arm on a rail is where the rail brings it nearest.
+    """
+    chain, rail = arm.robot.chain, arm.robot.rail
+    first = int(rail is not None)
+    shoulder = arm.world_from_base.apply(chain.origins[: first + 2].sum(axis=0))
+    if rail is not None:
+        axis = arm.world_from_base.rotation.apply(np.eye(3)["xyz".index(rail.axis)])
+        shoulder = shoulder + axis * np.clip((place - shoulder) @ axis, rail.lower, rail.upper)
+    reach = float(
+        np.linalg.norm(chain.origins[first + 2 :], axis=1).sum() + np.linalg.norm(chain.last_from_tool[:3, 3])
+    )
+    way = float(np.linalg.norm(place - shoulder))
+    if way <= reach:
+        return None
+    return f"{way:.2f} m from the {arm.name} arm's shoulder, which reaches {reach:.2f} m"

@@ -15,6 +15,7 @@ from regrasp.app.scenario.cell_layout import (
     Part,
     arm_bases,
     box_parts,
+    out_of_reach,
     overlap_findings,
     reaches,
 )
@@ -171,18 +172,10 @@ def _cable(document: Document, cell: CableCell) -> Iterator[Finding]:
 
 
 def _clip(document: Document, known: CableKnown) -> Iterator[Finding]:
-    arm = known.arm(known.cable.hand)
-    chain, first = arm.robot.chain, int(arm.robot.rail is not None)
-    shoulder = arm.world_from_base.apply(chain.origins[: first + 2].sum(axis=0))
-    reach = float(
-        np.linalg.norm(chain.origins[first + 2 :], axis=1).sum() + np.linalg.norm(chain.last_from_tool[:3, 3])
-    )
-    if arm.robot.rail:
-        reach += arm.robot.rail.upper - arm.robot.rail.lower
-    way = float(np.linalg.norm(np.asarray(known.cable.clip.seat) - shoulder))
-    if way > reach:
-        message = f"the clip is {way:.2f} m from the {known.cable.hand} arm's shoulder, which reaches {reach:.2f} m"
-        yield Finding(*document.place(("known", "cable", "clip", "seat")), f"{message}; move it nearer")
+    trouble = out_of_reach(known.arm(known.cable.hand), np.asarray(known.cable.clip.seat))
+    if trouble is not None:
+        message = f"the clip is {trouble}; move it nearer"
+        yield Finding(*document.place(("known", "cable", "clip", "seat")), message)
 
 
 def _plug(document: Document, known: CableKnown) -> Iterator[Finding]:

@@ -10,6 +10,7 @@ TASK = Task(
     about="Open the door of a habitat's 3D printer with a robot on a rail.",
     objects=Part("regrasp.sim.printer.objects:PrinterObjects"),
     cell=Part("regrasp.interfaces.printer.cell:PrinterCell"),
+    cell_findings=Part(f"{_HERE}.cell_layout:cell_findings"),
     expect=Part(f"{_HERE}.expectations:Expect"),
     causes=Part("regrasp.interfaces.printer.cause:PrinterCause"),
     when=Part("regrasp.interfaces.printer.fault:PrinterWhen"),
