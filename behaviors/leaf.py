@@ -10,8 +10,7 @@ from py_trees.ports import BehaviourWithPorts, PortInformation
 from regrasp.behaviors.keys import CAUSES, Keys, MissingKeyError, WithKeys
 from regrasp.behaviors.services import Services
 from regrasp.interfaces.cause import Cause, CauseCode, ServiceError
-from regrasp.interfaces.request import Request
-from regrasp.motion.failure import PlanningError
+from regrasp.interfaces.request import Request, RequestError
 
 T = TypeVar("T")
 LeafSteps = Generator[Request[Any] | None, None, None]
@@ -102,7 +101,7 @@ class StepsLeaf(Leaf):
     """A leaf whose work is a sequence: `steps()` yields a `Request` to be done, or None to wait for a tick.
 
     It ends in SUCCESS when the steps end, and in FAILURE when they raise `LeafFailed` or a request raises
-    PlanningError.
+    RequestError.
     """
 
     INPUT_PORTS: ClassVar[dict[str, Any]] = {}
@@ -126,7 +125,7 @@ class StepsLeaf(Leaf):
                     return Status.RUNNING
         except StopIteration:
             return Status.SUCCESS
-        except (PlanningError, LeafFailed) as error:
+        except (RequestError, LeafFailed) as error:
             return self.fail(error.code, str(error))
         return Status.RUNNING
 
@@ -138,7 +137,7 @@ class StepsLeaf(Leaf):
             self._work.close()
 
     def ask(self, request: Request[T]) -> Generator[Request[Any] | None, None, T]:
-        """Steps that do a request and return its answer, for a leaf that needs it, or that handles its PlanningError.
+        """Steps that do a request and return its answer, for a leaf that needs it, or that handles its RequestError.
 
         The request stops with the leaf.
         """

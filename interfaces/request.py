@@ -8,6 +8,14 @@ from regrasp.interfaces.wall_time import Part, counts_as
 T = TypeVar("T")
 
 
+class RequestError(Exception):
+    """A request cannot be done; `code` is the cause, the message says why, with numbers."""
+
+    def __init__(self, code: str, message: str) -> None:
+        super().__init__(message)
+        self.code = code
+
+
 class Request(Generic[T]):
     """Work under way; every `poll` does one step of it.
 
@@ -27,7 +35,7 @@ class Request(Generic[T]):
         self._step = counts_as(part)(self._next)
 
     def poll(self) -> bool:
-        """Whether it is done. Raises what its steps raise, as PlanningError with the cause when it cannot be done."""
+        """Whether it is done. Raises what its steps raise, as RequestError with the cause when it cannot be done."""
         return self._step()
 
     def cancel(self) -> None:

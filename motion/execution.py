@@ -47,6 +47,7 @@ class JawParameters:
 
     open_gap: float = 0.05  # m between the pads: 15 mm to each side of the connector; poses err by about 8 mm
     slack: float = 0.005  # m short of its gap that a jaw counts as open; choice
+    tolerance: float = 0.003  # m off its gap that a jaw counts as there: three times the encoder's backlash
     attempts: int = 3  # times that a jaw is told to open; choice
     timeout: float = 1.0  # s that it has each time; choice
     grip: GripParameters = field(default_factory=GripParameters)
@@ -205,6 +206,34 @@ class Execution:
                 yield
         message = f"the {arm} jaw stands {1e3 * gripper.reading().gap:.1f} mm open, told {jaw.attempts} times to open"
         raise self.give_up(arm, CauseCode.GRIPPER_FAILED, f"{message} to {1e3 * jaw.open_gap:.0f} mm")
+
+    def set_jaw(self, arm: str, gap: float) -> Iterator[None]:
+        """Steps that bring a jaw's pads `gap` m from each other.
+
+        Raises PlanningError MOTION_BLOCKED when something stops them on the way, and GRIPPER_FAILED when they do not
+        move at all.
+        """
+        gripper, jaw = self._grippers[arm], self.parameters.jaw
+        before = gripper.reading().gap
+        for _ in range(jaw.attempts):
+            gripper.open(gap)
+            end = self._clock.now() + jaw.timeout
+            while self._clock.now() < end - 1e-9:
+                yield
+                if abs(gripper.reading().gap - gap) < jaw.tolerance:
+                    return
+        stands = gripper.reading().gap
+        message = (
+            f"the {arm} jaw stands {1e3 * stands:.1f} mm open, told {jaw.attempts} times to go to {1e3 * gap:.1f} mm"
+        )
+        if abs(stands - before) < jaw.grip.moved:
+            raise self.give_up(arm, CauseCode.GRIPPER_FAILED, message)
+        raise PlanningError(CauseCode.MOTION_BLOCKED, message)
+
+    def press_jaw(self, arm: str, force: float) -> Iterator[None]:
+        """Steps that close a jaw until it presses with `force` N a finger, on whatever is between its pads."""
+        self._grippers[arm].close(force)
+        yield from self._pause(self.parameters.jaw.grip.time)
 
     def close_jaw(self, arm: str, thickness: float, gently: bool = False) -> Generator[None, None, float]:
         """Close a jaw on a thing of `thickness` m; returns the gap (m) at which it holds.

@@ -3,6 +3,7 @@
 from typing import TYPE_CHECKING
 
 from regrasp.interfaces.cause import CauseCode
+from regrasp.interfaces.request import RequestError
 
 if TYPE_CHECKING:
     from regrasp.motion.robots.contact_guard import Touch
@@ -11,12 +12,8 @@ if TYPE_CHECKING:
 NO_WAY = (CauseCode.NO_COLLISION_FREE_GOAL, CauseCode.PLANNING_FAILED, CauseCode.MOTION_BLOCKED)
 
 
-class PlanningError(Exception):
-    """No motion was found, or it could not be carried out; `code` is the cause, the message says why, with numbers."""
-
-    def __init__(self, code: str, message: str) -> None:
-        super().__init__(message)
-        self.code = code
+class PlanningError(RequestError):
+    """No motion was found, or it could not be carried out."""
 
 
 class TouchError(PlanningError):

@@ -13,12 +13,12 @@ from typing import TypeVar
 import numpy as np
 from scipy.spatial.transform import RigidTransform
 
+from regrasp.interfaces.arguments import finite_pose, not_negative, positive, rows, share, vector
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.cell import Box, KnownCell
 from regrasp.interfaces.devices import Arm, Clock, Gripper
 from regrasp.interfaces.request import Request
-from regrasp.motion.arguments import finite_pose, not_negative, positive, rows, share, vector
 from regrasp.motion.execution import Execution, ExecutionParameters
 from regrasp.motion.failure import NO_WAY, PlanningError, StoppedShortError, TouchError
 from regrasp.motion.grasping.approach import Cylinder, PickParameters, find_approaches, pick_candidates, points_beyond

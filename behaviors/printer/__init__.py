@@ -1,17 +1,22 @@
 """Leaves of the printer task."""
 
 from regrasp.behaviors.leaf import WithServices
-from regrasp.behaviors.printer.actions import (
-    ArmBack,
-    GripHandle,
-    LookAtHandle,
-    OpenGripper,
-    RailToHandle,
-    ReachHandle,
-    SlideDoor,
+from regrasp.behaviors.printer import door, primitives
+
+_LEAVES: tuple[type[WithServices], ...] = (
+    primitives.AnalyzeImage,
+    primitives.MoveBy,
+    primitives.MoveGripper,
+    primitives.MoveJoints,
+    primitives.MoveRail,
+    primitives.MoveToPose,
+    primitives.PressGripper,
+    door.ArmBack,
+    door.GripHandle,
+    door.LookAtHandle,
+    door.RailToHandle,
+    door.ReachHandle,
+    door.SlideDoor,
 )
 
-LEAVES: dict[str, type[WithServices]] = {
-    leaf.__name__: leaf
-    for leaf in (ArmBack, GripHandle, LookAtHandle, OpenGripper, RailToHandle, ReachHandle, SlideDoor)
-}
+LEAVES: dict[str, type[WithServices]] = {leaf.__name__: leaf for leaf in _LEAVES}

@@ -7,6 +7,7 @@ from regrasp.behaviors.services import Services
 from regrasp.interfaces.printer.services import PrinterMotionService, PrinterPerceptionService
 
 if TYPE_CHECKING:
+    from regrasp.interfaces.printer.actions import GripperDevice, ImageAnalyzer, Manipulator, Rail
     from regrasp.interfaces.printer.cell import PrinterKnown
 
 
@@ -17,3 +18,7 @@ class PrinterServices(Services):
     known: "PrinterKnown"
     motion: PrinterMotionService
     perception: PrinterPerceptionService
+    manipulator: "Manipulator"
+    gripper: "GripperDevice"
+    rail: "Rail"
+    analyzer: "ImageAnalyzer"

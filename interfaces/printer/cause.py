@@ -7,3 +7,4 @@ class PrinterCause(StrEnum):
     """The causes."""
 
     HANDLE_NOT_FOUND = "handle_not_found"  # no camera showed the handle of the door
+    TARGET_NOT_SEEN = "target_not_seen"  # no picture showed the part, or its gripping section

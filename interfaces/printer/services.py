@@ -26,24 +26,15 @@ class PrinterMotionService(MotionService, Protocol):
         """How far, m, the door is believed to stand open."""
         ...
 
-    def handle(self, opening: float) -> "RigidTransform":
-        """world_from_tool of a hand that takes the handle of a door that stands `opening` m open."""
+    def handle(self, opening: float, before: float = 0.0) -> "RigidTransform":
+        """world_from_tool of a hand that takes the handle of a door that stands `opening` m open.
+
+        Or `before` m before that, along the hand.
+        """
         ...
 
     def believe_handle(self, place: FloatArray) -> FloatArray:
         """Take the handle to be at a place (3,) m, of which y and z count; returns how far (3,) m it was off."""
-        ...
-
-    def go_before(self, arm: str, goal: "RigidTransform", standoff: float) -> Request[None]:
-        """Bring the tool along a free path `standoff` m before a pose (world_from_tool)."""
-        ...
-
-    def move_rail(self, arm: str, position: float) -> Request[None]:
-        """Bring an arm's rail to a position (m along it), and let the arm's other joints stand."""
-        ...
-
-    def reach(self, arm: str, goal: "RigidTransform", standoff: float) -> Request[None]:
-        """Bring the tool along a free path `standoff` m before a pose (world_from_tool), then straight into it."""
         ...
 
     def draw_back(self, arm: str, distance: float) -> Request[None]:

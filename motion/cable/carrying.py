@@ -8,9 +8,9 @@ from functools import partial
 import numpy as np
 from scipy.spatial.transform import RigidTransform
 
+from regrasp.interfaces.arguments import finite_pose, share
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cause import CauseCode
-from regrasp.motion.arguments import finite_pose, share
 from regrasp.motion.cable.cable_shape import cable_course
 from regrasp.motion.cable.carry_paths import CarryPathParameters, carry_paths, first_free
 from regrasp.motion.cable.held import connector_spheres

@@ -7,10 +7,10 @@ from itertools import product
 import numpy as np
 from scipy.spatial.transform import RigidTransform
 
+from regrasp.interfaces.arguments import finite_pose
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.request import Request
-from regrasp.motion.arguments import finite_pose
 from regrasp.motion.cable.cable_section import CableSection, section_of_cable
 from regrasp.motion.cable.cable_shape import cable_course
 from regrasp.motion.cable.taking import TakingMotion

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.spatial.transform import RigidTransform
 
+from regrasp.interfaces.arguments import finite_pose, vector
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.cable.motion import View, Viewpoint
@@ -14,7 +15,6 @@ from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.cell import FixedMount
 from regrasp.interfaces.scene import EARTH_GRAVITY
 from regrasp.interfaces.wall_time import counts_as
-from regrasp.motion.arguments import finite_pose, vector
 from regrasp.motion.cable.cable_path import natural_poses
 from regrasp.motion.cable.viewing import ViewingParameters, approached, outline, views_of
 from regrasp.motion.cable.viewpoints import closer_views, spiral

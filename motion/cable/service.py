@@ -8,12 +8,12 @@ from typing import TypeVar
 import numpy as np
 from scipy.spatial.transform import RigidTransform
 
+from regrasp.interfaces.arguments import finite_pose
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.cell import Box
 from regrasp.interfaces.evidence import Evidence
 from regrasp.interfaces.request import Request
-from regrasp.motion.arguments import finite_pose
 from regrasp.motion.cable.cable_shape import cable_course, connector_points
 from regrasp.motion.cable.gentle_pull import across_the_cable, pull_gently
 from regrasp.motion.cable.pulling_motion import PullingMotion

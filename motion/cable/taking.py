@@ -8,6 +8,7 @@ from typing import TypeVar, cast
 import numpy as np
 from scipy.spatial.transform import RigidTransform
 
+from regrasp.interfaces.arguments import finite_pose
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.cable.motion import Grip
@@ -16,7 +17,6 @@ from regrasp.interfaces.cell import Box
 from regrasp.interfaces.devices import Arm, Clock, Gripper
 from regrasp.interfaces.request import Request
 from regrasp.interfaces.wall_time import counts_as
-from regrasp.motion.arguments import finite_pose
 from regrasp.motion.cable.cable_reach import CableReachParameters
 from regrasp.motion.cable.cable_section import PullingParameters
 from regrasp.motion.cable.cable_shape import cable_course

@@ -12,9 +12,9 @@ import ompl.base as ob
 import ompl.geometric as og
 import ompl.util as ou
 
+from regrasp.interfaces.arguments import finite, not_negative, rows
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cause import CauseCode
-from regrasp.motion.arguments import finite, not_negative, rows
 from regrasp.motion.failure import PlanningError
 from regrasp.motion.robots.kinematics import past_limits
 from regrasp.motion.scene.collision import CollisionModel

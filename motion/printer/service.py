@@ -1,18 +1,19 @@
 """Motions at a printer: to the handle of its door, and with it."""
 
-from collections.abc import Callable, Generator, Iterator, Mapping
+from collections.abc import Callable, Collection, Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
+from regrasp.interfaces.arguments import finite, finite_pose, not_negative, positive, rows, share
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.cell import Box
 from regrasp.interfaces.devices import Arm, Clock, Gripper
 from regrasp.interfaces.printer.cell import PrinterKnown
+from regrasp.interfaces.quote import nearest, quoted
 from regrasp.interfaces.request import Request
-from regrasp.motion.arguments import finite, positive, share
 from regrasp.motion.failure import NO_WAY, GraspEmptyError, PlanningError, TouchError
 from regrasp.motion.grasping.gap_test import GripWatch
 from regrasp.motion.request import MotionRequest
@@ -62,10 +63,14 @@ class PrinterMotion(Motion):
         self.door_opening = float(np.clip(opening, 0.0, self._door.travel))
         self._boxes = [*self._fixed, *self._parts()]
 
-    def handle(self, opening: float) -> RigidTransform:
-        """world_from_tool of a hand that takes the handle of a door that stands `opening` m open."""
+    def handle(self, opening: float, before: float = 0.0) -> RigidTransform:
+        """world_from_tool of a hand that takes the handle of a door that stands `opening` m open.
+
+        Or `before` m before that, along the hand.
+        """
         _, handle = self._door.parts(opening)
-        return RigidTransform.from_components(np.array(handle.center) + self._off, TO_THE_PRINTER)
+        place = np.array(handle.center) + self._off - TO_THE_PRINTER.apply([before, 0.0, 0.0])
+        return RigidTransform.from_components(place, TO_THE_PRINTER)
 
     def believe_handle(self, place: FloatArray) -> FloatArray:
         """Take the handle to be at a place (3,) m, of which only y and z count; returns how far (3,) m it was off.
@@ -85,30 +90,76 @@ class PrinterMotion(Motion):
         panel, handle = self._door.parts(self.door_opening)
         return panel, handle.model_copy(update={"center": tuple((np.array(handle.center) + self._off).tolist())})
 
+    def things(self, names: Collection[str]) -> list[Box]:
+        """The boxes of these names that the arm keeps clear of, where they are believed to be.
+
+        Raises:
+            ValueError: there is none of such a name.
+        """
+        there = {box.name: box for box in self._boxes}
+        for name in names:
+            if name not in there:
+                raise ValueError(f"no thing {quoted(name)}; {nearest(name, there)}")
+        return [there[name] for name in names]
+
     def move_rail(self, arm: str, position: float) -> MotionRequest:
         """Bring an arm's rail to a position (m along it), and let the arm's other joints stand.
 
         Fails with OUT_OF_REACH past the rail's ends or for an arm without a rail, and as `move` does.
         """
-        return self.move(arm, self._with_rail(arm, position)[None], tight=True)
-
-    def go_before(self, arm: str, goal: RigidTransform, standoff: float) -> MotionRequest:
-        """Bring the tool along a free path `standoff` m before a pose (world_from_tool)."""
-        return self.move_tool(arm, goal * RigidTransform.from_translation([-positive("the standoff", standoff), 0, 0]))
-
-    def reach(self, arm: str, goal: RigidTransform, standoff: float) -> Request[None]:
-        """Bring the tool along a free path `standoff` m before a pose (world_from_tool), then straight into it.
-
-        On the straight way the arm may touch the door's handle, which lies between the fingers then.
-        """
-        positive("the standoff", standoff)
-        way = RigidTransform.from_translation([standoff, 0.0, 0.0])
-        _, handle = self._parts()
+        finite("the rail's position", position)
 
         def steps() -> Iterator[None]:
-            yield from self._done(self.move_tool(arm, goal * way.inv(), onward=[way]))
-            displacement = goal.translation - self.tool(arm).translation
-            yield from self._done(self.shift(arm, displacement, without=[handle]))
+            yield from self._move_steps(arm, self._with_rail(arm, position)[None])
+
+        return self.execution.request(arm, steps())
+
+    def move_joints(self, arm: str, angles: Sequence[float] | FloatArray) -> MotionRequest:
+        """Bring an arm's joints to angles (n,) rad along a free path, and let its rail stand."""
+        first = int(self.kinematics[arm].robot.rail is not None)
+        (goal,) = rows("the angles", angles, len(self.kinematics[arm]) - first)
+
+        def steps() -> Iterator[None]:
+            yield from self._move_steps(arm, np.append(self.joints(arm)[:first], goal)[None])
+
+        return self.execution.request(arm, steps())
+
+    def move_jaw(self, arm: str, gap: float, force: float | None = None) -> MotionRequest:
+        """Bring the pads `gap` m from each other, or with a force (N a finger) close them on what is between them.
+
+        Fails with OUT_OF_REACH for a gap that the gripper has not, and as `Execution.set_jaw` does.
+        """
+        gripper = self.kinematics[arm].robot.gripper
+        not_negative("the gap", gap)
+
+        def steps() -> Iterator[None]:
+            if force is not None:
+                yield from self.execution.press_jaw(arm, force)
+                return
+            if not gripper.closed <= gap <= gripper.opening:
+                span = f"{1e3 * gripper.closed:g} to {1e3 * gripper.opening:g} mm"
+                message = f"the jaw opens from {span}, asked for {1e3 * gap:g} mm"
+                raise PlanningError(CauseCode.OUT_OF_REACH, message)
+            yield from self.execution.set_jaw(arm, gap)
+
+        return self.execution.request(arm, steps())
+
+    def reach(
+        self, arm: str, goal: RigidTransform, standoff: float = 0.0, may_touch: Collection[str] = ()
+    ) -> Request[None]:
+        """Bring the tool along a free path `standoff` m before a pose (world_from_tool), then straight into it.
+
+        On the straight way the arm may touch the things named in `may_touch`, such as what its fingers come round.
+        """
+        finite_pose("the tool's pose", goal)
+        way = RigidTransform.from_translation([not_negative("the standoff", standoff), 0.0, 0.0])
+        spared = self.things(may_touch)
+
+        def steps() -> Iterator[None]:
+            yield from self._done(self.move_tool(arm, goal * way.inv(), onward=[way] if standoff else []))
+            if standoff:
+                displacement = goal.translation - self.tool(arm).translation
+                yield from self._done(self.shift(arm, displacement, without=spared))
 
         return self._together(arm, steps())
 

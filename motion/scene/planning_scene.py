@@ -6,13 +6,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.spatial.transform import RigidTransform
 
+from regrasp.interfaces.arguments import positive, rows
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.cell import Box, KnownCell, WristMount
 from regrasp.interfaces.devices import Arm, Gripper
 from regrasp.interfaces.frame import RgbdFrame
 from regrasp.interfaces.wall_time import counts_as
-from regrasp.motion.arguments import positive, rows
 from regrasp.motion.failure import PlanningError
 from regrasp.motion.robots.contact_guard import Touch
 from regrasp.motion.robots.contact_place import ContactPlaceParameters, contact_place, felt_points

@@ -11,6 +11,7 @@ TASK = Task(
     objects=Part("regrasp.sim.printer.objects:PrinterObjects"),
     cell=Part("regrasp.interfaces.printer.cell:PrinterCell"),
     cell_findings=Part(f"{_HERE}.cell_layout:cell_findings"),
+    cell_names=Part(f"{_HERE}.cell_names:cell_names"),
     expect=Part(f"{_HERE}.expectations:Expect"),
     causes=Part("regrasp.interfaces.printer.cause:PrinterCause"),
     when=Part("regrasp.interfaces.printer.fault:PrinterWhen"),

@@ -4,12 +4,33 @@ from typing import Any
 
 from regrasp.app.run.compose import connected
 from regrasp.behaviors.printer.services import PrinterServices
+from regrasp.interfaces.devices import Clock
+from regrasp.interfaces.printer.cell import PrinterKnown
+from regrasp.motion.printer.devices import ArmGripper, ArmManipulator, ArmRail, OneAtATime
 from regrasp.motion.printer.service import PrinterMotion
+from regrasp.perception.printer.analyzer import ColorAnalyzer
 from regrasp.perception.printer.service import PrinterPerception
 from regrasp.sim.printer.objects import PrinterObjects
 from regrasp.sim.world import World
 
 
 def printer_services(world: World[PrinterObjects], seed: int, log: Any) -> PrinterServices:
-    """Motion with what concerns the printer, and perception, see `connected`."""
-    return connected(PrinterServices, PrinterMotion, PrinterPerception, world, seed, log)
+    """Motion with what concerns the printer, perception, and the four devices of the arm at work; see `connected`."""
+    return connected(_with_devices, PrinterMotion, PrinterPerception, world, seed, log)
+
+
+def _with_devices(
+    known: PrinterKnown, clock: Clock, motion: PrinterMotion, perception: PrinterPerception, log: Any
+) -> PrinterServices:
+    hand, arm_and_rail = known.printer.hand, OneAtATime()
+    return PrinterServices(
+        known,
+        clock,
+        motion,
+        perception,
+        log,
+        manipulator=ArmManipulator(motion, hand, arm_and_rail),
+        gripper=ArmGripper(motion, hand, OneAtATime()),
+        rail=ArmRail(motion, hand, arm_and_rail),
+        analyzer=ColorAnalyzer(perception, known.printer, clock),
+    )

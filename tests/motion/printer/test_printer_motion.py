@@ -52,7 +52,7 @@ def test_the_rail_alone_moves_and_only_as_far_as_it_goes(rig: Rig) -> None:
     assert after[0] == pytest.approx(2.0, abs=2e-3)
     assert after[1:] == pytest.approx(before[1:], abs=5e-3)
     with pytest.raises(PlanningError, match=r"the rail goes from 0 to 3.2 m, asked for 4.000 m") as caught:
-        rig.motion.move_rail(ARM, 4.0)
+        rig.run(rig.motion.move_rail(ARM, 4.0))
     assert caught.value.code is CauseCode.OUT_OF_REACH
     with pytest.raises(ValueError, match="not finite"):
         rig.motion.move_rail(ARM, float("nan"))
@@ -71,7 +71,7 @@ def test_a_hand_that_takes_the_handle_gives_way_to_it_and_the_door_goes_along(ri
     motion = rig.motion
     rig.run(motion.release(ARM, 0.045))
     rig.run(motion.move_rail(ARM, 1.768))
-    rig.run(motion.reach(ARM, motion.handle(0.0), 0.08))
+    rig.run(motion.reach(ARM, motion.handle(0.0), 0.08, ["door_handle"]))
     assert rig.run(motion.take_handle(ARM)) == pytest.approx(0.02, abs=2e-3)
     assert abs(motion._force_across(ARM)) < motion.parameters.relieved
     rig.run(motion.slide_door(ARM, float(motion.joints(ARM)[0]) + 0.1))

@@ -1,34 +1,12 @@
-"""The primitive actions at a printer: gripper, rail and arm, and the door in hand."""
+"""What the arm does with the printer's door."""
 
 from typing import Any, ClassVar
 
-from regrasp.behaviors.leaf import LeafFailed, LeafPort, LeafSteps, StepsLeaf
-from regrasp.behaviors.printer.services import PrinterServices
+from regrasp.behaviors.leaf import LeafFailed, LeafPort, LeafSteps
+from regrasp.behaviors.printer.leaf import PrinterLeaf
 from regrasp.interfaces.cause import CauseCode
+from regrasp.interfaces.printer.actions import PoseGoal, RailGoal
 from regrasp.interfaces.printer.cause import PrinterCause
-
-
-class PrinterLeaf(StepsLeaf):
-    """A leaf of the arm that works at the printer."""
-
-    services: PrinterServices
-
-    @property
-    def hand(self) -> str:
-        """The arm's name."""
-        return self.services.known.printer.hand
-
-
-class OpenGripper(PrinterLeaf):
-    """Opens the gripper until its pads stand `opening` m apart."""
-
-    INPUT_PORTS: ClassVar[dict[str, Any]] = {
-        "opening": LeafPort(data_type=float, above=0.0, description="m between the pads")
-    }
-
-    def steps(self) -> LeafSteps:
-        """See the class."""
-        yield self.services.motion.release(self.hand, self.get_input("opening"))
 
 
 class GripHandle(PrinterLeaf):
@@ -50,7 +28,7 @@ class RailToHandle(PrinterLeaf):
         """See the class."""
         motion, base = self.services.motion, self.services.known.arm(self.hand).base
         handle = motion.handle(motion.door_opening).translation
-        yield motion.move_rail(self.hand, float(handle[1] + self.get_input("beside") - base[1]))
+        yield self.services.rail.send(RailGoal(float(handle[1] + self.get_input("beside") - base[1])))
 
 
 class LookAtHandle(PrinterLeaf):
@@ -68,7 +46,8 @@ class LookAtHandle(PrinterLeaf):
     def steps(self) -> LeafSteps:
         """See the class."""
         motion, known, perception = self.services.motion, self.services.known.printer, self.services.perception
-        yield motion.go_before(self.hand, motion.handle(motion.door_opening), self.get_input("standoff"))
+        before = motion.handle(motion.door_opening, self.get_input("standoff"))
+        yield self.services.manipulator.send(PoseGoal(before))
         begin = self.services.clock.now()
         while (place := perception.see_handle(known.camera, begin)) is None:
             if self.services.clock.now() > begin + self.get_input("seconds"):
@@ -91,7 +70,8 @@ class ReachHandle(PrinterLeaf):
     def steps(self) -> LeafSteps:
         """See the class."""
         motion = self.services.motion
-        yield motion.reach(self.hand, motion.handle(motion.door_opening), self.get_input("standoff"))
+        handle = motion.handle(motion.door_opening)
+        yield self.services.manipulator.send(PoseGoal(handle, self.get_input("standoff"), ("door_handle",)))
 
 
 class SlideDoor(PrinterLeaf):

@@ -1,10 +1,14 @@
 """Checks of what callers hand in: each says in a ValueError what is wrong with which argument."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import FloatArray
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import RigidTransform
 
 
 def finite(what: str, values: ArrayLike) -> FloatArray:
@@ -59,6 +63,6 @@ def vector(what: str, values: ArrayLike) -> FloatArray:
     return array
 
 
-def finite_pose(what: str, pose: RigidTransform) -> None:
+def finite_pose(what: str, pose: "RigidTransform") -> None:
     """Raises ValueError if a number of a pose is NaN or infinite."""
     finite(what, pose.as_matrix())

@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from regrasp.motion.arguments import finite, rows, share, vector
+from regrasp.interfaces.arguments import finite, rows, share, vector
 
 
 @given(arrays(float, st.tuples(st.integers(0, 5), st.just(3)), elements=st.floats(-1e6, 1e6)))
