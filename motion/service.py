@@ -47,6 +47,7 @@ class MotionParameters:
     approach_speed: float = 0.3  # share of the joints' speed on straight paths near things; choice
     optimistic_speed: float = 0.3  # share of the joints' speed on a path that may touch something; choice
     pulling_speed: float = 0.5  # share at most of one that pulls an elastic thing, and feels little else; choice
+    straight_margin: float = 0.020  # m that a checked straight way keeps from everything, if it began so far; choice
     arm_error: float = 0.005  # m that a tool may be off: the ViperX's accuracy by its maker
     touches: int = 6  # that end a motion; after each before it the arm goes on by another way; choice
     same_touch: float = 0.1  # rad or m; a touch at joints so near to those of another is of the same thing; choice
@@ -423,13 +424,14 @@ class Motion(PlanningScene):
     def _check_shift(self, model: CollisionModel, path: FloatArray, length: float) -> None:
         """Raises PlanningError MOTION_BLOCKED with the nearest thing unless a path of `length` m is free.
 
-        Free is hardly nearer to anything than where the path begins, or the greatest near margin.
+        Free is hardly nearer to anything than where the path begins, or `straight_margin` from everything.
         """
-        clearances = self.parameters.clearances
-        if model.path_free(path[1:], min(model.clearance(path[0]) - clearances.nearer, clearances.near_margins[0])):
+        values = self.parameters
+        if model.path_free(path[1:], min(model.clearance(path[0]) - values.clearances.nearer, values.straight_margin)):
             return
         distance, what = min(model.nearest(q) for q in path[1:])
-        message = f"{length:.2f} m straight on the arm is {-1e3 * distance:.0f} mm in {what}"
+        near = f"comes within {1e3 * distance:.0f} mm of" if distance > 0 else f"is {-1e3 * distance:.0f} mm in"
+        message = f"{length:.2f} m straight on the arm {near} {what}"
         raise PlanningError(CauseCode.MOTION_BLOCKED, message)
 
     def _keep_clear_but_near(self, points: FloatArray | None, place: FloatArray) -> None:

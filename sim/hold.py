@@ -89,7 +89,7 @@ class Hold:
 
 
 class Catch:
-    """A catch or a socket. It lets go of what it holds once that is pulled against `axis` (3,) with `force` N.
+    """A catch, which lets go of what it holds once that is pulled against `axis` (3,) with `force` N.
 
     `axis` is the direction in which the body goes in. A force across it, as a closing gripper makes, does not release
     the body. With `axis` None a force of that size in any direction does. `getConstraintState` gives the constraint's

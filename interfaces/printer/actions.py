@@ -61,14 +61,17 @@ class PoseGoal:
     """Bring the tool to a pose, world_from_tool; the rail moves too where the arm alone does not reach.
 
     The last `standoff` m it goes straight along the tool's axis. There it may touch the things named in `may_touch`.
+    From the pose the arm must be able to go on in straight lines to the poses `onward`, goal_from_tool.
     """
 
     pose: "RigidTransform"
     standoff: float = 0.0
     may_touch: tuple[str, ...] = ()
+    onward: tuple["RigidTransform", ...] = ()
 
     def __post_init__(self) -> None:
-        finite_pose("the pose", self.pose)
+        for pose in (self.pose, *self.onward):
+            finite_pose("the pose", pose)
         not_negative("the standoff", self.standoff)
 
     @classmethod

@@ -67,7 +67,7 @@ class ArmManipulator(_Device):
         motion, arm = self._motion, self._arm
         match goal:
             case PoseGoal():
-                request = motion.reach(arm, goal.pose, goal.standoff, goal.may_touch)
+                request = motion.reach(arm, goal.pose, goal.standoff, goal.may_touch, goal.onward)
             case PoseRelGoal():
                 request = motion.shift(arm, goal.offset, without=motion.things(goal.may_touch))
             case JointGoal():

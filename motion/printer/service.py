@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Collection, Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
@@ -16,8 +17,10 @@ from regrasp.interfaces.quote import nearest, quoted
 from regrasp.interfaces.request import Request
 from regrasp.motion.failure import NO_WAY, GraspEmptyError, PlanningError, TouchError
 from regrasp.motion.grasping.gap_test import GripWatch
+from regrasp.motion.printer.held_box import HeldBox
 from regrasp.motion.request import MotionRequest
 from regrasp.motion.robots.tool_force import tool_force
+from regrasp.motion.scene.collision import CollisionModel
 from regrasp.motion.service import Motion, MotionParameters
 
 # world_from_tool of a hand that points along -x, with its fingers to the left and right of what it takes
@@ -28,6 +31,7 @@ TO_THE_PRINTER = Rotation.from_matrix([[-1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0,
 class PrinterMotionParameters(MotionParameters):
     """Those of every task, and of the door."""
 
+    straight_margin: float = 0.004  # the arm is off by 2 mm and its rail by 1 mm; what it takes has things close by
     slide_speed: float = 0.2  # share of the rail's speed with the door in hand; choice
     back_shares: tuple[float, ...] = (1.0, 0.6, 0.3)  # of the way back, the first that is free; choice
     blocked: float = 30.0  # N across with which a door presses that goes no further; choice: it takes 8 N to slide
@@ -36,6 +40,7 @@ class PrinterMotionParameters(MotionParameters):
     most_give: float = 0.001  # m at most at once; choice: the arm is off by 2 mm
     gives: int = 10  # times at most
     give_time: float = 0.1  # s until the efforts are read again
+    sphere_spacing: float = 0.016  # m between the spheres that stand for what the hand holds; choice
 
 
 class PrinterMotion(Motion):
@@ -55,6 +60,7 @@ class PrinterMotion(Motion):
     ) -> None:
         super().__init__(known, arms, grippers, clock, seed, parameters, on_anomaly)
         self._fixed, self._door = [*self._boxes, *known.printer.fixtures()], known.printer.door
+        self._held: dict[str, list[HeldBox]] = {}  # by arm
         self._off, self._slid = np.zeros(3), False  # m from where the handle should be on the door; was it pulled?
         self.believe_door(0.0)
 
@@ -84,6 +90,41 @@ class PrinterMotion(Motion):
             self._off = self._off + off
             self.believe_door(self.door_opening)
         return off
+
+    def believe_part(self, section: FloatArray) -> None:
+        """Take the part's gripping section to be at a place (3,) m, and part and plate as far off, from now on."""
+        names = ("plate", "part", "section")
+        off = finite("the section's place", section) - self.things(["section"])[0].center
+        for box in self.things(names):
+            moved = tuple((np.array(box.center) + off).tolist())
+            self._fixed[self._fixed.index(box)] = box.model_copy(update={"center": moved})
+        self.believe_door(self.door_opening)
+
+    def believe_held(self, arm: str, names: Collection[str]) -> None:
+        """The hand holds the things of these names as they lie now: they go with it, and count as a part of the arm.
+
+        Raises:
+            ValueError: there is no thing of such a name.
+        """
+        tool = self.tool(arm)
+        for box in self.things(names):
+            self._fixed.remove(box)
+            pose = tool.inv() * RigidTransform.from_translation(box.center)
+            self._held.setdefault(arm, []).append(HeldBox(box, pose, self.parameters.sphere_spacing))
+        self.believe_door(self.door_opening)
+
+    def believe_placed(self, arm: str, names: Collection[str]) -> None:
+        """What the hand held of these things stays where it is now: the arm keeps clear of the box about each."""
+        tool, held = self.tool(arm), self._held.get(arm, [])
+        self._held[arm] = [thing for thing in held if thing.box.name not in names]
+        self._fixed += [thing.placed(tool) for thing in held if thing.box.name in names]
+        self.believe_door(self.door_opening)
+
+    def model(self, arm: str, *, held: FloatArray | None = None, **options: Any) -> CollisionModel:
+        """See `PlanningScene.model`; what the hand is believed to hold goes with it."""
+        if held is None and self._held.get(arm):
+            held = np.vstack([thing.spheres for thing in self._held[arm]])
+        return super().model(arm, held=held, **options)
 
     def _parts(self) -> tuple[Box, Box]:
         """The door and its handle as believed."""
@@ -145,18 +186,25 @@ class PrinterMotion(Motion):
         return self.execution.request(arm, steps())
 
     def reach(
-        self, arm: str, goal: RigidTransform, standoff: float = 0.0, may_touch: Collection[str] = ()
+        self,
+        arm: str,
+        goal: RigidTransform,
+        standoff: float = 0.0,
+        may_touch: Collection[str] = (),
+        onward: Sequence[RigidTransform] = (),
     ) -> Request[None]:
         """Bring the tool along a free path `standoff` m before a pose (world_from_tool), then straight into it.
 
         On the straight way the arm may touch the things named in `may_touch`, such as what its fingers come round.
+        The arm takes joints from which it can go on in straight lines to the poses `onward` (goal_from_tool).
         """
         finite_pose("the tool's pose", goal)
         way = RigidTransform.from_translation([not_negative("the standoff", standoff), 0.0, 0.0])
         spared = self.things(may_touch)
 
         def steps() -> Iterator[None]:
-            yield from self._done(self.move_tool(arm, goal * way.inv(), onward=[way] if standoff else []))
+            after = [way, *(way * pose for pose in onward)] if standoff else list(onward)
+            yield from self._done(self.move_tool(arm, goal * way.inv(), onward=after))
             if standoff:
                 displacement = goal.translation - self.tool(arm).translation
                 yield from self._done(self.shift(arm, displacement, without=spared))

@@ -20,4 +20,5 @@ TASK = Task(
     services=Part(f"{_HERE}.services:printer_services"),
     judge=Part(f"{_HERE}.judge:PrinterJudge"),
     words=Part(f"{_HERE}.words:WORDS"),
+    commands=Part(f"{_HERE}.commands:add_commands"),
 )

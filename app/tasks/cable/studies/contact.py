@@ -17,8 +17,8 @@ from regrasp.app.campaigns.table import print_table
 from regrasp.app.files.whole_file import write_whole
 from regrasp.app.records.result import plain, versions
 from regrasp.app.scenario.load import load_scenario
+from regrasp.app.studies.scene_tasks import SceneTask, run_tasks
 from regrasp.app.tasks.cable.placement import cable_at_start
-from regrasp.app.tasks.cable.studies.pose.tasks import SceneTask, run_tasks
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cable.cell import CableCell
 from regrasp.interfaces.cell import Box

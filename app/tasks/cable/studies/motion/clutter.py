@@ -9,14 +9,12 @@ from scipy.spatial.transform import Rotation
 from regrasp.app.scenario.placement import overlaps
 from regrasp.app.scenario.sampling import StandParameters
 from regrasp.app.scenario.shapes import JitteredBox, penetration_depth
+from regrasp.app.studies.standing import StandingArm, StandingClock, StandingGripper
 from regrasp.app.tasks.cable.placement import obstacle_overlaps
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cable.cell import CableCell, CableKnown
 from regrasp.interfaces.cell import Box
-from regrasp.interfaces.devices import Guard
-from regrasp.interfaces.reading import GripperReading, JointReading
 from regrasp.interfaces.scene import Obstacle
-from regrasp.interfaces.trajectory import Trajectory
 from regrasp.motion.cable.service import CableMotion
 from regrasp.motion.cable.taking import CableMotionParameters
 
@@ -73,57 +71,6 @@ def surface(piece: Obstacle, voxel: float) -> FloatArray:
 def solid_parts(piece: Obstacle) -> list[Box]:
     """The box of a piece and that of its stand, if it has one; both are turned by its yaw about their own middles."""
     return [piece.box] if piece.stand is None else [piece.box, piece.stand]
-
-
-class StandingArm:
-    """An arm device that stands where it was put, and does not move."""
-
-    def __init__(self, name: str, positions: FloatArray) -> None:
-        self.name, self.positions = name, positions
-
-    def reading(self) -> JointReading:
-        """See `Arm`."""
-        still = np.zeros(len(self.positions))
-        return JointReading(0.0, self.positions, still, still)
-
-    def gravity(self) -> FloatArray:
-        """See `Arm`."""
-        return np.zeros(3)
-
-    def follow(self, trajectory: Trajectory, guard: Guard | None = None) -> None:
-        """See `Arm`."""
-
-    def stop(self) -> None:
-        """See `Arm`."""
-
-    def is_moving(self) -> bool:
-        """See `Arm`."""
-        return False
-
-
-class StandingGripper:
-    """A gripper device whose jaw stays `gap` m open."""
-
-    def __init__(self, gap: float) -> None:
-        self.gap = gap
-
-    def open(self, gap: float) -> None:
-        """See `Gripper`."""
-
-    def close(self, force: float) -> None:
-        """See `Gripper`."""
-
-    def reading(self) -> GripperReading:
-        """See `Gripper`."""
-        return GripperReading(0.0, self.gap)
-
-
-class StandingClock:
-    """A clock that stands."""
-
-    def now(self) -> float:
-        """See `Clock`."""
-        return 0.0
 
 
 class ClutteredCell:

@@ -23,6 +23,7 @@ from regrasp.app.campaigns.statistics import wilson_interval
 from regrasp.app.campaigns.table import print_table
 from regrasp.app.files.whole_file import write_whole
 from regrasp.app.records.result import plain, versions
+from regrasp.app.studies.scene_tasks import SceneTask, run_tasks
 from regrasp.app.tasks.cable.cells import cable_cell
 from regrasp.app.tasks.cable.studies.motion.infeasible import INFEASIBLE
 from regrasp.app.tasks.cable.studies.motion.trial import (
@@ -34,7 +35,6 @@ from regrasp.app.tasks.cable.studies.motion.trial import (
     TrialParameters,
     run_trial,
 )
-from regrasp.app.tasks.cable.studies.pose.tasks import SceneTask, run_tasks
 from regrasp.interfaces.quote import printable
 
 KIND = "queries of a motion study"

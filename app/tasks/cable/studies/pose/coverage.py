@@ -19,8 +19,8 @@ from regrasp.app.campaigns.statistics import wilson_interval
 from regrasp.app.campaigns.table import print_table
 from regrasp.app.files.whole_file import write_whole
 from regrasp.app.records.result import plain, versions
+from regrasp.app.studies.scene_tasks import SceneTask, run_tasks
 from regrasp.app.tasks.cable.studies.pose.scenes import HEADLINE
-from regrasp.app.tasks.cable.studies.pose.tasks import SceneTask, run_tasks
 from regrasp.app.tasks.cable.studies.pose.trial import Setup
 from regrasp.perception.pose.estimate import Estimate
 

@@ -19,10 +19,10 @@ from regrasp.app.campaigns.statistics import wilson_interval
 from regrasp.app.campaigns.table import print_table
 from regrasp.app.files.whole_file import write_whole
 from regrasp.app.records.result import plain, versions
+from regrasp.app.studies.scene_tasks import SceneTask, run_tasks
 from regrasp.app.tasks.cable.studies.pose.both_cameras import BOTH, run_both
 from regrasp.app.tasks.cable.studies.pose.negatives import Negative, run_negatives
 from regrasp.app.tasks.cable.studies.pose.scenes import CONFIGURATIONS, HEADLINE
-from regrasp.app.tasks.cable.studies.pose.tasks import SceneTask, run_tasks
 from regrasp.app.tasks.cable.studies.pose.trial import Setup, Trial, run_trials
 
 # Hwang 2024, table 3: of 27 trials identified and grasped, mean error and its standard deviation in m.

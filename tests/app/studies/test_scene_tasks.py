@@ -5,7 +5,7 @@ import pytest
 from pydantic import TypeAdapter
 
 from regrasp.app.files.findings import Findings
-from regrasp.app.tasks.cable.studies.pose.tasks import SceneTask, run_tasks
+from regrasp.app.studies.scene_tasks import SceneTask, run_tasks
 
 NUMBERS = TypeAdapter(list[int])
 
