@@ -28,4 +28,13 @@ class DoorJams(Lasting):
     )
 
 
-FAULTS: tuple[type[Fault], ...] = (DoorJams,)
+class HandleMoves(Fault):
+    """The handle's mount slips: the handle slides along the door and stays there."""
+
+    type: Literal["handle_moves"] = Field(description="This fault.", examples=["handle_moves"])
+    by: Annotated[float, Field(ge=-0.05, le=0.05)] = Field(
+        default=0.02, description="Metres along the door; positive the way it opens.", examples=[0.02]
+    )
+
+
+FAULTS: tuple[type[Fault], ...] = (DoorJams, HandleMoves)

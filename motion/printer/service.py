@@ -92,8 +92,11 @@ class PrinterMotion(Motion):
         return off
 
     def believe_part(self, section: FloatArray) -> None:
-        """Take the part's gripping section to be at a place (3,) m, and part and plate as far off, from now on."""
-        names = ("plate", "part", "section")
+        """Take the part's gripping section to be at a place (3,) m, from now on.
+
+        Part, plate and the bed under the plate are taken to be as far off, since they lie on each other.
+        """
+        names = ("plate_bed", "plate", "part", "section")
         off = finite("the section's place", section) - self.things(["section"])[0].center
         for box in self.things(names):
             moved = tuple((np.array(box.center) + off).tolist())

@@ -12,7 +12,7 @@ class SimDoor:
     """A door on a slide with dry friction: it moves where more than that pulls along y, and stops by itself.
 
     Its base is a fixed point where the closed door's middle is. The door is the base's first link, and the handle is
-    fixed to that.
+    a link on the door. A stiff motor holds it where it is mounted, so that a fault can shift it along y.
     """
 
     panel_link = _DOOR
@@ -46,8 +46,8 @@ class SimDoor:
                 linkInertialFramePositions=[[0.0, 0.0, 0.0]] * 2,
                 linkInertialFrameOrientations=[level, level],
                 linkParentIndices=[0, 1],
-                linkJointTypes=[p.JOINT_PRISMATIC, p.JOINT_FIXED],
-                linkJointAxis=[[0, 1, 0], [0, 0, 1]],
+                linkJointTypes=[p.JOINT_PRISMATIC, p.JOINT_PRISMATIC],
+                linkJointAxis=[[0, 1, 0], [0, 1, 0]],
                 physicsClientId=client,
             )
         )
@@ -62,6 +62,7 @@ class SimDoor:
         )
         p.changeDynamics(self.body, _HANDLE, lateralFriction=hidden.handle_friction, physicsClientId=client)
         self.rub(hidden.door_friction)
+        self.shift_handle(0.0)
 
     @property
     def opening(self) -> float:
@@ -73,6 +74,18 @@ class SimDoor:
         # A motor that wants to stand still with no more than this force is Coulomb's friction.
         p.setJointMotorControl2(
             self.body, _DOOR, p.VELOCITY_CONTROL, targetVelocity=0.0, force=friction, physicsClientId=self._client
+        )
+
+    def shift_handle(self, by: float) -> None:
+        """Hold the handle `by` m along the door from where it was mounted, from now on."""
+        p.setJointMotorControl2(
+            self.body,
+            _HANDLE,
+            p.POSITION_CONTROL,
+            targetPosition=by,
+            positionGain=1.0,
+            force=2000.0,
+            physicsClientId=self._client,
         )
 
     def _shape(self, boxes: list[Box], places: list[list[float]]) -> tuple[int, int]:

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from regrasp.interfaces.printer.cell import PrinterCell
-from regrasp.interfaces.printer.fault import DoorJams
+from regrasp.interfaces.printer.fault import DoorJams, HandleMoves
 from regrasp.sim.engine import Engine
 from regrasp.sim.faults.effects import Effect, TaskEffects
 from regrasp.sim.faults.faults import TriggerState
@@ -37,7 +37,11 @@ class PrinterObjects(TaskObjects):
             usual = self.cell.hidden.printer.door_friction
             return Effect(lambda: self.door.rub(fault.friction), lambda: self.door.rub(usual))
 
-        return {DoorJams: jams}
+        def moves(fault: HandleMoves, *_: object) -> Effect:
+            seconds = 0.2  # slow enough that friction holds the door meanwhile
+            return Effect(step=lambda t: self.door.shift_handle(min(1.0, t / seconds) * fault.by), seconds=seconds)
+
+        return {DoorJams: jams, HandleMoves: moves}
 
     def after_step(self) -> None:
         """See `TaskObjects`: the catch or the bond may let go."""

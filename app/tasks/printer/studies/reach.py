@@ -209,8 +209,8 @@ class _Job:
     def _handle(self, opening: float) -> Iterator[Request[Any]]:
         values = self._parameters
         self.motion.believe_door(opening)
-        handle = self._believed(self.motion.handle(opening))
-        self.motion.believe_handle(handle.translation)
+        self.motion.believe_handle(self._believed(self.motion.handle(opening)).translation)
+        handle = self.motion.handle(opening)
         yield self._rail_to(handle, values.beside_handle)
         yield self._manipulator.send(PoseGoal(handle, values.handle_standoff, ("door_handle",)))
         yield self._by(values.handle_back, 0.0, 0.0, "door_handle")
