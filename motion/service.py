@@ -48,6 +48,7 @@ class MotionParameters:
     optimistic_speed: float = 0.3  # share of the joints' speed on a path that may touch something; choice
     pulling_speed: float = 0.5  # share at most of one that pulls an elastic thing, and feels little else; choice
     straight_margin: float = 0.020  # m that a checked straight way keeps from everything, if it began so far; choice
+    limit_margin: float = 0.1  # rad from a joint's limits within which it goes a full turn back instead; choice
     arm_error: float = 0.005  # m that a tool may be off: the ViperX's accuracy by its maker
     touches: int = 6  # that end a motion; after each before it the arm goes on by another way; choice
     same_touch: float = 0.1  # rad or m; a touch at joints so near to those of another is of the same thing; choice
@@ -124,6 +125,7 @@ class Motion(PlanningScene):
             model = self.start_model(arm, optimistic=optimistic)
 
             def path_to(ends: FloatArray) -> FloatArray:
+                ends = kin.turned_off_limits(ends, self.parameters.limit_margin)
                 goals = [end for end in ends if can_continue(kin, end, onward)]
                 try:
                     return self._plan(model, q, np.array(goals).reshape(-1, len(kin)), margin)

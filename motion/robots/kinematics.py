@@ -99,6 +99,16 @@ class ArmKinematics:
         slides = np.maximum(np.abs(self.lower), np.abs(self.upper))[self.chain.slides].sum()
         return float(links + slides)
 
+    def turned_off_limits(self, joints: FloatArray, margin: float) -> FloatArray:
+        """Joints (k, n) with the same poses: what stands within `margin` (rad) of a limit is turned back by 2 pi.
+
+        At a limit an arm cannot follow a line that leads past it. Where a full turn back leads to within the margin of
+        the other limit, a joint stays.
+        """
+        low, high, turn = self.lower + margin, self.upper - margin, 2.0 * np.pi * ~self.chain.slides
+        joints = np.where((joints > high) & (joints - turn >= low), joints - turn, joints)
+        return np.where((joints < low) & (joints + turn <= high), joints + turn, joints)
+
     def link_frames(self, q: FloatArray) -> FloatArray:
         """World frames (n + 1, 4, 4) of the base and the links, see `Chain`, for joints (n,)."""
         return np.asarray(link_frames_in(self.base, self.joints, np.asarray(q, float)))

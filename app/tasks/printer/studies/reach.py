@@ -189,7 +189,8 @@ class _Job:
         travel = self._printer.door.travel
         yield "handle, door closed", self._handle(0.0)
         yield "handle, door open", self._handle(travel)
-        goal = self._believed(self._goal())
+        goal = self._goal()  # the hand stays level, as at the handle
+        goal = RigidTransform.from_components(self._off(goal.translation, self._parameters.distance), goal.rotation)
         seen = goal.translation - self._goal().translation + self._printer.part.section.center
         self.motion.believe_part(seen)
         yield "before the printer", iter([self._rail_to(goal, self._parameters.beside_section)])
@@ -209,7 +210,7 @@ class _Job:
     def _handle(self, opening: float) -> Iterator[Request[Any]]:
         values = self._parameters
         self.motion.believe_door(opening)
-        self.motion.believe_handle(self._believed(self.motion.handle(opening)).translation)
+        self.motion.believe_handle(self._off(self.motion.handle(opening).translation, values.distance))
         handle = self.motion.handle(opening)
         yield self._rail_to(handle, values.beside_handle)
         yield self._manipulator.send(PoseGoal(handle, values.handle_standoff, ("door_handle",)))
@@ -286,15 +287,6 @@ class _Job:
 
     def _by(self, dx: float, dy: float, dz: float, *may_touch: str) -> Action[Any, Any]:
         return self._manipulator.send(PoseRelGoal((dx, dy, dz), may_touch))
-
-    def _believed(self, pose: RigidTransform) -> RigidTransform:
-        """A pose as the robot believes it when its camera has seen it: off in place and turn."""
-        place = self._off(pose.translation, self._parameters.distance)
-        axis = self._rng.normal(size=3)
-        angle = self._rng.normal() * np.deg2rad(self._cell.hidden.errors.camera_angle_deg)
-        return RigidTransform.from_components(
-            place, Rotation.from_rotvec(angle * axis / np.linalg.norm(axis)) * pose.rotation
-        )
 
     def _off(self, place: FloatArray, distance: float) -> FloatArray:
         """A place (3,) m off by what arm and rail err, and by what a camera errs that sees it from a `distance` (m)."""
