@@ -25,11 +25,12 @@ from regrasp.motion.grasping.approach import Cylinder, PickParameters, find_appr
 from regrasp.motion.grasping.grasps import Grasp
 from regrasp.motion.planning.planner import PlannerParameters, plan
 from regrasp.motion.planning.separation import SeparationParameters, SpeedBySeparation
-from regrasp.motion.planning.straight import can_continue, straight_line
+from regrasp.motion.planning.straight import can_continue, straight_line, straight_lines
 from regrasp.motion.request import MotionRequest
 from regrasp.motion.robots.arm_offsets import JointOffsetParameters, joint_offsets
 from regrasp.motion.robots.contact_guard import ContactLimits
 from regrasp.motion.robots.dynamics import ArmDynamics
+from regrasp.motion.robots.poses import multiply
 from regrasp.motion.scene.collision import Clearances, CollisionModel
 from regrasp.motion.scene.distance_grid import NO_SURFACES
 from regrasp.motion.scene.planning_scene import NO_POINTS, PlanningScene, PlanningSceneParameters
@@ -110,11 +111,13 @@ class Motion(PlanningScene):
         world_from_tool: RigidTransform,
         *,
         onward: Sequence[RigidTransform] = (),
+        may_touch: Collection[Box] | None = None,
         margin: float | None = None,
     ) -> MotionRequest:
         """As `move`, to any joints that bring the tool to a pose. A rail stays where it is if that will do.
 
-        From there the tool must also reach the poses `onward` (goal_from_tool) in straight lines.
+        From there the tool must also reach the poses `onward` (goal_from_tool) in straight lines. With `may_touch`,
+        joints come first from which these lines keep `straight_margin` from everything but these boxes.
         """
         for pose in (world_from_tool, *onward):
             finite_pose("the tool's pose", pose)
@@ -127,6 +130,8 @@ class Motion(PlanningScene):
             def path_to(ends: FloatArray) -> FloatArray:
                 ends = kin.turned_off_limits(ends, self.parameters.limit_margin)
                 goals = [end for end in ends if can_continue(kin, end, onward)]
+                if may_touch is not None:
+                    goals = [end for end in goals if self._free_onward(arm, end, onward, may_touch)] or goals
                 try:
                     return self._plan(model, q, np.array(goals).reshape(-1, len(kin)), margin)
                 except PlanningError:
@@ -422,6 +427,16 @@ class Motion(PlanningScene):
         kin = self.kinematics[arm]
         distance = float(np.linalg.norm(place - kin.base[:3, 3]))
         return f"{distance:.2f} m from its base, and its links measure {kin.reach:.2f} m"
+
+    def _free_onward(
+        self, arm: str, q: FloatArray, onward: Sequence[RigidTransform], may_touch: Collection[Box]
+    ) -> bool:
+        """Whether straight lines from joints (n,) to the poses `onward` (goal_from_tool) are free but for the boxes."""
+        kin = self.kinematics[arm]
+        tool = kin.tool_matrix(q)
+        path = straight_lines(kin, q, [multiply(tool, pose.as_matrix()) for pose in onward])
+        model = self.model(arm, without=may_touch)
+        return path is not None and model.path_free(path, self.parameters.straight_margin)
 
     def _check_shift(self, model: CollisionModel, path: FloatArray, length: float) -> None:
         """Raises PlanningError MOTION_BLOCKED with the nearest thing unless a path of `length` m is free.

@@ -198,8 +198,8 @@ class PrinterMotion(Motion):
     ) -> Request[None]:
         """Bring the tool along a free path `standoff` m before a pose (world_from_tool), then straight into it.
 
-        On the straight way the arm may touch the things named in `may_touch`, such as what its fingers come round.
-        The arm takes joints from which it can go on in straight lines to the poses `onward` (goal_from_tool).
+        On straight ways the arm may touch the things named in `may_touch`, such as what its fingers come round. The arm
+        takes joints from which it can go on in straight lines to the poses `onward` (goal_from_tool).
         """
         finite_pose("the tool's pose", goal)
         way = RigidTransform.from_translation([not_negative("the standoff", standoff), 0.0, 0.0])
@@ -207,7 +207,7 @@ class PrinterMotion(Motion):
 
         def steps() -> Iterator[None]:
             after = [way, *(way * pose for pose in onward)] if standoff else list(onward)
-            yield from self._done(self.move_tool(arm, goal * way.inv(), onward=after))
+            yield from self._done(self.move_tool(arm, goal * way.inv(), onward=after, may_touch=spared))
             if standoff:
                 displacement = goal.translation - self.tool(arm).translation
                 yield from self._done(self.shift(arm, displacement, without=spared))

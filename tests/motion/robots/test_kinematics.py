@@ -2,11 +2,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from robots import VX300S
+from robots import UR5E, UR5E_ON_RAIL, VX300S
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cell import OPTICAL
+from regrasp.interfaces.robot.robot import Robot
 from regrasp.motion.robots.answers import wrap
 from regrasp.motion.robots.kinematics import ArmKinematics
 from regrasp.motion.robots.views import ik_view
@@ -104,3 +105,19 @@ def test_view_is_found_for_nine_in_ten_reachable_views_and_upright_comes_first()
 def test_view_needs_a_camera_along_the_link() -> None:
     with pytest.raises(ValueError, match="along the last joint's axis"):
         ik_view(KIN, RigidTransform.identity(), RigidTransform.identity())
+
+
+@pytest.mark.parametrize("robot", [UR5E, UR5E_ON_RAIL, VX300S], ids=["ur5e", "ur5e_on_rail", "vx300s"])
+@settings(max_examples=40, deadline=None)
+@given(st.data())
+def test_a_joint_near_its_limit_is_turned_back_to_the_same_pose(robot: Robot, data: st.DataObject) -> None:
+    kin, margin = ArmKinematics(robot, BASE), 0.1
+    q = np.array([data.draw(st.floats(float(a), float(b))) for a, b in zip(kin.lower, kin.upper, strict=True)])
+    i = data.draw(st.integers(0, len(q) - 1))
+    q[i] = data.draw(st.sampled_from([kin.lower[i], kin.upper[i], kin.upper[i] - margin / 2.0]))
+    (back,) = kin.turned_off_limits(q[None], margin)
+    assert kin.tool_matrix(back) == pytest.approx(kin.tool_matrix(q), abs=1e-9)
+    within = (back >= kin.lower + margin) & (back <= kin.upper - margin)
+    room = ~kin.chain.slides & (kin.upper - kin.lower >= 2.0 * np.pi + 2.0 * margin)
+    assert np.all(within[room])
+    assert np.all(back[~room] == q[~room])

@@ -199,7 +199,7 @@ class _Job:
         along = RigidTransform.from_translation
         deeper = self._parameters.deeper
         onward = along([deeper, 0.0, 0.0]), along([deeper - self._parameters.out, 0.0, 0.0])
-        yield "goal", iter([self._go(goal, *onward)])
+        yield "goal", iter([self._go(goal, *onward, may_touch=("section", "part", "plate", "plate_bed"))])
         yield "section", iter([self._by(-self._parameters.deeper, 0.0, 0.0, "section", "part")])
         yield "out of the printer", self._draw_out()
         yield "clamp", self._to_clamp()
@@ -235,8 +235,9 @@ class _Job:
         pose = RigidTransform.from_components(self._off(place, 0.0), TO_THE_PRINTER)
         yield self._rail_to(pose, values.beside_clamp)
         down = RigidTransform.from_translation([0.0, 0.0, -values.above])
-        yield self._go(pose, down, pose.inv() * self._twisted(pose * down))
-        yield self._by(0.0, 0.0, -values.above, "clamp_bed", "clamp_left", "clamp_right")
+        clamp = ("clamp_bed", "clamp_left", "clamp_right")
+        yield self._go(pose, down, pose.inv() * self._twisted(pose * down), may_touch=clamp)
+        yield self._by(0.0, 0.0, -values.above, *clamp)
 
     def _twist(self) -> Iterator[Request[Any]]:
         """The clamp holds the plate, and the hand turns the part about its own axis."""
@@ -270,9 +271,9 @@ class _Job:
         yield self.motion.sleep(self._arm)
         yield self._manipulator.send(JointGoal(self._sleep[1:]))
 
-    def _go(self, pose: RigidTransform, *onward: RigidTransform) -> Request[Any]:
+    def _go(self, pose: RigidTransform, *onward: RigidTransform, may_touch: tuple[str, ...] = ()) -> Request[Any]:
         def steps() -> Iterator[None]:
-            action = self._manipulator.send(PoseGoal(pose, onward=onward))
+            action = self._manipulator.send(PoseGoal(pose, may_touch=may_touch, onward=onward))
             while not action.poll():
                 yield
             off = float(np.linalg.norm(action.answer.tool.translation - pose.translation))

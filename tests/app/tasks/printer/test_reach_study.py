@@ -43,3 +43,11 @@ def test_a_place_that_cannot_be_reached_is_told_with_its_cause() -> None:
     assert "beam" in missed["goal"] or "keeps" in missed["goal"]
     assert "start 45-CE" not in missed
     assert "places reached; " in str(row)
+
+
+def test_the_goal_is_reached_with_joints_from_which_the_straight_way_to_the_section_is_free() -> None:
+    """From the nearest joints of this seed's goal the elbow would meet the printer's top on the way."""
+    cell = load_cell(shipped("cell")["habitat"])
+    assert isinstance(cell, PrinterCell)
+    (row,) = reach.run_seed(cell, 115, reach.ReachParameters())
+    assert [place for place in row.places if place.why] == []
