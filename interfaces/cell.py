@@ -140,6 +140,26 @@ class Region(Model):
         return self
 
 
+_MOST_VOXELS = 3e6  # of a map, which each look goes through: choice, some 0.3 s
+
+
+class MappedRegion(Region):
+    """Where obstacles are mapped, in voxels."""
+
+    voxel: Length = 0.01  # edge, m; choice: a hand must pass between obstacles 0.1 m apart
+
+    @model_validator(mode="after")
+    def _not_too_many(self) -> Self:
+        sides = np.array(self.upper) - self.lower
+        if (count := float(np.prod(sides / self.voxel))) > _MOST_VOXELS:
+            least = np.ceil(1e3 * np.cbrt(np.prod(sides) / _MOST_VOXELS)) / 1e3
+            raise ValueError(
+                f"has {count / 1e6:.0f} million voxels, at most {_MOST_VOXELS / 1e6:.0f} million are allowed; "
+                f"make the region smaller, or add voxel: {least:g}"
+            )
+        return self
+
+
 class KnownCell(Model):
     """What the robot's software is told about the cell. A task adds its section under the task's name."""
 
@@ -147,7 +167,7 @@ class KnownCell(Model):
     arms: tuple[ArmSpec, ...]
     cameras: tuple[CameraSpec, ...]
     latencies: Latencies
-    mapped: Region | None = None  # where obstacles are mapped; left out: before the arms, see `PerceptionParameters`
+    mapped: MappedRegion | None = None  # left out: before the arms, see `PerceptionParameters`
 
     def solids(self) -> list[Box]:
         """All fixed and known obstacles, as boxes along the world's axes."""

@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import FloatArray
-from regrasp.interfaces.cell import FixedMount, KnownCell
+from regrasp.interfaces.cell import FixedMount, KnownCell, MappedRegion
 from regrasp.interfaces.devices import Camera, Clock
 from regrasp.interfaces.frame import RgbdFrame
 from regrasp.interfaces.services import Obstacles
@@ -26,8 +26,7 @@ class PerceptionParameters:
     """The mapped region, what counts as a new obstacle, and the parameters of the parts."""
 
     # World frame, m. Where obstacles may matter: in the thesis's cell from the arms' bases to the panel that they face.
-    region_lower: tuple[float, float, float] = (0.0, -0.44, 0.01)
-    region_upper: tuple[float, float, float] = (0.50, 0.44, 0.62)
+    region: MappedRegion = MappedRegion(lower=(0.0, -0.44, 0.01), upper=(0.50, 0.44, 0.62))
     min_new_voxels: int = 80  # of a new obstacle: the front of a piece of 9 cm
     mapped_distance: float = 0.03  # m; choice: what is so near to a mapped thing is the noise of its edges: 100 voxels
     surface_step: int = 3  # px between the readings of `surface`
@@ -71,12 +70,8 @@ class Perception:
         self._known, self._cameras, self._clock = known, cameras, clock
         self.pose_of, self._arm_spheres = pose_of, arm_spheres
         self._health = {name: CameraHealth(name, parameters.health) for name in cameras}
-        lower, upper = parameters.region_lower, parameters.region_upper
-        if known.mapped is not None:
-            lower, upper = known.mapped.lower, known.mapped.upper
-        self.occupancy = Occupancy(
-            np.array(lower), np.array(upper), known.solids(), self._spared(), parameters.occupancy
-        )
+        region = parameters.region if known.mapped is None else known.mapped
+        self.occupancy = Occupancy(region, known.solids(), self._spared(), parameters.occupancy)
 
     @property
     def fixed_cameras(self) -> tuple[str, ...]:

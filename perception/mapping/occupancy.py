@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import ColorImage, DepthImage, FloatArray, Mask
-from regrasp.interfaces.cell import Box
+from regrasp.interfaces.cell import Box, MappedRegion
 from regrasp.interfaces.fields import Color
 from regrasp.interfaces.frame import Intrinsics, RgbdFrame
 from regrasp.perception.camera.color import SegmentationParameters, color_mask
@@ -26,7 +26,6 @@ NO_READING = 1e3  # m; farther than any reading
 class OccupancyParameters:
     """Resolution of the map, and which depth readings are obstacles."""
 
-    voxel_size: float = 0.010  # m; obstacles stand within 0.1 m of the connector, and a hand must pass between
     pixel_step: int = 4  # px; choice: the readings are 5 mm apart at 0.75 m
     known_margin: float = 0.025  # m; choice: depth scale 1.5 % of 0.85 m is 13 mm, camera pose 6 mm, noise 4 mm
     robot_margin: float = 0.02  # m; choice: arms are 5 mm off, depth scale 13 mm
@@ -66,14 +65,13 @@ class Occupancy:
 
     def __init__(
         self,
-        lower: FloatArray,
-        upper: FloatArray,
+        region: MappedRegion,
         known: Sequence[Box],
         spared: Spared | None = None,
         parameters: OccupancyParameters = OccupancyParameters(),
     ) -> None:
-        """The region is from `lower` to `upper` (3,) m, world frame. `known` boxes and the `spared` do not count."""
-        size = parameters.voxel_size
+        """The region is in the world frame. `known` boxes and the `spared` do not count."""
+        size, lower, upper = region.voxel, np.array(region.lower), np.array(region.upper)
         counts = np.ceil((upper - lower) / size - 1e-9).astype(int)
         grid = np.moveaxis(np.indices(tuple(counts)), 0, -1).reshape(-1, 3)
         centers = lower + (grid + 0.5) * size
@@ -182,9 +180,9 @@ class Occupancy:
 def near_boxes(points: FloatArray, boxes: Sequence[Box], margin: float) -> Mask:
     """Whether each of `points` (n, 3) m is inside one of `boxes` or within `margin` m of it; (n,)."""
     near = np.zeros(len(points), np.bool_)
-    for box in boxes:
-        beyond = np.maximum(np.abs(points - box.center) - 0.5 * np.asarray(box.size), 0.0)
-        near |= np.einsum("ij,ij->i", beyond, beyond) <= margin**2
+    centers = np.array([box.center for box in boxes], float).reshape(-1, 3)
+    sizes = np.array([box.size for box in boxes], float).reshape(-1, 3)
+    _mark_near_boxes(points, centers, 0.5 * sizes, margin**2, near)
     return near
 
 
@@ -202,6 +200,19 @@ def _mark_near(points: FloatArray, centers: FloatArray, squares: FloatArray, nea
         for m in range(len(centers)):
             x, y, z = points[n, 0] - centers[m, 0], points[n, 1] - centers[m, 1], points[n, 2] - centers[m, 2]
             if x * x + y * y + z * z <= squares[m]:
+                near[n] = True
+                break
+
+
+@numba.njit(cache=True)
+def _mark_near_boxes(points: FloatArray, centers: FloatArray, halves: FloatArray, square: float, near: Mask) -> None:
+    """Mark in `near` (n,) the points (n, 3) whose squared distance to a box is at most `square`; (m, 3) half sizes."""
+    for n in range(len(points)):
+        for m in range(len(centers)):
+            distance = 0.0
+            for i in range(3):
+                distance += max(abs(points[n, i] - centers[m, i]) - halves[m, i], 0.0) ** 2
+            if distance <= square:
                 near[n] = True
                 break
 

@@ -129,9 +129,14 @@ def _upside_down(data: Any) -> None:
     data["known"]["mapped"] = {"lower": [0, 0, 0.5], "upper": [1, 1, 0.2]}
 
 
+def _too_many_voxels(data: Any) -> None:
+    data["known"]["mapped"] = {"lower": [0, 0, 0], "upper": [2, 3, 2]}
+
+
 @pytest.mark.parametrize(
     ("spoil", "message"),
     [
+        (_too_many_voxels, "12 million voxels, at most 3 million are allowed; .* add voxel: 0.016"),
         (_upside_down, "lower is not below upper"),
         (_misspell, "Extra inputs"),
         (_no_direction, "a direction must not be zero"),

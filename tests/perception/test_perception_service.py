@@ -6,7 +6,7 @@ from raycast import BLACK, PURPLE, REAR_POSE, WOOD, Block, Cylinder, Sensor, ren
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.cable.cell import CableKnown
-from regrasp.interfaces.cell import KnownCell, Region
+from regrasp.interfaces.cell import KnownCell, MappedRegion
 from regrasp.interfaces.frame import Intrinsics, RgbdFrame
 from regrasp.perception.cable.service import CablePerception
 from regrasp.perception.mapping.occupancy import Spheres, Voxel
@@ -109,7 +109,7 @@ def test_a_cell_may_say_where_obstacles_are_mapped(known: CableKnown) -> None:
     eye = Eye()
     eye.show(seen(FOAM), number=1, stamp=0.0)
     middle = float(0.5 * (FOAM.lower[1] + FOAM.upper[1]))
-    half = known.model_copy(update={"mapped": Region(lower=(0.16, middle, 0.01), upper=(0.5, 0.44, 0.62))})
+    half = known.model_copy(update={"mapped": MappedRegion(lower=(0.16, middle, 0.01), upper=(0.5, 0.44, 0.62))})
     eyes = perception(half, eye)
     assert eyes.map_obstacles("rear") > 0
     assert float(eyes.occupancy.occupied_points()[:, 1].min()) > middle
@@ -183,7 +183,7 @@ def test_without_a_task_the_connector_is_an_obstacle_like_another(known: CableKn
     points, edge, unseen, _ = eyes.obstacles()
     assert len(points) + len(unseen) == found
     assert np.linalg.norm(points - PLACE, axis=1).min() < 0.04
-    assert edge == eyes.parameters.occupancy.voxel_size
+    assert edge == eyes.parameters.region.voxel
     spared = perception(known, eye)
     spared.look_around()
     assert len(spared.obstacles()[0]) < found

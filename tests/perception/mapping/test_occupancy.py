@@ -8,14 +8,15 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.cable.cell import Connector
-from regrasp.interfaces.cell import OPTICAL, Box, pose_along
+from regrasp.interfaces.cell import OPTICAL, Box, MappedRegion, pose_along
 from regrasp.interfaces.frame import Intrinsics
 from regrasp.perception.mapping.occupancy import Occupancy, OccupancyParameters, Spared, Voxel, near_boxes
 
 Points = NDArray[np.float64]
 REAR = Intrinsics.from_fov(848, 480, np.deg2rad(65.0))
 WRIST = Intrinsics.from_fov(848, 480, np.deg2rad(69.4))
-PARAMETERS = OccupancyParameters(voxel_size=0.015)
+REGION = MappedRegion(lower=(0.0, -0.45, 0.0), upper=(0.52, 0.45, 0.65), voxel=0.015)
+PARAMETERS = OccupancyParameters()
 KNOWN = [
     Box(name="floor", center=(0.2, 0.0, -0.02), size=(2.4, 2.4, 0.04)),
     Box(name="back_panel", center=(0.5145, 0.0, 0.305), size=(0.013, 0.9144, 0.6096)),
@@ -30,11 +31,9 @@ HIDDEN_END = Cylinder(np.array([0.43, 0.0, 0.25]), np.array([0.0, 1.0, 0.1]), co
 
 def empty(connector: Connector) -> Occupancy:
     return Occupancy(
-        np.array([0.0, -0.45, 0.0]),
-        np.array([0.52, 0.45, 0.65]),
+        REGION,
         KNOWN,
         Spared(connector.color, 2 * connector.radius),
-        PARAMETERS,
     )
 
 
