@@ -26,7 +26,9 @@ class PerceptionParameters:
     """The mapped region, what counts as a new obstacle, and the parameters of the parts."""
 
     # World frame, m. Where obstacles may matter: in the thesis's cell from the arms' bases to the panel that they face.
-    region: MappedRegion = MappedRegion(lower=(0.0, -0.44, 0.01), upper=(0.50, 0.44, 0.62))
+    region: MappedRegion = field(
+        default_factory=lambda: MappedRegion(lower=(0.0, -0.44, 0.01), upper=(0.50, 0.44, 0.62))
+    )
     min_new_voxels: int = 80  # of a new obstacle: the front of a piece of 9 cm
     mapped_distance: float = 0.03  # m; choice: what is so near to a mapped thing is the noise of its edges: 100 voxels
     surface_step: int = 3  # px between the readings of `surface`
