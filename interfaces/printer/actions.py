@@ -60,8 +60,8 @@ class Device(Protocol[Goal, Feedback, Result]):
 class PoseGoal:
     """Bring the tool to a pose, world_from_tool; the rail moves too where the arm alone does not reach.
 
-    The last `standoff` m it goes straight along the tool's axis. There it may touch the things named in `may_touch`.
-    From the pose the arm must be able to go on in straight lines to the poses `onward`, goal_from_tool.
+    The last `standoff` m it goes straight along the tool's axis. From the pose the arm must be able to go on in
+    straight lines to the poses `onward`, goal_from_tool. On straight ways it may touch the things named in `may_touch`.
     """
 
     pose: "RigidTransform"
