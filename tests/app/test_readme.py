@@ -92,4 +92,14 @@ def test_the_first_robot_has_no_key_that_may_be_left_out(key: str, tmp_path: Pat
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_every_link_leads_somewhere(page: Path) -> None:
     for link in re.findall(r"\]\(([^)]+)\)", page.read_text(encoding="utf-8")):
-        assert link.startswith("https://") or (page.parent / link).exists(), link
+        if link.startswith("https://"):
+            continue
+        path, _, section = link.partition("#")
+        assert (page.parent / path).exists(), link
+        assert not section or section in sections(page.parent / path), link
+
+
+def sections(page: Path) -> list[str]:
+    """The name by which a link leads to each heading, as GitHub makes it: small letters, no marks, a dash for a blank."""
+    headings = re.findall(r"^#+ (.*)$", page.read_text(encoding="utf-8"), re.MULTILINE)
+    return [re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-") for heading in headings]
