@@ -4,6 +4,7 @@ from collections.abc import Generator, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import RigidTransform
@@ -38,6 +39,16 @@ class CarryMotion(SearchMotion):
     """Carries a held connector on its cable."""
 
     parameters: CarryMotionParameters
+
+    def __init__(self, *args: Any, **keywords: Any) -> None:
+        """See `Motion`."""
+        super().__init__(*args, **keywords)
+        self._caught: list[FloatArray] = []  # places (3,) m of the cable's end at which a touch stopped the arm
+
+    def forget_felt(self) -> bool:
+        """See `PlanningScene`; the places at which the cable may have been caught are forgotten, too."""
+        caught, self._caught = self._caught, []
+        return super().forget_felt() or bool(caught)
 
     def carry(
         self,
@@ -87,8 +98,11 @@ class CarryMotion(SearchMotion):
             try:
                 allowed = self._along_cable(limits, held)
                 yield from self._follow(arm, path, min(speed, self._pace(optimistic)), model, allowed)
-            except TouchError:
+            except TouchError as error:
                 yield from self._while_open(arm)
+                # The cable behind the connector may have touched, and not the arm: the place that is mapped as felt, on
+                # the arm, then does not keep the next path from the same touch.
+                self._caught.append(self._cable_end(kin.tool(error.touch.joints) * held))
                 raise
 
         def tries() -> Iterator[None]:
@@ -122,7 +136,11 @@ class CarryMotion(SearchMotion):
         """The cable of what is held (tool_from_connector) as a constraint on a path that begins at joints `q` (n,)."""
         tether, kin = self.parameters.tether, self.kinematics[arm]
         grid = self.grid_beside(cable_course(self.known, kin.tool(q) * held), tether.seen_free, optimistic)
-        return Tether(self.known, held, q, kin, self.known.solids(), grid, max_bend, tether)
+        return Tether(self.known, held, q, kin, self.known.solids(), grid, max_bend, tether, self._caught)
+
+    def _cable_end(self, world_from_connector: RigidTransform) -> FloatArray:
+        """Where (3,) m the cable goes into a connector."""
+        return world_from_connector.apply([-0.5 * self.known.cable.connector.length, 0.0, 0.0])
 
     def _along_cable(self, limits: ContactLimits, held: RigidTransform) -> ContactLimits:
         """The limits, with the cable free to pull along itself at what is held (tool_from_connector)."""

@@ -37,15 +37,18 @@ class TetherParameters:
     near_ends: float = 0.06
     slack: float = 0.001  # m by which a path may make worse what is not kept where it begins; choice
     bend_slack: float = 0.5  # 1/m, the same of the curvature
+    caught: float = 0.04  # m that the cable's end keeps away from where a touch stopped it; choice
+    caught_share: float = 0.8  # of its distance from there at the start, which it keeps at most; choice
 
 
 @nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
 def _course(  # type: ignore[no-untyped-def]
-    end, anchor, direction, full, points, near_ends, boxes, distance, lower, h
+    end, anchor, direction, full, points, near_ends, boxes, distance, lower, h, caught
 ):
     """(length, clearance, bend) of the cable: m of its course and to anything, 1/m at the connector.
 
-    `end` (4, 4) is that of the cable in the world, x along the cable, whose length is `full` m.
+    `end` (4, 4) is that of the cable in the world, x along the cable, whose length is `full` m. It keeps clear of the
+    spheres `caught` (n, 4) m: centre and radius.
     """
     p, d = end[:3, 3], end[:3, 0]
     chord = np.sqrt(((p - anchor) ** 2).sum())
@@ -67,6 +70,8 @@ def _course(  # type: ignore[no-untyped-def]
         clearance = min(clearance, grid_distance(here, distance, lower, h))
         for b in range(boxes.shape[0]):
             clearance = min(clearance, box_distance(here, boxes[b]))
+    for i in range(caught.shape[0]):
+        clearance = min(clearance, np.sqrt(((p - caught[i, :3]) ** 2).sum()) - caught[i, 3])
     onward = 6.0 * (anchor - p) + chord * (2.0 * direction + 4.0 * d)  # second derivative of the curve at the connector
     bend = np.sqrt((np.cross(d, onward) ** 2).sum()) / (chord * chord)
     # A rod with both ends clamped that is too long by s bulges by a = 2 sqrt(s L) / pi, and its ends bend by
@@ -97,7 +102,7 @@ def course_length(known: CableKnown, world_from_connector: FloatArray, points: i
     end[:3, 3] -= 0.5 * known.cable.connector.length * end[:3, 0]
     anchor, direction = known.cable.anchor
     nothing = np.full((1, 1, 1), FREE_DISTANCE, np.float32)
-    surroundings = box_table([]), nothing, np.zeros(3), 1e-3
+    surroundings = box_table([]), nothing, np.zeros(3), 1e-3, np.empty((0, 4))
     full = known.cable.length
     return float(_course(end, anchor, np.asarray(direction, float), full, points, 0.0, *surroundings)[0])
 
@@ -121,18 +126,24 @@ class Tether:
         grid: DistanceGrid,
         max_bend: float = np.inf,
         parameters: TetherParameters = TetherParameters(),
+        caught: Sequence[FloatArray] = (),
     ) -> None:
         """The arm holds the connector at `held` (tool_from_connector); its joints at the start are `start` (n,).
 
-        The cable keeps clear of the `boxes`, and of what `grid` says, and bends by at most `max_bend` 1/m.
+        The cable keeps clear of the `boxes`, and of what `grid` says, and bends by at most `max_bend` 1/m. Its
+        end keeps away from the places `caught` (3,) m, in the world, at which a touch stopped it before.
         """
         self._connector_from_end = np.eye(4)
         self._connector_from_end[0, 3] = -0.5 * known.cable.connector.length
+        held_end = held.as_matrix() @ self._connector_from_end
+        begin = (kinematics.tool_matrix(np.asarray(start, float)) @ held_end)[:3, 3]
+        kept = [min(parameters.caught, parameters.caught_share * np.linalg.norm(begin - place)) for place in caught]
+        spheres = [[*place, radius] for place, radius in zip(caught, kept, strict=True)]
         anchor, direction = known.cable.anchor
         self._arguments = (
             kinematics.base,
             kinematics.joints,
-            np.ascontiguousarray(kinematics.last_from_tool @ held.as_matrix() @ self._connector_from_end),
+            np.ascontiguousarray(kinematics.last_from_tool @ held_end),
             anchor,
             np.asarray(direction, float),
             known.cable.length,
@@ -142,6 +153,7 @@ class Tether:
             np.ascontiguousarray(grid.distance),
             grid.lower,
             float(grid.h),
+            np.array(spheres, float).reshape(-1, 4),
         )
         self._step = parameters.step
         length, clearance, bend = _state(np.asarray(start, float), *self._arguments)

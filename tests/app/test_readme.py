@@ -100,6 +100,6 @@ def test_every_link_leads_somewhere(page: Path) -> None:
 
 
 def sections(page: Path) -> list[str]:
-    """The name by which a link leads to each heading, as GitHub makes it: small letters, no marks, a dash for a blank."""
+    """The name of each heading in a link, as GitHub makes it: small letters, no marks, a dash for a blank."""
     headings = re.findall(r"^#+ (.*)$", page.read_text(encoding="utf-8"), re.MULTILINE)
     return [re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-") for heading in headings]

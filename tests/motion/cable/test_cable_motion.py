@@ -68,6 +68,34 @@ def test_a_carry_takes_the_way_that_the_cable_goes_to_the_first_goal(rig: Rig) -
     assert length < 1.2 * np.linalg.norm((goals[0] * held).translation - (start * held).translation)
 
 
+def test_a_carry_does_not_take_the_cable_again_to_where_it_was_caught(
+    rig: Rig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(rig.motion, "feel", lambda arm, touch: touch.joints[:3])  # nothing is mapped
+    held = in_hand(rig, [0.02, 0.0, 0.10])
+    goal = natural_pose(rig.known, np.array([-0.04, 0.0, 0.17])) * held.inv()
+    end_in_tool = held.apply([-0.5 * rig.known.cable.connector.length, 0.0, 0.0])
+
+    def cable_end(q: Points) -> Points:
+        return rig.motion.kinematics["right"].tool(q).apply(end_in_tool)
+
+    halfway = 0.5 * (cable_end(rig.motion.joints("right")) + goal.apply(end_in_tool))
+    caught: list[Points] = []
+
+    def touches(q: Points) -> bool:
+        if np.linalg.norm(cable_end(q) - halfway) < 0.02:
+            caught.append(cable_end(q))
+        return bool(caught)
+
+    rig.arms["right"].bumps.append(touches)
+    rig.run(rig.motion.carry("right", [goal], held, speed=0.5))
+    assert rig.motion.tool("right").translation == pytest.approx(goal.translation, abs=1e-3)
+    kept = min(np.linalg.norm(cable_end(q) - caught[0]) for q in flown(rig, "right"))
+    assert kept > 0.02
+    assert rig.motion.forget_felt()
+    assert not rig.motion.forget_felt()
+
+
 def test_a_goal_from_which_the_tool_cannot_go_on_is_no_goal(rig: Rig) -> None:
     held = in_hand(rig, [0.02, 0.0, 0.10])
     goals = [natural_pose(rig.known, np.array([-0.04, 0.0, 0.17])) * held.inv()]

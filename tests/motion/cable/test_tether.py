@@ -1,5 +1,7 @@
 """The cable as a constraint on where an arm may take its end."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 from fake_devices import Rig
@@ -33,8 +35,10 @@ class Held:
         found: FloatArray = self.kin.ik(connector * self.held.inv(), self.start)[0]
         return found
 
-    def tether(self, grid: DistanceGrid = NOTHING, max_bend: float = np.inf) -> Tether:
-        return Tether(self.known, self.held, self.start, self.kin, [], grid, max_bend)
+    def tether(
+        self, grid: DistanceGrid = NOTHING, max_bend: float = np.inf, caught: Sequence[FloatArray] = ()
+    ) -> Tether:
+        return Tether(self.known, self.held, self.start, self.kin, [], grid, max_bend, caught=caught)
 
 
 @pytest.fixture(scope="module")
@@ -80,3 +84,26 @@ def test_what_touches_the_cable_at_the_start_does_not_forbid_every_way(known: Ca
     tether = bent.tether(grid_of(lies_on))
     assert tether.holds(bent.start)
     assert tether.holds(bent.at(natural_pose(known, BENT + np.array([0.0, 0.0, 0.05]))))
+
+
+def cable_end(held: Held, connector: RigidTransform) -> FloatArray:
+    """Where (3,) m the cable goes into the connector."""
+    return connector.apply([-0.5 * held.known.cable.connector.length, 0.0, 0.0])
+
+
+def test_the_cable_s_end_keeps_away_from_where_it_was_caught(held: Held) -> None:
+    straight, between, beyond = (natural_pose(held.known, share * BENT) for share in (0.0, 0.5, 1.0))
+    tether = held.tether(caught=[cable_end(held, between)])
+    assert tether.holds(held.at(straight))
+    assert tether.holds(held.at(beyond))
+    assert not tether.holds_along(held.at(straight), held.at(beyond))
+    assert held.tether().holds_along(held.at(straight), held.at(beyond))
+
+
+@pytest.mark.parametrize("ahead", [0.0, 0.02])
+def test_a_cable_caught_close_to_the_start_may_go_any_other_way(held: Held, ahead: float) -> None:
+    straight, bent, other_way = (held.at(natural_pose(held.known, share * BENT)) for share in (0.0, 1.0, -1.0))
+    caught = cable_end(held, natural_pose(held.known, STRAIGHT)) + ahead * BENT / np.linalg.norm(BENT)
+    tether = held.tether(caught=[caught])
+    assert tether.holds_along(straight, other_way)
+    assert tether.holds_along(straight, bent) is (ahead == 0.0)
