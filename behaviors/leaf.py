@@ -28,10 +28,12 @@ class LeafFailed(Exception):  # noqa: N818 - it names the leaf's outcome
 class LeafPort(PortInformation):
     """A port with limits that the check of a tree file enforces.
 
-    A number is more than `above`; a string is one of the `names` that the cell gives to this kind of thing.
+    A number is more than `above`, and `least` or more; a string is one of the `names` that the cell gives to this kind
+    of thing.
     """
 
     above: float | None = None
+    least: float | None = None
     names: str | None = None
 
 

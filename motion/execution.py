@@ -173,8 +173,9 @@ class Execution:
             trouble, elapsed = yield from self._run(arm, trajectory, guard)
             if guard.touch is not None:
                 self._on_anomaly(felt := self._felt(arm, guard.touch))
-                with suppress(StoppedShortError):
-                    yield from self._back_off(arm, trajectory, elapsed)
+                if contact.back_off:
+                    with suppress(StoppedShortError):
+                        yield from self._back_off(arm, trajectory, elapsed)
                 raise TouchError(felt, guard.touch)
             if trouble is None:
                 break
@@ -253,6 +254,8 @@ class Execution:
             stood = evidence.detected and evidence.value > before - grip.moved
             if not stood:
                 break
+        if stood and before < thickness - grip.moved:
+            raise GraspEmptyError(f"the jaw closed on nothing: it stood {1e3 * before:.1f} mm open before")
         if stood:
             message = f"the {arm} jaw stands {1e3 * evidence.value:.1f} mm open, told {grip.attempts} times to close"
             raise self.give_up(arm, CauseCode.GRIPPER_FAILED, message)

@@ -29,7 +29,7 @@ _EXAMPLES = {int: "a whole number such as 3", float: "a number such as 0.5", boo
 
 @dataclass(frozen=True)
 class Attribute:
-    """What values an attribute takes, and whether it is a port. A number must be more than `above`."""
+    """What values an attribute takes, and whether it is a port. A number must be more than `above`, and `least` or more."""
 
     accepts: Accepts
     required: bool = True
@@ -37,6 +37,7 @@ class Attribute:
     is_output: bool = False
     takes_key: bool = True
     above: float | None = None
+    least: float | None = None
     default: Any = None
     about: str = ""
     refused: Mapping[str, str] = field(default_factory=dict)  # accepted words that cannot be used here, and why
@@ -47,6 +48,7 @@ class Attribute:
         if isinstance(self.accepts, tuple):
             return " or ".join(self.accepts)
         limit = "" if self.above is None else f" above {self.above:g}"
+        limit += "" if self.least is None else f" from {self.least:g} on"
         return getattr(self.accepts, "__name__", str(self.accepts)) + limit
 
     def problem(self, value: str) -> str | None:
@@ -67,6 +69,8 @@ class Attribute:
             return f"is not finite; {right}"
         if self.above is not None and result <= self.above:
             return f"is not above {self.above:g}; write more than {self.above:g}"
+        if self.least is not None and result < self.least:
+            return f"is below {self.least:g}; write {self.least:g} or more"
         return None
 
 
@@ -192,6 +196,7 @@ def _port(port: Any, is_output: bool, names: CellNames) -> Attribute:
         is_port=True,
         is_output=is_output,
         above=getattr(port, "above", None),
+        least=getattr(port, "least", None),
         default=port.default_value,
         about=port.description,
         refused={name: why for name, why in known.items() if why} if isinstance(known, Mapping) else {},

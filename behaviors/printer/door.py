@@ -14,7 +14,7 @@ class GripHandle(PrinterLeaf):
 
     def steps(self) -> LeafSteps:
         """See the class."""
-        yield self.services.motion.take_handle(self.hand)
+        yield self.with_hand(self.services.motion.take_handle(self.hand))
 
 
 class RailToHandle(PrinterLeaf):
@@ -61,7 +61,7 @@ class LookAtHandle(PrinterLeaf):
 
 
 class ReachHandle(PrinterLeaf):
-    """Brings the open gripper `standoff` m before the handle, then straight round it."""
+    """Brings the open gripper `standoff` m before the handle, then straight round it; fails if it is not open enough."""
 
     INPUT_PORTS: ClassVar[dict[str, Any]] = {
         "standoff": LeafPort(data_type=float, above=0.0, description="m before the handle, from where it goes straight")
@@ -70,6 +70,10 @@ class ReachHandle(PrinterLeaf):
     def steps(self) -> LeafSteps:
         """See the class."""
         motion = self.services.motion
+        gap, thickness = self.services.gripper.state().gap, self.services.known.printer.door.handle.size[1]
+        if gap <= thickness:
+            why = f"the jaw stands {1e3 * gap:.1f} mm open, and the handle is {1e3 * thickness:.1f} mm thick"
+            raise LeafFailed(CauseCode.MOTION_BLOCKED, why)
         handle = motion.handle(motion.door_opening)
         yield self.services.manipulator.send(PoseGoal(handle, self.get_input("standoff"), ("door_handle",)))
 
@@ -78,14 +82,14 @@ class SlideDoor(PrinterLeaf):
     """Moves the rail, and with it the door whose handle the gripper holds, until the door stands `opening` m open."""
 
     INPUT_PORTS: ClassVar[dict[str, Any]] = {
-        "opening": LeafPort(data_type=float, description="m that the door shall stand open; 0 closes it")
+        "opening": LeafPort(data_type=float, least=0.0, description="m that the door shall stand open; 0 closes it")
     }
 
     def steps(self) -> LeafSteps:
         """See the class."""
         motion = self.services.motion
         way = self.get_input("opening") - motion.door_opening
-        yield motion.slide_door(self.hand, float(motion.joints(self.hand)[0] + way))
+        yield self.with_arm(motion.slide_door(self.hand, float(motion.joints(self.hand)[0] + way)))
 
 
 class ArmBack(PrinterLeaf):
@@ -97,4 +101,4 @@ class ArmBack(PrinterLeaf):
 
     def steps(self) -> LeafSteps:
         """See the class."""
-        yield self.services.motion.draw_back(self.hand, self.get_input("distance"))
+        yield self.with_arm(self.services.motion.draw_back(self.hand, self.get_input("distance")))

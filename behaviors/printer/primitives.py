@@ -2,9 +2,10 @@
 
 from typing import Any, ClassVar
 
-from regrasp.behaviors.leaf import LeafPort, LeafSteps
+from regrasp.behaviors.leaf import LeafFailed, LeafPort, LeafSteps
 from regrasp.behaviors.printer.leaf import PrinterLeaf
 from regrasp.interfaces.printer.actions import GripperGoal, ImageGoal, JointGoal, PoseGoal, PoseRelGoal, RailGoal
+from regrasp.interfaces.printer.cause import PrinterCause
 
 
 def _meters(what: str) -> LeafPort:
@@ -35,6 +36,7 @@ class MoveToPose(PrinterLeaf):
             data_type=float,
             required=False,
             default_value=0.0,
+            least=0.0,
             description="m before the pose, from where it goes straight",
         ),
     }
@@ -74,7 +76,9 @@ class MoveJoints(PrinterLeaf):
 class MoveGripper(PrinterLeaf):
     """Brings the gripper's pads `gap` m from each other."""
 
-    INPUT_PORTS: ClassVar[dict[str, Any]] = {"gap": LeafPort(data_type=float, description="m between the pads")}
+    INPUT_PORTS: ClassVar[dict[str, Any]] = {
+        "gap": LeafPort(data_type=float, least=0.0, description="m between the pads")
+    }
 
     def steps(self) -> LeafSteps:
         """See the class."""
@@ -82,7 +86,7 @@ class MoveGripper(PrinterLeaf):
 
 
 class PressGripper(PrinterLeaf):
-    """Closes the gripper on whatever is between its pads, until they press with `force`."""
+    """Closes the gripper on what is between its pads until they press with `force`; fails if nothing is between them."""
 
     INPUT_PORTS: ClassVar[dict[str, Any]] = {
         "force": LeafPort(data_type=float, above=0.0, description="N of each finger")
@@ -115,14 +119,17 @@ class AnalyzeImage(PrinterLeaf):
         ),
     }
     OUTPUT_PORTS: ClassVar[dict[str, Any]] = {
-        "right": LeafPort(data_type=float, required=False, description="px from the picture's centre to the box's"),
-        "down": LeafPort(data_type=float, required=False, description="px from the picture's centre to the box's"),
+        "right": LeafPort(data_type=float, required=False, description="px right, from the picture's centre to the box's"),
+        "down": LeafPort(data_type=float, required=False, description="px down, from the picture's centre to the box's"),
         "area": LeafPort(data_type=float, required=False, description="px2 of the target's box"),
     }
 
     def steps(self) -> LeafSteps:
         """See the class."""
-        goal = ImageGoal(self.get_input("target"), self.get_input("seconds"))
+        try:
+            goal = ImageGoal(self.get_input("target"), self.get_input("seconds"))
+        except ValueError as error:  # of a key, whose value no check of the tree knows
+            raise LeafFailed(PrinterCause.TARGET_NOT_SEEN, str(error)) from error
         seen = yield from self.ask(self.services.analyzer.send(goal))
         for name, value in zip(self.OUTPUT_PORTS, (*seen.offset, seen.area), strict=True):
             self._set_output(name, value)

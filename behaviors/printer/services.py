@@ -7,7 +7,7 @@ from regrasp.behaviors.services import Services
 from regrasp.interfaces.printer.services import PrinterMotionService, PrinterPerceptionService
 
 if TYPE_CHECKING:
-    from regrasp.interfaces.printer.actions import GripperDevice, ImageAnalyzer, Manipulator, Rail
+    from regrasp.interfaces.printer.actions import GripperDevice, ImageAnalyzer, Manipulator, Rail, Turn
     from regrasp.interfaces.printer.cell import PrinterKnown
 
 
@@ -22,3 +22,5 @@ class PrinterServices(Services):
     gripper: "GripperDevice"
     rail: "Rail"
     analyzer: "ImageAnalyzer"
+    arm_and_rail: "Turn"
+    jaw: "Turn"

@@ -4,13 +4,14 @@ A device takes a goal and does it over many ticks. Until the result is there it 
 cancelled at any time; a new goal preempts the one under way. A goal that cannot be done ends with its cause.
 """
 
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Generic, Literal, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, Literal, Protocol, TypeVar
 
 from regrasp.interfaces.arguments import finite, finite_pose, not_negative, positive, vector
 from regrasp.interfaces.arrays import FloatArray
-from regrasp.interfaces.request import Request
+from regrasp.interfaces.printer.cause import PrinterCause
+from regrasp.interfaces.request import Request, RequestError
 from regrasp.interfaces.wall_time import Part
 
 if TYPE_CHECKING:
@@ -26,8 +27,8 @@ Target = Literal["obj", "targ"]  # the source's classes: the red part, and its b
 class Action(Request[Result], Generic[Feedback, Result]):
     """A goal under way: `poll` it every tick, `cancel` it at any time; `answer` is its result once it is done.
 
-    `feedback` tells how far it is, at any time. An action that was cancelled, or preempted by a new goal, counts as
-    done and has no result.
+    `feedback` tells how far it is, at any time. An action that was cancelled counts as done and has no result. One that
+    a new goal preempted is stopped, and its `poll` raises RequestError PREEMPTED.
     """
 
     def __init__(
@@ -39,20 +40,50 @@ class Action(Request[Result], Generic[Feedback, Result]):
     ) -> None:
         super().__init__(steps, stop, part)
         self.feedback = feedback
-        self.cancelled = False
+        self.cancelled = self._failed = False
+
+    def poll(self) -> bool:
+        """See `Request`."""
+        try:
+            return super().poll()
+        except RequestError:
+            self._failed = True
+            raise
 
     def cancel(self) -> None:
-        """See `Request`. An action that is done stays done."""
-        if not self.cancelled and not hasattr(self, "_answer"):
+        """See `Request`. An action that is done, or has failed, stays so."""
+        if self._under_way():
             self.cancelled = True
             super().cancel()
+
+    def preempt(self) -> None:
+        """Cancel it for the sake of a new goal; see `cancel`."""
+        if self._under_way():
+            self.cancel()
+            self._steps = _preempted()
+
+    def _under_way(self) -> bool:
+        return not (self.cancelled or self._failed or hasattr(self, "_answer"))
+
+
+def _preempted() -> Iterator[None]:
+    raise RequestError(PrinterCause.PREEMPTED, "another goal was sent to the device before this one was done")
+    yield
 
 
 class Device(Protocol[Goal, Feedback, Result]):
     """A device that does one goal at a time."""
 
     def send(self, goal: Goal) -> Action[Feedback, Result]:
-        """Begin with a goal; one under way is cancelled. Raises TypeError for a goal of another device."""
+        """Begin with a goal; one under way is preempted. Raises TypeError for a goal of another device."""
+        ...
+
+
+class Turn(Protocol):
+    """Who moves a part of the robot, such as arm and rail together: one action at a time."""
+
+    def take(self, request: Request[Any], feedback: Callable[[], Feedback]) -> Action[Feedback, Any]:
+        """A request of the motion service as an action that preempts the one under way."""
         ...
 
 
@@ -194,7 +225,14 @@ class Sighting:
     stamp: float  # s, of the picture
 
 
+class GripperDevice(Device[GripperGoal, GripperState, GripperState], Protocol):
+    """The gripper."""
+
+    def state(self) -> GripperState:
+        """The gap between the pads, as read."""
+        ...
+
+
 Manipulator = Device[ManipulatorGoal, ManipulatorState, ManipulatorState]
-GripperDevice = Device[GripperGoal, GripperState, GripperState]
 Rail = Device[RailGoal, RailState, RailState]
 ImageAnalyzer = Device[ImageGoal, ImageFeedback, Sighting]

@@ -7,4 +7,5 @@ class PrinterCause(StrEnum):
     """The causes."""
 
     HANDLE_NOT_FOUND = "handle_not_found"  # no camera showed the handle of the door
+    PREEMPTED = "preempted"  # another goal took the device
     TARGET_NOT_SEEN = "target_not_seen"  # no picture showed the part, or its gripping section

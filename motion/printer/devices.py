@@ -22,38 +22,43 @@ State = TypeVar("State")
 
 
 class OneAtATime:
-    """What arm and rail share: a goal of either preempts one under way of both."""
+    """Who moves a part of the robot, such as arm and rail together, or the jaw: a new action preempts the last one.
 
-    def __init__(self) -> None:
+    `moving` tells whether the part still moves: it may brake after what was preempted, and a new action begins once it
+    rests.
+    """
+
+    def __init__(self, moving: Callable[[], bool] = lambda: False) -> None:
+        self._moving = moving
         self._under_way: Action[Any, Any] | None = None
 
-    def begin(self, action: Action[State, State]) -> Action[State, State]:
-        """Cancel the action under way; the new one, to be polled."""
+    def take(
+        self, request: Request[Any], feedback: Callable[[], State], result: Callable[[], Any] | None = None
+    ) -> Action[State, Any]:
+        """The request as an action, to be polled; its answer is the request's, or the `result` when it is done."""
+
+        def steps() -> Generator[None, None, Any]:
+            while self._moving():
+                yield
+            while not request.poll():
+                yield
+            return request.answer if result is None else result()
+
         if self._under_way is not None:
-            self._under_way.cancel()
-        self._under_way = action
-        return action
+            self._under_way.preempt()
+        self._under_way = Action(steps(), feedback, request.cancel)
+        return self._under_way
 
 
 class _Device:
-    """A device of one arm. What moves the arm begins once it rests: it may still brake after what was preempted."""
-
-    moves_the_arm = True
+    """A device of one arm, which takes its turn with what else moves the same part."""
 
     def __init__(self, motion: PrinterMotion, arm: str, turn: OneAtATime) -> None:
         self._motion, self._arm, self._turn = motion, arm, turn
 
     def _action(self, request: Request[Any], state: Callable[[], State]) -> Action[State, State]:
         """The request as an action whose feedback and result are the device's state."""
-
-        def steps() -> Generator[None, None, State]:
-            while self.moves_the_arm and self._motion.arms[self._arm].is_moving():
-                yield
-            while not request.poll():
-                yield
-            return state()
-
-        return self._turn.begin(Action(steps(), state, request.cancel))
+        return self._turn.take(request, state, state)
 
 
 class ArmManipulator(_Device):
@@ -97,8 +102,6 @@ class ArmRail(_Device):
 
 class ArmGripper(_Device):
     """Implements `regrasp.interfaces.printer.actions.GripperDevice`."""
-
-    moves_the_arm = False
 
     def send(self, goal: GripperGoal) -> Action[GripperState, GripperState]:
         """See `Device`. It ends with OUT_OF_REACH for a gap that the jaw has not, and with GRIPPER_FAILED."""

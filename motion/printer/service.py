@@ -1,7 +1,7 @@
 """Motions at a printer: to the handle of its door, and with it."""
 
 from collections.abc import Callable, Collection, Generator, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -33,6 +33,8 @@ class PrinterMotionParameters(MotionParameters):
 
     straight_margin: float = 0.004  # the arm is off by 2 mm and its rail by 1 mm; what it takes has things close by
     slide_speed: float = 0.2  # share of the rail's speed with the door in hand; choice
+    slide_samples: int = 50  # of the way with the door, among which the one nearest to a thing is told; choice
+    end_stop: float = 0.02  # m before a slide's goal from which a door that is blocked has come to its stop; choice
     back_shares: tuple[float, ...] = (1.0, 0.6, 0.3)  # of the way back, the first that is free; choice
     blocked: float = 30.0  # N across with which a door presses that goes no further; choice: it takes 8 N to slide
     relieved: float = 6.0  # N across that may be left when a hand has given way to what it holds; choice
@@ -171,14 +173,21 @@ class PrinterMotion(Motion):
     def move_jaw(self, arm: str, gap: float, force: float | None = None) -> MotionRequest:
         """Bring the pads `gap` m from each other, or with a force (N a finger) close them on what is between them.
 
-        Fails with OUT_OF_REACH for a gap that the gripper has not, and as `Execution.set_jaw` does.
+        Fails with OUT_OF_REACH for a gap or a force that the gripper has not, with GRASP_EMPTY where nothing is between
+        the pads that shall press, and as `Execution.set_jaw` does.
         """
         gripper = self.kinematics[arm].robot.gripper
         not_negative("the gap", gap)
 
         def steps() -> Iterator[None]:
             if force is not None:
+                if force > gripper.force:
+                    message = f"a finger presses with up to {gripper.force:g} N, asked for {force:g} N"
+                    raise PlanningError(CauseCode.OUT_OF_REACH, message)
                 yield from self.execution.press_jaw(arm, force)
+                stands, slack = self.grippers[arm].reading().gap, self.parameters.execution.jaw.tolerance
+                if stands < gripper.closed + slack:
+                    raise GraspEmptyError(f"nothing is between the pads: they stand {1e3 * stands:.1f} mm apart")
                 return
             if not gripper.closed <= gap <= gripper.opening:
                 span = f"{1e3 * gripper.closed:g} to {1e3 * gripper.opening:g} mm"
@@ -278,21 +287,25 @@ class PrinterMotion(Motion):
         """Bring the rail of an arm that holds the handle to a position (m along it): the door goes along.
 
         Where the door stands then is believed by how far the hand went, however the motion ends. It fails with
-        GRASP_EMPTY when the hand has lost the handle, and with MOTION_BLOCKED when the door goes no further.
+        GRASP_EMPTY when the hand has lost the handle, and with MOTION_BLOCKED when the door goes no further. A door
+        that goes no further just before the goal has come to its end stop, and that is no failure.
         """
         goal, speed = self._with_rail(arm, position), share("the speed", self.parameters.slide_speed)
 
         def steps() -> Iterator[None]:
+            yield from self._give_way(arm)  # a stop leaves the stiff arm pressing on the handle
             start, before, self._slid = self.joints(arm), self.door_opening, True
             path = np.array([start, np.where(np.arange(len(goal)) == self._rail(arm), goal, start)])
             model = self.model(arm, without=self._parts())
             if not model.path_free(path, 0.0):
-                distance, what = min(model.nearest(q) for q in path)
-                raise PlanningError(CauseCode.MOTION_BLOCKED, f"the arm would come {-distance:.3f} m deep into {what}")
-            thickness = self._door.handle.size[1]
+                between = np.linspace(path[0], path[1], self.parameters.slide_samples)
+                distance, what = min(model.nearest(q) for q in between)
+                why = f"on its way with the door the arm would come to {1e3 * distance:.0f} mm from {what}"
+                raise PlanningError(CauseCode.MOTION_BLOCKED, why)
+            thickness, limits = self._door.handle.size[1], replace(self._guard.drawing, back_off=False)
             watch = GripWatch(self.grippers[arm], thickness, self.parameters.execution.jaw.grip.gap)
             try:
-                for _ in self._follow(arm, path, speed, model, self._guard.drawing):
+                for _ in self._follow(arm, path, speed, model, limits):
                     if (evidence := watch.evidence()).detected:
                         self.execution.halt(arm)
                         trouble = self._lost_or_blocked(arm, evidence.sentence)
@@ -306,7 +319,10 @@ class PrinterMotion(Motion):
                 went = self.tool(arm).translation[1] - self.kinematics[arm].tool(start).translation[1]
                 self.believe_door(before + went)
             yield from self._give_way(arm)
-            raise trouble
+            left = before + goal[self._rail(arm)] - start[self._rail(arm)] - self.door_opening
+            if trouble.code is not CauseCode.MOTION_BLOCKED or abs(left) > self.parameters.end_stop:
+                raise trouble
+            self._on_anomaly(f"{trouble}; {1e3 * abs(left):.0f} mm are left, so this is its end stop")
 
         return self._together(arm, steps())
 

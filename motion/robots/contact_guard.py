@@ -26,6 +26,7 @@ class ContactLimits:
     # frame; None: nowhere.
     pull: FloatArray | None = None
     pull_near: float = 15.0  # N that it may pull where something is near: what random scenes showed; choice
+    back_off: bool = True  # after a touch the arm goes back the way that it came; not where it would take a thing along
     elastic: bool = False  # something elastic may hold the arm back: one that falls behind is blocked, not broken
     far: float | None = None  # the share where nothing is near that could be touched; None: the same
 

@@ -50,7 +50,7 @@ class ColorAnalyzer:
         if not isinstance(goal, ImageGoal):
             raise TypeError(f"the image analyzer takes ImageGoal, not {type(goal).__name__}")
         if self._under_way is not None:
-            self._under_way.cancel()
+            self._under_way.preempt()
         looked_at: set[float] = set()  # the stamps of the pictures
         self._under_way = Action(self._steps(goal, looked_at), lambda: ImageFeedback(len(looked_at)), part="perception")
         return self._under_way

@@ -22,7 +22,8 @@ def printer_services(world: World[PrinterObjects], seed: int, log: Any) -> Print
 def _with_devices(
     known: PrinterKnown, clock: Clock, motion: PrinterMotion, perception: PrinterPerception, log: Any
 ) -> PrinterServices:
-    hand, arm_and_rail = known.printer.hand, OneAtATime()
+    hand = known.printer.hand
+    arm_and_rail, jaw = OneAtATime(motion.arms[hand].is_moving), OneAtATime()
     return PrinterServices(
         known,
         clock,
@@ -30,7 +31,9 @@ def _with_devices(
         perception,
         log,
         manipulator=ArmManipulator(motion, hand, arm_and_rail),
-        gripper=ArmGripper(motion, hand, OneAtATime()),
+        gripper=ArmGripper(motion, hand, jaw),
         rail=ArmRail(motion, hand, arm_and_rail),
         analyzer=ColorAnalyzer(perception, known.printer, clock),
+        arm_and_rail=arm_and_rail,
+        jaw=jaw,
     )

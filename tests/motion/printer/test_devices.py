@@ -116,7 +116,9 @@ def test_a_new_goal_preempts_the_one_under_way_of_arm_or_rail(rig: Rig) -> None:
     rig.wait(1.0, first)
     second = rig.services.manipulator.send(PoseGoal(pose(-0.2, 2.0, 1.5)))
     assert first.cancelled
-    assert first.poll()
+    with pytest.raises(RequestError, match="another goal was sent") as raised:
+        first.poll()
+    assert raised.value.code is PrinterCause.PREEMPTED
     result = rig.run(second)
     np.testing.assert_allclose(result.tool.translation, [-0.2, 2.0, 1.5], atol=3e-3)
     assert not rig.world.contact_peaks
@@ -126,7 +128,10 @@ def test_the_gripper_goes_to_a_gap_and_presses_with_a_force(rig: Rig) -> None:
     gripper = rig.services.gripper
     for gap in (0.06, 0.03):
         assert rig.run(gripper.send(GripperGoal(gap))).gap == pytest.approx(gap, abs=3e-3)
-    assert rig.run(gripper.send(GripperGoal(force=20.0))).gap < 0.005  # nothing is between the pads
+    for force, code in ((20.0, CauseCode.GRASP_EMPTY), (1000.0, CauseCode.OUT_OF_REACH)):
+        with pytest.raises(RequestError) as raised:
+            rig.run(gripper.send(GripperGoal(force=force)))  # nothing is between the pads
+        assert raised.value.code is code
 
 
 def test_gripper_and_arm_move_at_once(rig: Rig) -> None:
