@@ -29,7 +29,7 @@ _EXAMPLES = {int: "a whole number such as 3", float: "a number such as 0.5", boo
 
 @dataclass(frozen=True)
 class Attribute:
-    """What values an attribute takes, and whether it is a port. A number must be more than `above`, and `least` or more."""
+    """What values an attribute takes, and whether it is a port. A number is above `above`, and not below `least`."""
 
     accepts: Accepts
     required: bool = True

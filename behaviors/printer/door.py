@@ -61,7 +61,10 @@ class LookAtHandle(PrinterLeaf):
 
 
 class ReachHandle(PrinterLeaf):
-    """Brings the open gripper `standoff` m before the handle, then straight round it; fails if it is not open enough."""
+    """Brings the open gripper `standoff` m before the handle, then straight round it.
+
+    It fails if the gripper is not open wide enough for the handle.
+    """
 
     INPUT_PORTS: ClassVar[dict[str, Any]] = {
         "standoff": LeafPort(data_type=float, above=0.0, description="m before the handle, from where it goes straight")

@@ -86,7 +86,10 @@ class MoveGripper(PrinterLeaf):
 
 
 class PressGripper(PrinterLeaf):
-    """Closes the gripper on what is between its pads until they press with `force`; fails if nothing is between them."""
+    """Closes the gripper on what is between its pads until they press with `force`.
+
+    It fails if nothing is between them.
+    """
 
     INPUT_PORTS: ClassVar[dict[str, Any]] = {
         "force": LeafPort(data_type=float, above=0.0, description="N of each finger")
@@ -119,8 +122,8 @@ class AnalyzeImage(PrinterLeaf):
         ),
     }
     OUTPUT_PORTS: ClassVar[dict[str, Any]] = {
-        "right": LeafPort(data_type=float, required=False, description="px right, from the picture's centre to the box's"),
-        "down": LeafPort(data_type=float, required=False, description="px down, from the picture's centre to the box's"),
+        "right": LeafPort(data_type=float, required=False, description="px right from the picture's centre to its own"),
+        "down": LeafPort(data_type=float, required=False, description="px down from the picture's centre to its own"),
         "area": LeafPort(data_type=float, required=False, description="px2 of the target's box"),
     }
 

@@ -67,8 +67,8 @@ class Action(Request[Result], Generic[Feedback, Result]):
 
 
 def _preempted() -> Iterator[None]:
+    yield from ()  # makes it a generator, which raises at the next poll
     raise RequestError(PrinterCause.PREEMPTED, "another goal was sent to the device before this one was done")
-    yield
 
 
 class Device(Protocol[Goal, Feedback, Result]):

@@ -21,7 +21,7 @@ TREE = """
       <MoveToPose name="pose" x="-0.15" y="2.0" z="1.5" standoff="0.05"/>
       <MoveBy name="by" dx="0.03" dz="-0.05"/>
       <MoveJoints name="joints" q1="0.0" q2="-2.2" q3="2.3" q4="-1.67" q5="-1.5707963267948966" q6="0.0"/>
-      <PressGripper name="press" force="20.0"/>
+      <FailureIsSuccess name="on_nothing"><PressGripper name="press" force="20.0"/></FailureIsSuccess>
       <AnalyzeImage name="see" target="{target}" seconds="0.3"/>
     </Sequence>
   </BehaviorTree>
@@ -77,6 +77,7 @@ def test_a_leaf_tells_how_far_its_action_is_and_stops_the_arm_when_it_is_stopped
         ("obj", ('position="1.5"', 'position="nan"'), "not finite"),
         ("obj", ("<MoveRail", "<FlyRail"), "unknown element 'FlyRail'"),
         ("obj", ('force="20.0"', 'force="-1"'), "above 0"),
+        ("obj", ('gap="0.06"', 'gap="-0.01"'), "below 0"),
         ("obj", (' position="1.5"', ""), "position"),
     ],
 )
@@ -86,3 +87,57 @@ def test_what_is_no_goal_is_a_line_before_anything_runs(
     with pytest.raises(Findings) as raised:
         scenario(tmp_path, target, TREE.replace(*change) if change[0] else TREE)
     assert any(told in str(item) and "mine.xml:" in str(item) for item in raised.value.items)
+
+
+PARALLEL = """
+<root main_tree_to_execute="Mine">
+  <BehaviorTree ID="Mine"><Parallel name="both" policy="success_on_all">{leaves}</Parallel></BehaviorTree>
+</root>
+"""
+
+
+@pytest.mark.parametrize(
+    "leaves",
+    [
+        '<MoveRail name="first" position="1.0"/><MoveToPose name="second" x="-0.1" y="2.3" z="1.6"/>',
+        '<AnalyzeImage name="first" target="obj"/><AnalyzeImage name="second" target="targ"/>',
+        '<MoveToPose name="first" x="-0.1" y="2.3" z="1.6"/><ArmBack name="second" distance="0.05"/>',
+    ],
+)
+def test_a_leaf_whose_goal_is_preempted_fails(tmp_path: Path, leaves: str) -> None:
+    mine = scenario(tmp_path, "obj", PARALLEL.format(leaves=leaves))
+    result = regrasp.run(mine, seed=2, out=tmp_path / "run")
+    assert result.cause is not None
+    assert (result.cause.code, result.cause.node) == ("preempted", "both/first")
+
+
+GRIP = """
+<MoveGripper name="fit" gap="0.05"/><RailToHandle name="rail" beside="-0.2"/>
+<LookAtHandle name="look" standoff="0.20" seconds="1.0"/><ReachHandle name="reach" standoff="0.08"/>
+<GripHandle name="grip"/>
+"""
+STOPPED = f"""
+<root main_tree_to_execute="Mine">
+  <BehaviorTree ID="Mine">
+    <Fallback name="again" memory="true">
+      <Sequence name="first" memory="true">
+        {GRIP}<TimeLimit name="limit" seconds="3"><SlideDoor name="slide" opening="0.43"/></TimeLimit>
+      </Sequence>
+      <SlideDoor name="on" opening="0.43"/>
+    </Fallback>
+  </BehaviorTree>
+</root>
+"""
+
+
+def test_a_slide_that_was_stopped_goes_on_up_to_the_door_s_end_stop(tmp_path: Path) -> None:
+    result = regrasp.run(scenario(tmp_path, "obj", STOPPED), seed=2, out=tmp_path / "run")
+    assert result.outcome == "success"
+    assert result.measured["door_open"] == pytest.approx(0.43, abs=0.003)
+
+
+def test_a_closed_jaw_is_not_brought_to_the_handle(tmp_path: Path) -> None:
+    tree = STOPPED.replace('gap="0.05"', 'gap="0.0"')
+    result = regrasp.run(scenario(tmp_path, "obj", tree), seed=2, out=tmp_path / "run")
+    assert "the handle is 20.0 mm thick" in (tmp_path / "run" / "events.jsonl").read_text()
+    assert result.outcome == "failure"

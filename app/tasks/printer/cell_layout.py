@@ -11,8 +11,9 @@ from regrasp.app.files.yaml_lines import Document
 from regrasp.app.scenario.cell_layout import CellLayoutParameters, box_parts, out_of_reach, reaches
 from regrasp.app.scenario.shapes import penetration_depth
 from regrasp.interfaces.cell import Box, Region, WristMount
-from regrasp.interfaces.printer.cell import PrinterCell, PrinterKnown
+from regrasp.interfaces.printer.cell import KnownPrinter, PrinterCell, PrinterKnown
 from regrasp.interfaces.quote import nearest, quoted
+from regrasp.perception.camera.color import SegmentationParameters, color_mask
 
 _HERE = ("known", "printer")
 
@@ -47,10 +48,59 @@ def _layout(
         depth = penetration_depth(np.vstack([part.halves, below.halves]), part.center - below.center)
         if depth > parameters.touching:
             yield reaches(document, part, depth, below.name)
+    yield from _in_things(document, known, parameters.touching)
+    yield from _names_of_boxes(document, known)
+    yield from _colors(document, known)
     yield from _in_the_opening(document, known)
     yield from _on_the_plate(document, known, parameters.touching)
     yield from _door(document, known)
     yield from _rail(document, known)
+
+
+def _own_things(printer: KnownPrinter) -> Iterator[tuple[tuple[str, ...], Box]]:
+    """Each thing of the printer, the door and its handle all along their way, with the key of its place."""
+    keys = {"door": ("door",), "door_handle": ("door", "handle"), "section": ("part", "section")}
+    shut, opened = printer.door.parts(0.0), printer.door.parts(printer.door.travel)
+    for before, after in zip(shut, opened, strict=True):
+        center = tuple(0.5 * (np.array(before.center) + after.center))
+        x, y, z = before.size
+        yield keys[before.name], before.model_copy(update={"center": center, "size": (x, y + printer.door.travel, z)})
+    for box in printer.fixtures():
+        yield keys.get(box.name, (box.name.partition("_")[0],)), box
+
+
+def _in_things(document: Document, known: PrinterKnown, most: float) -> Iterator[Finding]:
+    """Things of the printer that reach into a box of the cell; of each thing the deepest."""
+    boxes = box_parts(("known", "boxes"), known.boxes)
+    for path, box in _own_things(known.printer):
+        [part] = box_parts((), [box])
+        depths = [(penetration_depth(np.vstack([part.halves, b.halves]), part.center - b.center), b) for b in boxes]
+        depth, other = max(depths, key=lambda found: found[0])
+        if depth > most:
+            told = f"the {box.name} reaches {depth:.3f} m into {quoted(other.name)}; move one of them"
+            yield Finding(*document.place((*_HERE, *path, "center")), told)
+
+
+def _names_of_boxes(document: Document, known: PrinterKnown) -> Iterator[Finding]:
+    """Boxes with the name of one of the printer's things."""
+    own = {box.name for _, box in _own_things(known.printer)}
+    for i, box in enumerate(known.boxes):
+        if box.name in own:
+            told = f"{quoted(box.name)} is the name of a thing of the printer; give the box another"
+            yield Finding(*document.place(("known", "boxes", i, "name")), told)
+
+
+def _colors(document: Document, known: PrinterKnown) -> Iterator[Finding]:
+    """Handle, part and section that are found by their colours, which another thing has, too."""
+    things = {box.name: box for _, box in _own_things(known.printer)}
+    for name, path in {"door_handle": ("door", "handle"), "part": ("part",), "section": ("part", "section")}.items():
+        wanted = SegmentationParameters.for_color(things[name].color)
+        for other in (*(box for box in things.values() if box.name != name), *known.boxes):
+            pixel = np.rint(255 * np.array(other.color)).astype(np.uint8).reshape(1, 1, 3)
+            if color_mask(pixel, wanted).any():
+                told = f"{quoted(other.name)} has the colour of the {name}, which is found by that; change one of them"
+                yield Finding(*document.place((*_HERE, *path, "color")), told)
+                break
 
 
 def _in_the_opening(document: Document, known: PrinterKnown) -> Iterator[Finding]:
