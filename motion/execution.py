@@ -195,6 +195,48 @@ class Execution:
         yield from self._arrive(arm, path[-1])
         self._watches[arm].leave(self._joints(arm))
 
+    def standing(self, arm: str) -> FloatArray:
+        """The joints (n,) at which an arm at rest stands: those it was told where it was left, else as read."""
+        return self._from_command(arm, self._joints(arm)[None])[0]
+
+    def stream(
+        self,
+        arm: str,
+        trajectories: Iterator[Trajectory | None],
+        contact: ContactLimits,
+        separation: Separation | None = None,
+    ) -> Iterator[None]:
+        """Steps that let an arm follow one trajectory after the other, asked for at every tick; None keeps the last.
+
+        Each must begin where the arm is told to be then, and as fast. When there are no more, or it fails, the arm
+        brakes. Raises TouchError when the arm touches something, ARM_FAILED for implausible readings, StoppedShortError
+        when it does not follow, and what the trajectories raise.
+        """
+        guard, watch, under_way, begun = self._guard(arm, contact, separation), self._watches[arm], None, 0.0
+        watch.begin()
+        watch.leave(None)
+        try:
+            for trajectory in trajectories:
+                if trajectory is not None:
+                    self._arms[arm].follow(trajectory, guard)
+                    under_way, begun = trajectory, self._clock.now()
+                yield
+                reading = self._arms[arm].reading()
+                if guard.touch is not None:
+                    self._on_anomaly(felt := self._felt(arm, guard.touch))
+                    raise TouchError(felt, guard.touch)
+                if (jumped := watch.jumped(reading)) is not None:
+                    raise self.give_up(arm, CauseCode.ARM_FAILED, jumped)
+                if under_way is not None:
+                    trouble = watch.off_trajectory(reading, under_way, self._clock.now() - begun)
+                    if trouble is not None:
+                        raise StoppedShortError(trouble)
+        finally:
+            self.halt(arm)
+        while self._arms[arm].is_moving():
+            yield
+        watch.leave(self._joints(arm))
+
     def open_jaw(self, arm: str, gap: float) -> Iterator[None]:
         """Steps that open a jaw until its fingers read `gap` m. Raises PlanningError GRIPPER_FAILED if they do not."""
         gripper, jaw = self._grippers[arm], self.parameters.jaw

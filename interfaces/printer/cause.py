@@ -9,3 +9,4 @@ class PrinterCause(StrEnum):
     HANDLE_NOT_FOUND = "handle_not_found"  # no camera showed the handle of the door
     PREEMPTED = "preempted"  # another goal took the device
     TARGET_NOT_SEEN = "target_not_seen"  # no picture showed the part, or its gripping section
+    TARGET_TOO_FAST = "target_too_fast"  # the part moves faster than the hand follows

@@ -23,8 +23,15 @@ class Door(Model):
     center: Vector  # where it is closed
     size: Size
     travel: Length  # along y from closed to open
+    opening: Annotated[float, Field(ge=0.0, le=10.0)] = 0.0  # m that it stands open at first
     handle: Handle
     color: Color = (0.55, 0.70, 0.80)
+
+    @model_validator(mode="after")
+    def _opens_so_far(self) -> Self:
+        if self.opening > self.travel:
+            raise ValueError(f"opening {self.opening:g} is more than the door's travel, {self.travel:g}; give less")
+        return self
 
     @model_validator(mode="after")
     def _handle_before_the_door(self) -> Self:
@@ -152,6 +159,9 @@ class HiddenPrinter(Model):
     door_friction: Force  # Coulomb's, of the slide
     handle_friction: Friction  # coefficient
     handle_off: tuple[Offset, Offset] = (0.0, 0.0)  # m along y and z from where the robot believes it
+    part_off: tuple[Offset, Offset] = (0.0, 0.0)  # m along x and y on the plate from where the robot believes it
+    part_yaw_deg: Annotated[float, Field(ge=-45.0, le=45.0)] = 0.0  # that it is turned to the left
+    part_absent: bool = False  # somebody has taken it
     plate_mass: Mass
     part_mass: Mass  # with its gripping section
     plate_friction: Friction  # coefficient, of the plate on what it lies on or what clamps it

@@ -1,7 +1,7 @@
 """Motions at a printer: to the handle of its door, and with it."""
 
 from collections.abc import Callable, Collection, Generator, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -10,14 +10,17 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from regrasp.interfaces.arguments import finite, finite_pose, not_negative, positive, rows, share
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cause import CauseCode
-from regrasp.interfaces.cell import Box
+from regrasp.interfaces.cell import Box, WristMount
 from regrasp.interfaces.devices import Arm, Clock, Gripper
+from regrasp.interfaces.frame import RgbdFrame
 from regrasp.interfaces.printer.cell import PrinterKnown
+from regrasp.interfaces.printer.target import TargetTracker
 from regrasp.interfaces.quote import nearest, quoted
 from regrasp.interfaces.request import Request
 from regrasp.motion.failure import NO_WAY, GraspEmptyError, PlanningError, TouchError
 from regrasp.motion.grasping.gap_test import GripWatch
 from regrasp.motion.printer.held_box import HeldBox
+from regrasp.motion.printer.servoing import Servo, ServoParameters
 from regrasp.motion.request import MotionRequest
 from regrasp.motion.robots.tool_force import tool_force
 from regrasp.motion.scene.collision import CollisionModel
@@ -42,6 +45,8 @@ class PrinterMotionParameters(MotionParameters):
     most_give: float = 0.001  # m at most at once; choice: the arm is off by 2 mm
     gives: int = 10  # times at most
     give_time: float = 0.1  # s until the efforts are read again
+    servo_spares: tuple[str, ...] = ("part", "section", "plate", "plate_bed")  # that a servo's way may touch
+    servo: ServoParameters = field(default_factory=ServoParameters)
     sphere_spacing: float = 0.016  # m between the spheres that stand for what the hand holds; choice
 
 
@@ -64,7 +69,7 @@ class PrinterMotion(Motion):
         self._fixed, self._door = [*self._boxes, *known.printer.fixtures()], known.printer.door
         self._held: dict[str, list[HeldBox]] = {}  # by arm
         self._off, self._slid = np.zeros(3), False  # m from where the handle should be on the door; was it pulled?
-        self.believe_door(0.0)
+        self.believe_door(known.printer.door.opening)
 
     def believe_door(self, opening: float) -> None:
         """Keep clear of the door as it stands `opening` m open, from now on."""
@@ -222,6 +227,27 @@ class PrinterMotion(Motion):
                 yield from self._done(self.shift(arm, displacement, without=spared))
 
         return self._together(arm, steps())
+
+    def servo(self, arm: str, target: TargetTracker, before: float) -> MotionRequest:
+        """Bring the tool `before` m before a target by what is seen of it on the way, and turn it as the target is.
+
+        Fails with TARGET_NOT_SEEN, TARGET_TOO_FAST, TIMED_OUT, OUT_OF_REACH or MOTION_BLOCKED, and as `straight` does.
+        """
+        not_negative("the distance before the target", before)
+
+        def steps() -> Iterator[None]:
+            start = self.execution.standing(arm)
+            model = self.model(arm, without=self.things(self.parameters.servo_spares))
+            servo = Servo(self.kinematics[arm], start, target, before, self._clock, model, self.parameters.servo)
+            yield from self.execution.stream(arm, servo.trajectories(lambda: self.tool(arm)), self._guard.free)
+
+        return self.execution.request(arm, steps())
+
+    def tool_at(self, frame: RgbdFrame) -> RigidTransform:
+        """world_from_tool at the exposure of a frame of the camera on an arm, by the encoders."""
+        mount = self.known.camera(frame.camera).mount
+        assert isinstance(mount, WristMount) and frame.joints is not None
+        return self.kinematics[mount.arm].tool(frame.joints)
 
     def draw_back(self, arm: str, distance: float) -> Request[None]:
         """Draw the hand straight back by `distance` m, or by as large a share of that as is free.

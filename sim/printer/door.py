@@ -60,6 +60,7 @@ class SimDoor:
             jointDamping=0.0,
             physicsClientId=client,
         )
+        p.resetJointState(self.body, _DOOR, door.opening, physicsClientId=client)
         p.changeDynamics(self.body, _HANDLE, lateralFriction=hidden.handle_friction, physicsClientId=client)
         self.rub(hidden.door_friction)
         self.shift_handle(0.0)

@@ -6,6 +6,7 @@ import numpy as np
 import pybullet as p
 from scipy.spatial.transform import RigidTransform, Rotation
 
+from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cell import Box
 from regrasp.interfaces.printer.cell import Bond, HiddenPrinter, KnownPrinter
 from regrasp.sim.bodies import BodyLink, box_shapes
@@ -31,6 +32,12 @@ class PartBond:
         """Whether the part is still bonded."""
         return self._hold is not None
 
+    def release(self) -> None:
+        """Break it."""
+        if self._hold is not None:
+            self._hold.release()
+            self._hold = None
+
     def step(self, normal: tuple[float, float, float]) -> bool:
         """Whether it breaks now; call after every physics step with the plate's normal in the world's axes."""
         if self._hold is None:
@@ -46,8 +53,7 @@ class PartBond:
             or abs(about_z) > limits.twist
         )
         if over:
-            self._hold.release()
-            self._hold = None
+            self.release()
         return over
 
 
@@ -64,16 +70,44 @@ class SimPart:
         self.plate = self._build_plate(known, hidden)
         self.part = self._build_part(known, hidden)
         engine.let_pass(self.part, -1, self.plate)  # as long as it is bonded
-        plate_at, part_at = (RigidTransform.from_translation(at) for at in (known.plate.center, known.part.center))
+        plate_at, part_at = RigidTransform.from_translation(known.plate.center), _place(known, hidden)
         self.catch = Catch(Hold(BodyLink(engine.client, self.plate), plate_at), -np.array(_OUT), hidden.catch_force)
         foot = (0.0, 0.0, -0.5 * known.part.size[2])
-        hold = Hold(BodyLink(engine.client, self.part), plate_at.inv() * part_at, base=self.plate, pivot=foot)
+        self._on_plate = plate_at.inv() * part_at
+        hold = Hold(BodyLink(engine.client, self.part), self._on_plate, base=self.plate, pivot=foot)
+        self._hold, self._foot = hold, np.array(foot)
         self.bond = PartBond(hold, hidden.bond)
+        if hidden.part_absent:
+            self._take_away()
 
     def pose(self, body: int) -> RigidTransform:
         """The true pose of the plate's or the part's middle, world_from_body."""
         position, quaternion = p.getBasePositionAndOrientation(body, physicsClientId=self._engine.client)
         return RigidTransform.from_components(position, Rotation.from_quat(quaternion))
+
+    def float_off(self, velocity: FloatArray | None) -> None:
+        """Break the bond, and let the part move with (3,) m/s, without turning; None: leave its motion as it is."""
+        if self.bond.holds:
+            self.bond.release()
+            self._engine.let_meet(self.part, -1, self.plate)
+        if velocity is not None:
+            client = self._engine.client
+            p.resetBaseVelocity(self.part, velocity.tolist(), [0.0, 0.0, 0.0], physicsClientId=client)
+
+    def slide(self, way: FloatArray) -> None:
+        """Move the bonded part by (3,) m on the plate from where it was printed; a broken bond moves nothing."""
+        if self.bond.holds:
+            at = self._on_plate * RigidTransform.from_translation(self._foot)
+            quaternion = at.rotation.as_quat().tolist()
+            self._hold.move((at.translation + way).tolist(), quaternion)
+
+    def _take_away(self) -> None:
+        """The part stands out of everyone's sight, under the floor."""
+        self.float_off(None)
+        away = RigidTransform.from_translation([0.0, 0.0, -2.0])
+        position = away.translation.tolist()
+        p.resetBasePositionAndOrientation(self.part, position, [0, 0, 0, 1], physicsClientId=self._engine.client)
+        Hold(BodyLink(self._engine.client, self.part), away)
 
     def step(self) -> None:
         """Check what holds the two; call after every physics step."""
@@ -93,7 +127,7 @@ class SimPart:
 
     def _build_part(self, known: KnownPrinter, hidden: HiddenPrinter) -> int:
         part, section = known.part.blocks()
-        client, level = self._engine.client, [0.0, 0.0, 0.0, 1.0]
+        client, level, place = self._engine.client, [0.0, 0.0, 0.0, 1.0], _place(known, hidden)
         shapes = [box_shapes(client, block) for block in (part, section)]
         volumes = np.prod([part.size, section.size], axis=1)
         masses = hidden.part_mass * volumes / volumes.sum()
@@ -101,7 +135,8 @@ class SimPart:
             p.createMultiBody(
                 float(masses[0]),
                 *shapes[0],
-                part.center,
+                place.translation.tolist(),
+                place.rotation.as_quat().tolist(),
                 linkMasses=[float(masses[1])],
                 linkCollisionShapeIndices=[shapes[1][0]],
                 linkVisualShapeIndices=[shapes[1][1]],
@@ -129,3 +164,9 @@ class SimPart:
             angularDamping=0.0,
             physicsClientId=self._engine.client,
         )
+
+
+def _place(known: KnownPrinter, hidden: HiddenPrinter) -> RigidTransform:
+    """world_from_part where it was truly printed."""
+    turn = Rotation.from_euler("z", hidden.part_yaw_deg, degrees=True)
+    return RigidTransform.from_components(np.add(known.part.center, [*hidden.part_off, 0.0]), turn)

@@ -1,0 +1,131 @@
+"""Visual servoing: the hand goes to a target by what its camera sees on the way, and follows it if it moves."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.spatial.transform import RigidTransform
+
+from regrasp.interfaces.arrays import FloatArray
+from regrasp.interfaces.cause import CauseCode
+from regrasp.interfaces.devices import Clock
+from regrasp.interfaces.printer.cause import PrinterCause
+from regrasp.interfaces.printer.target import TargetEstimate, TargetTracker
+from regrasp.interfaces.trajectory import Trajectory
+from regrasp.motion.failure import PlanningError
+from regrasp.motion.planning.following import FollowingParameters, followed
+from regrasp.motion.planning.online import OnlineParameters, OnlinePlanner, ToolSamples
+from regrasp.motion.robots.kinematics import ArmKinematics
+from regrasp.motion.scene.collision import CollisionModel
+
+
+@dataclass(frozen=True)
+class ServoParameters:
+    """When the hand has come to its goal, and how it comes there."""
+
+    tolerance: float = 0.0012  # m; choice: a third of what the source's best approach errs
+    angle: float = 0.010  # rad
+    deviation: float = 0.0015  # m, of the target's estimate at most; choice
+    steady: float = 0.3  # s for which all that holds; choice
+    corridor: float = 0.004  # m beside the goal's axis within which the hand goes on along it; choice
+    funnel: float = 2.0  # m before the goal for each m that it is further beside; choice
+    most_before: float = 0.10  # m; choice: from there fingers 0.05 m long do not reach the target
+    lost: float = 1.0  # s without a picture that shows the target; a sound camera needs 0.1
+    timeout: float = 20.0  # s; without a fault it takes 3
+    fastest: float = 0.10  # m/s of a target that the hand still follows; choice: half of its own speed
+    stop_margin: float = 0.0  # m from everything at which the hand stops before it
+    following: FollowingParameters = field(default_factory=FollowingParameters)
+    online: OnlineParameters = field(default_factory=OnlineParameters)
+
+
+class Servo:
+    """Plans an arm's way to a target anew with every tick. The arm's rail stands.
+
+    The goal lies `before` m before the target's front, on the target's x axis, and the tool is turned as the target is.
+    """
+
+    def __init__(
+        self,
+        kin: ArmKinematics,
+        start: FloatArray,
+        target: TargetTracker,
+        before: float,
+        clock: Clock,
+        model: CollisionModel,
+        parameters: ServoParameters = ServoParameters(),
+    ) -> None:
+        self._kin, self._target, self._before = kin, target, before
+        self._joints, self._speeds = start, np.zeros(len(start))
+        self._clock, self._model, self._parameters = clock, model, parameters
+        self._online = OnlinePlanner(kin.tool(start), parameters.online)
+        self.goal: RigidTransform | None = None  # the last one
+        self.off = np.inf  # m from it
+
+    def trajectories(self, tool: Callable[[], RigidTransform]) -> Iterator[Trajectory | None]:
+        """A trajectory for each tick, None to keep the last one, until the tool has come to the goal.
+
+        `tool` gives world_from_tool as read. Raises PlanningError with TARGET_NOT_SEEN, TARGET_TOO_FAST, TIMED_OUT,
+        OUT_OF_REACH or MOTION_BLOCKED.
+        """
+        values, begin = self._parameters, self._clock.now()
+        planned, plan, steady_since = begin, None, None
+        while True:
+            now = self._clock.now()
+            seen = self._target.update()
+            if now - (begin if seen is None else seen.stamp) > values.lost:
+                why = f"the target was not seen for {values.lost:g} s: {self._target.why}"
+                raise PlanningError(PrinterCause.TARGET_NOT_SEEN, why)
+            if now - begin > values.timeout:
+                why = f"the hand did not come to rest at the target in {values.timeout:g} s: {1e3 * self.off:.1f} mm are left"
+                raise PlanningError(CauseCode.TIMED_OUT, why)
+            if seen is None:
+                yield None
+                continue
+            speed = float(np.linalg.norm(seen.velocity))
+            if speed > values.fastest:
+                why = f"the target moves with {speed:.2f} m/s, the hand follows {values.fastest:g} m/s"
+                raise PlanningError(PrinterCause.TARGET_TOO_FAST, why)
+            goal = self._goal(seen, now)
+            there = self._there(seen, goal, tool())
+            steady_since = (now if steady_since is None else steady_since) if there else None
+            if steady_since is not None and now - steady_since > values.steady:
+                return
+            if plan is not None:
+                self._online.advance(now - planned)
+                self._joints, self._speeds = plan.sample(now - planned)
+            plan, planned = self._trajectory(self._online.replan(self._aim(goal, tool()), seen.velocity)), now
+            yield plan
+
+    def _goal(self, seen: TargetEstimate, now: float) -> RigidTransform:
+        """world_from_tool where it shall be now."""
+        drift = RigidTransform.from_translation(seen.velocity * (now - seen.stamp))
+        self.goal = drift * seen.pose * RigidTransform.from_translation([-self._before, 0.0, 0.0])
+        return self.goal
+
+    def _there(self, seen: TargetEstimate, goal: RigidTransform, tool: RigidTransform) -> bool:
+        values, left = self._parameters, goal.inv() * tool
+        self.off = float(np.linalg.norm(left.translation))
+        return (
+            self.off < values.tolerance
+            and left.rotation.magnitude() < values.angle
+            and seen.deviation < values.deviation
+        )
+
+    def _aim(self, goal: RigidTransform, tool: RigidTransform) -> RigidTransform:
+        """Where to go now: before the goal, as long as the tool is beside its axis."""
+        values, left = self._parameters, (goal.inv() * tool).translation
+        beside = max(float(np.hypot(left[1], left[2])) - values.corridor, 0.0)
+        before = min(values.funnel * beside, values.most_before)
+        return goal * RigidTransform.from_translation([-before, 0.0, 0.0])
+
+    def _trajectory(self, samples: ToolSamples) -> Trajectory:
+        """The joints along the tool's way. Raises PlanningError where the arm cannot follow or would meet something."""
+        values, kin = self._parameters, self._kin
+        positions = followed(kin, self._joints, samples.poses, values.following)
+        velocities = np.gradient(positions, samples.times, axis=0)
+        velocities[0] = self._speeds
+        if not self._model.path_free(positions, values.stop_margin):
+            distance, what = min(self._model.nearest(q) for q in positions)
+            why = f"on its way to the target the arm would come to {1e3 * distance:.0f} mm from {what}"
+            raise PlanningError(CauseCode.MOTION_BLOCKED, why)
+        return Trajectory(samples.times, positions, velocities)
