@@ -278,8 +278,12 @@ class Execution:
         self._grippers[arm].close(force)
         yield from self._pause(self.parameters.jaw.grip.time)
 
-    def close_jaw(self, arm: str, thickness: float, gently: bool = False) -> Generator[None, None, float]:
-        """Close a jaw on a thing of `thickness` m; returns the gap (m) at which it holds.
+    def close_jaw(
+        self, arm: str, thickness: float, gently: bool = False, force: float | None = None
+    ) -> Generator[None, None, float]:
+        """Close a jaw on a thing of `thickness` m, with `force` N a finger (default: as set).
+
+        Returns the gap (m) at which it holds.
 
         `gently`: with little force at first, and with all of it only once it stands about as wide as the thing.
         Raises GraspEmptyError when it closes on nothing, JawBlockedError when it closes gently on something that is
@@ -292,7 +296,7 @@ class Execution:
             if thickness + grip.wider < gap < before - grip.moved:
                 raise JawBlockedError(f"the jaw met something beside: it stands {1e3 * gap:.1f} mm open", gap)
         for _ in range(grip.attempts):
-            evidence = yield from self._close(arm, thickness, grip.force, grip.time)
+            evidence = yield from self._close(arm, thickness, grip.force if force is None else force, grip.time)
             stood = evidence.detected and evidence.value > before - grip.moved
             if not stood:
                 break

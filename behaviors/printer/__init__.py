@@ -1,7 +1,7 @@
 """Leaves of the printer task."""
 
 from regrasp.behaviors.leaf import WithServices
-from regrasp.behaviors.printer import door, primitives
+from regrasp.behaviors.printer import door, part, primitives
 
 _LEAVES: tuple[type[WithServices], ...] = (
     primitives.AnalyzeImage,
@@ -12,6 +12,10 @@ _LEAVES: tuple[type[WithServices], ...] = (
     primitives.MoveToPose,
     primitives.PressGripper,
     door.ArmBack,
+    part.ApproachPart,
+    part.HandBeforePart,
+    part.RailToPart,
+    part.TakePart,
     door.GripHandle,
     door.LookAtHandle,
     door.RailToHandle,

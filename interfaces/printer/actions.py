@@ -21,6 +21,7 @@ Feedback = TypeVar("Feedback", covariant=True)
 Result = TypeVar("Result")
 Goal = TypeVar("Goal", contravariant=True)
 
+Approach = Literal["one_step", "two_step", "three_step", "servo"]  # ways to the part; the first three the source's
 Target = Literal["obj", "targ"]  # the source's classes: the red part, and its blue gripping section
 
 

@@ -45,6 +45,7 @@ class PrinterMotionParameters(MotionParameters):
     most_give: float = 0.001  # m at most at once; choice: the arm is off by 2 mm
     gives: int = 10  # times at most
     give_time: float = 0.1  # s until the efforts are read again
+    part_force: float = 20.0  # N a finger: the pads hold 24 N by friction, and its catch lets go of the plate at 6 N
     servo_spares: tuple[str, ...] = ("part", "section", "plate", "plate_bed")  # that a servo's way may touch
     servo: ServoParameters = field(default_factory=ServoParameters)
     sphere_spacing: float = 0.016  # m between the spheres that stand for what the hand holds; choice
@@ -54,6 +55,7 @@ class PrinterMotion(Motion):
     """Moves an arm on a rail, and the door with it. The arm keeps clear of the door where it believes it to stand."""
 
     parameters: PrinterMotionParameters
+    known: PrinterKnown
 
     def __init__(
         self,
@@ -68,6 +70,9 @@ class PrinterMotion(Motion):
         super().__init__(known, arms, grippers, clock, seed, parameters, on_anomaly)
         self._fixed, self._door = [*self._boxes, *known.printer.fixtures()], known.printer.door
         self._held: dict[str, list[HeldBox]] = {}  # by arm
+        section = known.printer.part.section
+        self._section = RigidTransform.from_components(section.center, TO_THE_PRINTER)  # where it is believed to be
+        self._half_section = 0.5 * section.size[0]
         self._off, self._slid = np.zeros(3), False  # m from where the handle should be on the door; was it pulled?
         self.believe_door(known.printer.door.opening)
 
@@ -240,8 +245,40 @@ class PrinterMotion(Motion):
             model = self.model(arm, without=self.things(self.parameters.servo_spares))
             servo = Servo(self.kinematics[arm], start, target, before, self._clock, model, self.parameters.servo)
             yield from self.execution.stream(arm, servo.trajectories(lambda: self.tool(arm)), self._guard.free)
+            if servo.goal is not None:
+                self._section = servo.goal * RigidTransform.from_translation([before + self._half_section, 0.0, 0.0])
+                self.believe_part(self._section.translation)
 
         return self.execution.request(arm, steps())
+
+    def part_goal(self, before: float) -> RigidTransform:
+        """world_from_tool `before` m before the front of the part's section, where that is believed to be."""
+        section = self._section
+        return section * RigidTransform.from_translation([-self._half_section - before, 0.0, 0.0])
+
+    def leads_on(
+        self, arm: str, joints: FloatArray, onward: Sequence[RigidTransform], may_touch: Collection[str]
+    ) -> bool:
+        """Whether straight lines from joints (n,) to the poses `onward` (tool_from_goal) are free but for these things."""
+        return self._free_onward(arm, joints, onward, self.things(may_touch))
+
+    def take_part(self, arm: str, deeper: float) -> Request[float]:
+        """Go straight on by `deeper` m, close the jaw on the part's section, and let the hand give way to it.
+
+        Gently, and the hand gives way as at the door: part and plate give way to little. The answer is the gap (m)
+        between the pads. It fails as `shift` and `close` do.
+        """
+        positive("the way", deeper)
+        thickness, spared = self.known.printer.part.section.size[1], self.parameters.servo_spares
+
+        def steps() -> Generator[None, None, float]:
+            way = self.tool(arm).rotation.apply([deeper, 0.0, 0.0])
+            yield from self._done(self.shift(arm, way, without=self.things(spared)))
+            yield from self.execution.close_jaw(arm, thickness, force=self.parameters.part_force)
+            yield from self._give_way(arm)
+            return self.grippers[arm].reading().gap
+
+        return self._together(arm, steps())
 
     def tool_at(self, frame: RgbdFrame) -> RigidTransform:
         """world_from_tool at the exposure of a frame of the camera on an arm, by the encoders."""

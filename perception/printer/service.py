@@ -1,7 +1,7 @@
-"""Perception at a printer: where the handle of its door is."""
+"""Perception at a printer: where the handle of its door is, and where the printed part."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.spatial.transform import RigidTransform
@@ -9,11 +9,14 @@ from scipy.spatial.transform import RigidTransform
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.devices import Camera, Clock
 from regrasp.interfaces.frame import RgbdFrame
+from regrasp.interfaces.printer.actions import Sighting
 from regrasp.interfaces.printer.cell import PrinterKnown
 from regrasp.interfaces.wall_time import counts_as
 from regrasp.perception.camera.color import SegmentationParameters, color_mask
 from regrasp.perception.camera.model import deproject
 from regrasp.perception.mapping.occupancy import Spheres
+from regrasp.perception.printer.approach_tables import ApproachTables, load_tables
+from regrasp.perception.printer.part_track import PartTracker, PartTrackParameters
 from regrasp.perception.service import Perception, PerceptionParameters
 
 
@@ -22,11 +25,12 @@ class PrinterPerceptionParameters(PerceptionParameters):
     """Those of every task, and of the handle."""
 
     least_points: int = 200  # pixels of the handle with depth; choice: it has 2000 at 0.35 m
+    track: PartTrackParameters = field(default_factory=PartTrackParameters)
     span: tuple[float, float] = (0.5, 99.5)  # percentiles of its pixels between which its middle lies; choice
 
 
 class PrinterPerception(Perception):
-    """Sees the handle of the door."""
+    """Sees the handle of the door, and the printed part."""
 
     parameters: PrinterPerceptionParameters
 
@@ -40,7 +44,24 @@ class PrinterPerception(Perception):
         parameters: PrinterPerceptionParameters = PrinterPerceptionParameters(),
     ) -> None:
         super().__init__(known, cameras, clock, pose_of, arm_spheres, parameters)
+        self._printer = known.printer
+        self.tables: ApproachTables | None = None  # None: the shipped ones, once they are asked for
         self._color = SegmentationParameters.for_color(known.printer.door.handle.color)
+
+    def part_tracker(
+        self, tool_of: Callable[[RgbdFrame], RigidTransform], gap: Callable[[], float], since: float
+    ) -> PartTracker:
+        """What follows the part's section through the camera on the hand, in frames from the time `since` (s) on.
+
+        `tool_of` gives world_from_tool at a frame's exposure, `gap` what the finger encoder reads (m).
+        """
+        return PartTracker(self, self._printer, tool_of, gap, since, self.parameters.track)
+
+    def offset_by_tables(self, seen: Sighting) -> FloatArray:
+        """Offset (3,) m in the world from the tool to its goal before the part, see `ApproachTables`."""
+        if self.tables is None:
+            self.tables = load_tables()
+        return self.tables.offset(seen)
 
     @counts_as("perception")
     def see_handle(self, camera: str, since: float) -> FloatArray | None:

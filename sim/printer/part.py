@@ -12,7 +12,10 @@ from regrasp.interfaces.printer.cell import Bond, HiddenPrinter, KnownPrinter
 from regrasp.sim.bodies import BodyLink, box_shapes
 from regrasp.sim.engine import Engine
 from regrasp.sim.hold import Catch, Hold
+from regrasp.sim.robot.arm import SimArm
+from regrasp.sim.robot.model import pad_links
 
+_INTO = Rotation.from_euler("z", 180.0, degrees=True)  # from the part's x axis, which points out of the printer
 _OUT = (1.0, 0.0, 0.0)  # the way out of the printer, world
 
 
@@ -66,7 +69,7 @@ class SimPart:
     section_link = 0
 
     def __init__(self, engine: Engine, known: KnownPrinter, hidden: HiddenPrinter) -> None:
-        self._engine = engine
+        self._engine, self._known = engine, known.part
         self.plate = self._build_plate(known, hidden)
         self.part = self._build_part(known, hidden)
         engine.let_pass(self.part, -1, self.plate)  # as long as it is bonded
@@ -84,6 +87,20 @@ class SimPart:
         """The true pose of the plate's or the part's middle, world_from_body."""
         position, quaternion = p.getBasePositionAndOrientation(body, physicsClientId=self._engine.client)
         return RigidTransform.from_components(position, Rotation.from_quat(quaternion))
+
+    def front(self) -> RigidTransform:
+        """The true pose of the middle of the section's front, world_from_front: x points into the part, z up."""
+        section, part = self._known.section, self._known
+        off = np.subtract(section.center, part.center) + [0.5 * section.size[0], 0.0, 0.0]
+        return self.pose(self.part) * RigidTransform.from_components(off, _INTO)
+
+    def held_by(self, arm: SimArm) -> bool:
+        """Whether both pads of an arm's gripper touch the section."""
+        pads = [arm.links[name] for name in pad_links(arm.robot.gripper)]
+        return all(
+            p.getContactPoints(arm.body, self.part, pad, self.section_link, physicsClientId=self._engine.client)
+            for pad in pads
+        )
 
     def float_off(self, velocity: FloatArray | None) -> None:
         """Break the bond, and let the part move with (3,) m/s, without turning; None: leave its motion as it is."""

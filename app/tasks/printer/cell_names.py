@@ -2,10 +2,10 @@
 
 from typing import get_args
 
-from regrasp.interfaces.printer.actions import Target
+from regrasp.interfaces.printer.actions import Approach, Target
 from regrasp.interfaces.printer.cell import PrinterCell
 
 
 def cell_names(cell: PrinterCell | None) -> dict[str, dict[str, str]]:
-    """See `Task.cell_names`: the targets of the image analyzer, in any cell."""
-    return {"target": dict.fromkeys(get_args(Target), "")}
+    """See `Task.cell_names`: the targets of the image analyzer and the approaches, in any cell."""
+    return {"target": dict.fromkeys(get_args(Target), ""), "approach": dict.fromkeys(get_args(Approach), "")}

@@ -14,3 +14,7 @@ class Expect(expect.Expect):
     door_open: Annotated[
         NotNegative | None, Field(description="Metres at least that the door stands open then.", examples=[0.41])
     ] = None
+    part_held: Annotated[
+        bool | None,
+        Field(description="Whether both pads touch the part's gripping section then.", examples=[True]),
+    ] = None

@@ -9,14 +9,21 @@ from regrasp.app.tasks.printer.expectations import Expect
 
 
 class PrinterJudge(judge.Judge[Expect]):
-    """Judges the door's true opening."""
+    """Judges the door's true opening, and whether the part is held."""
 
     def states(self) -> Iterator[Expectation]:
         """See `Judge`."""
         if self.expect.door_open is not None:
             opening = self.world.objects.door.opening
             yield Expectation("door_open", opening >= self.expect.door_open, round(opening, 4), self.expect.door_open)
+        if self.expect.part_held is not None:
+            held = self._held()
+            yield Expectation("part_held", held == self.expect.part_held, held, self.expect.part_held)
+
+    def _held(self) -> bool:
+        hand = self.world.arms[self.world.cell.known.printer.hand]
+        return self.world.objects.part.held_by(hand)
 
     def measured(self) -> dict[str, Any]:
         """See `Judge`."""
-        return {"door_open": round(self.world.objects.door.opening, 4)}
+        return {"door_open": round(self.world.objects.door.opening, 4), "part_held": self._held()}

@@ -1,0 +1,113 @@
+"""What the arm does with the printed part."""
+
+from typing import Any, ClassVar, get_args
+
+from regrasp.behaviors.leaf import LeafFailed, LeafPort, LeafSteps
+from regrasp.behaviors.printer.leaf import PrinterLeaf
+from regrasp.interfaces.cause import CauseCode
+from regrasp.interfaces.printer.actions import Approach, ImageGoal, PoseGoal, PoseRelGoal, RailGoal
+
+_NEAR = ("part", "section", "plate", "plate_bed")  # what the hand comes near to on purpose
+
+
+class RailToPart(PrinterLeaf):
+    """Brings the rail to where the arm's base stands `beside` m along y from the part's gripping section."""
+
+    INPUT_PORTS: ClassVar[dict[str, Any]] = {
+        "beside": LeafPort(data_type=float, description="m along y from the section to the arm's base")
+    }
+
+    def steps(self) -> LeafSteps:
+        """See the class."""
+        place, base = self.services.motion.part_goal(0.0).translation, self.services.known.arm(self.hand).base
+        yield self.services.rail.send(RailGoal(float(place[1] + self.get_input("beside") - base[1])))
+
+
+class HandBeforePart(PrinterLeaf):
+    """Brings the tool to an offset from its goal, `before` m before where the section is believed to be.
+
+    From there the hand can go straight to the goal, and `deeper` m on.
+    """
+
+    INPUT_PORTS: ClassVar[dict[str, Any]] = {
+        name: LeafPort(data_type=float, required=False, default_value=usual, description=f"m along {name[1]}")
+        for name, usual in (("dx", 0.30), ("dy", 0.0), ("dz", 0.0))
+    } | {
+        "before": LeafPort(data_type=float, above=0.0, description="m from the goal to the section's front"),
+        "deeper": LeafPort(data_type=float, above=0.0, description="m from the goal to the grasp"),
+    }
+
+    def steps(self) -> LeafSteps:
+        """See the class."""
+        from scipy.spatial.transform import RigidTransform  # late: a tree's check needs no scipy
+
+        goal = self.services.motion.part_goal(self.get_input("before"))
+        start = RigidTransform.from_translation([self.get_input(name) for name in ("dx", "dy", "dz")]) * goal
+        onward = start.inv() * goal, RigidTransform.from_translation([self.get_input("deeper"), 0.0, 0.0])
+        yield self.services.manipulator.send(PoseGoal(start, may_touch=_NEAR, onward=onward))
+
+
+class ApproachPart(PrinterLeaf):
+    """Goes from where the part is in sight to `before` m before its gripping section, by what the camera shows.
+
+    The method is `servo`, which looks all the way, or one of the source's: `one_step` looks once and goes there,
+    `two_step` centres the part first, and `three_step` also stops at a `buffer`. These three take the part and the
+    camera to be aligned with the world.
+    """
+
+    INPUT_PORTS: ClassVar[dict[str, Any]] = {
+        "method": LeafPort(data_type=str, names="approach", description="servo, one_step, two_step or three_step"),
+        "before": LeafPort(data_type=float, above=0.0, description="m from the goal to the section's front"),
+        "buffer": LeafPort(
+            data_type=float,
+            required=False,
+            default_value=0.25,
+            above=0.0,
+            description="m before the goal at which three_step stops",
+        ),
+        "seconds": LeafPort(
+            data_type=float, required=False, default_value=1.0, above=0.0, description="simulated seconds for each look"
+        ),
+    }
+
+    def steps(self) -> LeafSteps:
+        """See the class."""
+        method = self.get_input("method")
+        if method not in get_args(Approach):
+            why = f"no approach {method!r}; there are {', '.join(get_args(Approach))}"
+            raise LeafFailed(CauseCode.PLANNING_FAILED, why)
+        if method == "servo":
+            yield from self._servo()
+            return
+        if method != "one_step":
+            yield from self._step(None)
+        if method == "three_step":
+            yield from self._step(self.get_input("buffer"))
+        yield from self._step(0.0)
+
+    def _servo(self) -> LeafSteps:
+        services = self.services
+        gap = lambda: services.gripper.state().gap  # noqa: E731
+        tracker = services.perception.part_tracker(services.motion.tool_at, gap, services.clock.now())
+        yield self.with_arm(services.motion.servo(self.hand, tracker, self.get_input("before")))
+
+    def _step(self, stop: float | None) -> LeafSteps:
+        """Look, centre the part, and go on to `stop` m before the goal; None: only centre it."""
+        services = self.services
+        seen = yield from self.ask(services.analyzer.send(ImageGoal("obj", self.get_input("seconds"))))
+        x, y, z = services.perception.offset_by_tables(seen)
+        ahead = 0.0 if stop is None else min(x + stop, 0.0)  # never back, as the source
+        self.say("saw the part", offset=seen.offset, area=seen.area, goal=[round(v, 4) for v in (x, y, z)])
+        yield services.manipulator.send(PoseRelGoal((float(ahead), float(y), float(z)), _NEAR))
+
+
+class TakePart(PrinterLeaf):
+    """Goes `deeper` m straight on and closes the gripper on the section; fails if it closes on nothing."""
+
+    INPUT_PORTS: ClassVar[dict[str, Any]] = {
+        "deeper": LeafPort(data_type=float, above=0.0, description="m from the goal to the grasp")
+    }
+
+    def steps(self) -> LeafSteps:
+        """See the class."""
+        yield self.with_hand(self.services.motion.take_part(self.hand, self.get_input("deeper")))
