@@ -3,11 +3,10 @@
 from typing import Any, ClassVar, get_args
 
 from regrasp.behaviors.leaf import LeafFailed, LeafPort, LeafSteps
+from regrasp.behaviors.printer.approach import NEAR, approach_steps
 from regrasp.behaviors.printer.leaf import PrinterLeaf
 from regrasp.interfaces.cause import CauseCode
-from regrasp.interfaces.printer.actions import Approach, ImageGoal, PoseGoal, PoseRelGoal, RailGoal
-
-_NEAR = ("part", "section", "plate", "plate_bed")  # what the hand comes near to on purpose
+from regrasp.interfaces.printer.actions import Approach, PoseGoal, RailGoal
 
 
 class RailToPart(PrinterLeaf):
@@ -44,7 +43,7 @@ class HandBeforePart(PrinterLeaf):
         goal = self.services.motion.part_goal(self.get_input("before"))
         start = RigidTransform.from_translation([self.get_input(name) for name in ("dx", "dy", "dz")]) * goal
         onward = start.inv() * goal, RigidTransform.from_translation([self.get_input("deeper"), 0.0, 0.0])
-        yield self.services.manipulator.send(PoseGoal(start, may_touch=_NEAR, onward=onward))
+        yield self.services.manipulator.send(PoseGoal(start, may_touch=NEAR, onward=onward))
 
 
 class ApproachPart(PrinterLeaf):
@@ -73,32 +72,11 @@ class ApproachPart(PrinterLeaf):
     def steps(self) -> LeafSteps:
         """See the class."""
         method = self.get_input("method")
-        if method not in get_args(Approach):
+        if method not in get_args(Approach):  # of a key, whose value no check of the tree knows
             why = f"no approach {method!r}; there are {', '.join(get_args(Approach))}"
             raise LeafFailed(CauseCode.PLANNING_FAILED, why)
-        if method == "servo":
-            yield from self._servo()
-            return
-        if method != "one_step":
-            yield from self._step(None)
-        if method == "three_step":
-            yield from self._step(self.get_input("buffer"))
-        yield from self._step(0.0)
-
-    def _servo(self) -> LeafSteps:
-        services = self.services
-        gap = lambda: services.gripper.state().gap  # noqa: E731
-        tracker = services.perception.part_tracker(services.motion.tool_at, gap, services.clock.now())
-        yield self.with_arm(services.motion.servo(self.hand, tracker, self.get_input("before")))
-
-    def _step(self, stop: float | None) -> LeafSteps:
-        """Look, centre the part, and go on to `stop` m before the goal; None: only centre it."""
-        services = self.services
-        seen = yield from self.ask(services.analyzer.send(ImageGoal("obj", self.get_input("seconds"))))
-        x, y, z = services.perception.offset_by_tables(seen)
-        ahead = 0.0 if stop is None else min(x + stop, 0.0)  # never back, as the source
-        self.say("saw the part", offset=seen.offset, area=seen.area, goal=[round(v, 4) for v in (x, y, z)])
-        yield services.manipulator.send(PoseRelGoal((float(ahead), float(y), float(z)), _NEAR))
+        before, buffer, seconds = (self.get_input(name) for name in ("before", "buffer", "seconds"))
+        yield from approach_steps(self.services, method, before, buffer, seconds, self.say)
 
 
 class TakePart(PrinterLeaf):

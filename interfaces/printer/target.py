@@ -13,8 +13,8 @@ if TYPE_CHECKING:
 class TargetEstimate:
     """The middle of the front of what a hand shall take, as it was at `stamp` s.
 
-    `pose` is world_from_target: x points into it, z up. `velocity` (3,) m/s in the world. `deviation` (m, each axis) and
-    `yaw_deviation` (rad) are standard deviations.
+    `pose` is world_from_target: x points into it, z up. `velocity` (3,) m/s in the world. `deviation` (m, each axis)
+    and `yaw_deviation` (rad) are standard deviations.
     """
 
     stamp: float

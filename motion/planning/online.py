@@ -86,9 +86,11 @@ class OnlinePlanner:
         return self._samples(self._plan)
 
     def _samples(self, plan: Trajectory) -> ToolSamples:
-        values, duration = self._parameters, max(plan.duration, self._parameters.fine)
-        times = np.arange(0.0, min(duration, values.fine_time), values.fine)
-        times = np.append(times, np.linspace(times[-1], duration, values.rest + 1)[1:])
+        values, left = self._parameters, plan.duration - self._parameters.fine_time
+        times = np.arange(round(values.fine_time / values.fine) + 1) * values.fine
+        if left > values.fine:
+            count = min(values.rest, int(left / values.fine))
+            times = np.append(times, np.linspace(values.fine_time, plan.duration, count + 1)[1:])
         offsets = np.array([plan.at_time(float(t))[0] for t in times])
         turns = self._goal.rotation * Rotation.from_rotvec(offsets[:, 3:])
         poses = np.tile(np.eye(4), (len(times), 1, 1))

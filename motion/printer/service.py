@@ -259,7 +259,7 @@ class PrinterMotion(Motion):
     def leads_on(
         self, arm: str, joints: FloatArray, onward: Sequence[RigidTransform], may_touch: Collection[str]
     ) -> bool:
-        """Whether straight lines from joints (n,) to the poses `onward` (tool_from_goal) are free but for these things."""
+        """Whether lines from joints (n,) to the poses `onward` (tool_from_goal) are free but for these things."""
         return self._free_onward(arm, joints, onward, self.things(may_touch))
 
     def take_part(self, arm: str, deeper: float) -> Request[float]:
@@ -283,7 +283,8 @@ class PrinterMotion(Motion):
     def tool_at(self, frame: RgbdFrame) -> RigidTransform:
         """world_from_tool at the exposure of a frame of the camera on an arm, by the encoders."""
         mount = self.known.camera(frame.camera).mount
-        assert isinstance(mount, WristMount) and frame.joints is not None
+        assert isinstance(mount, WristMount)
+        assert frame.joints is not None
         return self.kinematics[mount.arm].tool(frame.joints)
 
     def draw_back(self, arm: str, distance: float) -> Request[None]:

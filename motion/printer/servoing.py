@@ -33,7 +33,7 @@ class ServoParameters:
     lost: float = 1.0  # s without a picture that shows the target; a sound camera needs 0.1
     timeout: float = 20.0  # s; without a fault it takes 3
     fastest: float = 0.10  # m/s of a target that the hand still follows; choice: half of its own speed
-    stop_margin: float = 0.0  # m from everything at which the hand stops before it
+    stop_margin: float = 0.004  # m from everything, to which a way may lead; the arm is off by 2 mm and its rail by 1 mm
     following: FollowingParameters = field(default_factory=FollowingParameters)
     online: OnlineParameters = field(default_factory=OnlineParameters)
 
@@ -76,8 +76,8 @@ class Servo:
                 why = f"the target was not seen for {values.lost:g} s: {self._target.why}"
                 raise PlanningError(PrinterCause.TARGET_NOT_SEEN, why)
             if now - begin > values.timeout:
-                why = f"the hand did not come to rest at the target in {values.timeout:g} s: {1e3 * self.off:.1f} mm are left"
-                raise PlanningError(CauseCode.TIMED_OUT, why)
+                why = f"the hand did not come to rest at the target in {values.timeout:g} s"
+                raise PlanningError(CauseCode.TIMED_OUT, f"{why}: {1e3 * self.off:.1f} mm are left")
             if seen is None:
                 yield None
                 continue
@@ -107,7 +107,7 @@ class Servo:
         self.off = float(np.linalg.norm(left.translation))
         return (
             self.off < values.tolerance
-            and left.rotation.magnitude() < values.angle
+            and float(left.rotation.magnitude()) < values.angle
             and seen.deviation < values.deviation
         )
 

@@ -1,6 +1,5 @@
 """The source's two tables: how far the printed part is by its box's area, and m a pixel by how far it is."""
 
-from dataclasses import dataclass
 from importlib.resources import files
 from itertools import pairwise
 from pathlib import Path
@@ -18,8 +17,8 @@ SHIPPED = "approach_tables.json"
 class ApproachTables(Model):
     """Knots, nearest first: `regrasp calibrate-approach` makes them.
 
-    `distance` (m) is the tool's, to its goal before the part, where the hand is aligned with it. `area` (px2) is that of
-    the part's box there, `scale` (m/px) of what lies in the plane of the part's front, and `aim` (m) by how much the
+    `distance` (m) is the tool's, to its goal before the part, where the hand is aligned with it. `area` (px2) is that
+    of the part's box there, `scale` (m/px) of what lies in the plane of the part's front, and `aim` (m) by how much the
     middle of the box lies left of and above the picture's.
     """
 

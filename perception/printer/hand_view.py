@@ -7,6 +7,7 @@ no such error (relative sensing; compare Hutchinson, Hager, Corke 1996, "A Tutor
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import ColorImage, FloatArray
@@ -40,7 +41,7 @@ class HandView:
 
     def __init__(self, tool_from_camera: RigidTransform, parameters: HandViewParameters = HandViewParameters()) -> None:
         self._camera_from_tool, self._parameters = tool_from_camera.inv(), parameters
-        self._mean: FloatArray | None = None
+        self._mean: NDArray[np.float32] | None = None
         self._depths: list[FloatArray] = []
         self._count = 0
         self.offset: FloatArray = np.zeros(3)
@@ -92,7 +93,7 @@ class HandView:
         """The pads' inner edges and their upper edge, px, near where they should be; None if they are not seen."""
         values, mean = self.parameters, self._mean
         assert mean is not None
-        height, width = mean.shape[:2]
+        height = len(mean)
         low, high = round(v) + values.search // 2, min(round(v) + 2 * values.search, height)
         if high - low < values.search // 2:
             return None

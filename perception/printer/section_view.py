@@ -4,9 +4,10 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
-from regrasp.interfaces.arrays import ColorImage, DepthImage, FloatArray, Mask
+from regrasp.interfaces.arrays import DepthImage, FloatArray, Mask
 from regrasp.interfaces.frame import Intrinsics, RgbdFrame
 from regrasp.interfaces.printer.cell import PrintedPart
 from regrasp.perception.camera.color import SegmentationParameters, color_mask
@@ -164,7 +165,7 @@ class SectionView:
             else:
                 across = left - u.min()
             step = np.array([across * z / k.fx, (top - v.min()) * z / k.fy, 0.0]) @ turn
-            place = place + [0.0, step[1], step[2]]
+            place = place + np.array([0.0, step[1], step[2]])
             place[0] = camera[0] + plane[0] + plane[1] * (place[1] - camera[1])
         distance = float(place[0] - camera[0])
         deviation = values.deviation * max(1.0, distance / values.deviation_distance) * (1.0 if whole else 3.0)
@@ -175,7 +176,7 @@ class SectionView:
         return SectionSighting(frame.stamp, place, yaw, deviation, yaw_deviation)
 
 
-def _largest(mask: Mask) -> FloatArray | None:
+def _largest(mask: NDArray[np.uint8]) -> FloatArray | None:
     """Left, top, width, height and area of the mask's largest blob; None if it is empty."""
     _, _, boxes, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
     return boxes[1 + int(np.argmax(boxes[1:, cv2.CC_STAT_AREA]))] if len(boxes) > 1 else None

@@ -91,7 +91,7 @@ class SimPart:
     def front(self) -> RigidTransform:
         """The true pose of the middle of the section's front, world_from_front: x points into the part, z up."""
         section, part = self._known.section, self._known
-        off = np.subtract(section.center, part.center) + [0.5 * section.size[0], 0.0, 0.0]
+        off = np.subtract(section.center, part.center) + np.array([0.5 * section.size[0], 0.0, 0.0])
         return self.pose(self.part) * RigidTransform.from_components(off, _INTO)
 
     def held_by(self, arm: SimArm) -> bool:

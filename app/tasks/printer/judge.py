@@ -21,8 +21,8 @@ class PrinterJudge(judge.Judge[Expect]):
             yield Expectation("part_held", held == self.expect.part_held, held, self.expect.part_held)
 
     def _held(self) -> bool:
-        hand = self.world.arms[self.world.cell.known.printer.hand]
-        return self.world.objects.part.held_by(hand)
+        objects = self.world.objects
+        return bool(objects.part.held_by(self.world.arms[objects.cell.known.printer.hand]))
 
     def measured(self) -> dict[str, Any]:
         """See `Judge`."""

@@ -1,4 +1,4 @@
-"""`regrasp calibrate-approach`: the tables of the source's approaches, from rendered pictures (sections 4.3.8, 4.3.9)."""
+"""`regrasp calibrate-approach`: the tables of the source's approaches (sections 4.3.8, 4.3.9), by rendered pictures."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -32,7 +32,8 @@ def calibrated(cell: PrinterCell, parameters: CalibrationParameters = Calibratio
         ValueError: a picture does not show the part, or the tables do not rise and fall as they must.
     """
     with HandPlaced(without_errors(cell), 0) as hand:
-        analyzer = ColorAnalyzer(hand.services.perception, cell.known.printer, hand.world)
+        perception: Any = hand.services.perception
+        analyzer = ColorAnalyzer(perception, cell.known.printer, hand.world)
         count = round((parameters.farthest - parameters.nearest) / parameters.step) + 1
         distances = np.linspace(parameters.nearest, parameters.farthest, count)
         rows = [_knot(hand, analyzer, float(distance), parameters.aside) for distance in distances]
@@ -56,8 +57,8 @@ def write_tables(tables: ApproachTables, path: Path) -> None:
 
 def without_errors(cell: PrinterCell) -> PrinterCell:
     """The cell with devices that are not off and have no noise."""
-    errors: dict[str, Any] = {name: 0.0 for name in ("camera_position", "camera_angle_deg", "depth_scale", "arm_tool")}
-    errors |= {name: 0.0 for name in ("finger_noise", "finger_backlash")}
+    errors: dict[str, Any] = dict.fromkeys(("camera_position", "camera_angle_deg", "depth_scale", "arm_tool"), 0.0)
+    errors |= dict.fromkeys(("finger_noise", "finger_backlash"), 0.0)
     hidden = cell.hidden.model_copy(update={"errors": cell.hidden.errors.model_copy(update=errors)})
     return cell.model_copy(update={"hidden": hidden})
 
@@ -65,7 +66,7 @@ def without_errors(cell: PrinterCell) -> PrinterCell:
 def _knot(
     hand: HandPlaced, analyzer: ColorAnalyzer, distance: float, aside: float
 ) -> tuple[float, float, float, float]:
-    """The box's area, the scale, and how far left and up the box's middle lies, m, with the hand so far from its goal."""
+    """The box's area, the scale, and how far left and up its middle lies (m), with the hand so far from its goal."""
     seen = [_seen(hand, analyzer, distance, y) for y in (-aside, 0.0, aside)]
     scale = 2 * aside / abs(seen[2].offset[0] - seen[0].offset[0])
     return seen[1].area, scale, -scale * seen[1].offset[0], -scale * seen[1].offset[1]

@@ -43,7 +43,7 @@ class HandPlaced:
         self._camera = cell.known.printer.camera
         self.arm = self.world.arms[self.name]
         self.arm.gripper.place_at(gap)
-        self.services.motion.grippers[self.name].open(gap)
+        self.arm.gripper.open(gap)
 
     @property
     def goal(self) -> RigidTransform:
