@@ -22,6 +22,8 @@ class TimingParameters:
     sample: float = 0.015  # s between samples; up to 0.02 after the slowing that the check of the limits may ask for
     limit_share: float = 0.85  # of the limits; toppra overshoots accelerations between its grid points
     grid_step: float = 0.02  # rad of path between two grid points at most
+    thinned: tuple[int, ...] = (1, 2, 3)  # with each so many'th waypoint it is tried, if it fails with more; choice
+    least_turn: float = 1e-3  # rad or m that a waypoint left out may lie beside the line of its neighbours; choice
     same_place: float = 1e-6  # rad or m in each joint; of waypoints that are nearer the later stands for both; choice
 
 
@@ -71,12 +73,17 @@ def time_path(
     path = path[np.append(np.abs(np.diff(path, axis=0)).max(axis=1) > parameters.same_place, True)]
     if len(path) == 1:
         return Trajectory(np.zeros(1), path.copy(), np.zeros(path.shape))
-    curve = _blended(path, parameters.corner)
     velocity = parameters.limit_share * fastest
     acceleration = parameters.limit_share * limits.accelerations
-    grid = _grid(curve.x, parameters.grid_step)
-    rates = None if allowed is None else _rates(curve, grid, allowed, speed)
-    timed = time_optimal(curve, grid, velocity, acceleration, rates)
+    for every in parameters.thinned:
+        # toppra's solver finds none along some smooth lines of many waypoints, and one along half of them (measured)
+        some = path if every == 1 else path[np.unique(np.append(np.arange(0, len(path), every), len(path) - 1))]
+        curve = _blended(some, parameters.corner)
+        grid = _grid(curve.x, parameters.grid_step)
+        rates = None if allowed is None else _rates(curve, grid, allowed, speed)
+        timed = time_optimal(curve, grid, velocity, acceleration, rates)
+        if timed is not None or _turns(path, every) > parameters.least_turn:
+            break
     if timed is None:
         raise RuntimeError(f"toppra found no timing for a path of {len(path)} waypoints")
     count = max(2, int(np.ceil(timed.duration / (speed * parameters.sample))) + 1)
@@ -85,6 +92,14 @@ def time_path(
     velocities[[0, -1]] = 0.0
     stretch = max(1.0, _overshoot(t, positions, velocities, fastest, limits.accelerations)) / speed
     return Trajectory(t * stretch, positions, velocities / stretch)
+
+
+def _turns(path: FloatArray, every: int) -> float:
+    """How far a waypoint of a path (k, n) lies beside the line of those `every` before and after it, at most."""
+    if len(path) <= 2 * every:
+        return np.inf
+    middle = 0.5 * (path[: -2 * every] + path[2 * every :])
+    return float(np.abs(path[every:-every] - middle).max())
 
 
 def _rates(curve: BPoly, grid: FloatArray, allowed: PathSpeed, speed: float) -> FloatArray | None:

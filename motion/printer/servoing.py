@@ -33,7 +33,7 @@ class ServoParameters:
     lost: float = 1.0  # s without a picture that shows the target; a sound camera needs 0.1
     timeout: float = 20.0  # s; without a fault it takes 3
     fastest: float = 0.10  # m/s of a target that the hand still follows; choice: half of its own speed
-    stop_margin: float = 0.004  # m from everything, to which a way may lead; the arm is off by 2 mm and its rail by 1 mm
+    stop_margin: float = 0.004  # m that a way keeps from everything: the arm errs by 2 mm, its rail by 1 mm
     following: FollowingParameters = field(default_factory=FollowingParameters)
     online: OnlineParameters = field(default_factory=OnlineParameters)
 
