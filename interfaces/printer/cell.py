@@ -161,7 +161,6 @@ class HiddenPrinter(Model):
     handle_off: tuple[Offset, Offset] = (0.0, 0.0)  # m along y and z from where the robot believes it
     part_off: tuple[Offset, Offset] = (0.0, 0.0)  # m along x and y on the plate from where the robot believes it
     part_yaw_deg: Annotated[float, Field(ge=-45.0, le=45.0)] = 0.0  # that it is turned to the left
-    part_absent: bool = False  # somebody has taken it
     plate_mass: Mass
     part_mass: Mass  # with its gripping section
     plate_friction: Friction  # coefficient, of the plate on what it lies on or what clamps it

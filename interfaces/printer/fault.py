@@ -6,6 +6,9 @@ from pydantic import Field
 
 from regrasp.interfaces.fault import Fault, FractionRange, Lasting, When
 
+Way = Annotated[float, Field(ge=-0.05, le=0.05)]  # metres
+Speed = Annotated[float, Field(ge=-0.2, le=0.2)]  # metres a second
+
 
 class PrinterWhen(When):
     """When a fault begins: exactly one of `at`, `opened` and `node`. Each fault begins once."""
@@ -37,4 +40,28 @@ class HandleMoves(Fault):
     )
 
 
-FAULTS: tuple[type[Fault], ...] = (DoorJams, HandleMoves)
+class PartKnocked(Fault):
+    """Something knocks the printed part: it slides on its plate, to which it stays bonded."""
+
+    type: Literal["part_knocked"] = Field(description="This fault.", examples=["part_knocked"])
+    by: tuple[Way, Way] = Field(
+        default=(0.0, 0.02), description="Metres along x and y from where it was printed.", examples=[[0.0, 0.02]]
+    )
+
+
+class PartFloats(Lasting):
+    """The bond of the printed part breaks, and the part drifts, without turning, as long as the fault lasts."""
+
+    type: Literal["part_floats"] = Field(description="This fault.", examples=["part_floats"])
+    velocity: tuple[Speed, Speed, Speed] = Field(
+        default=(0.0, 0.014, 0.014), description="Metres a second along x, y and z.", examples=[[0.0, 0.014, 0.014]]
+    )
+
+
+class PartTaken(Fault):
+    """Somebody takes the printed part away."""
+
+    type: Literal["part_taken"] = Field(description="This fault.", examples=["part_taken"])
+
+
+FAULTS: tuple[type[Fault], ...] = (DoorJams, HandleMoves, PartFloats, PartKnocked, PartTaken)

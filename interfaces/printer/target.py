@@ -28,6 +28,7 @@ class TargetTracker(Protocol):
     """Follows a target from picture to picture."""
 
     why: str  # why the last picture told nothing
+    trouble: str | None  # why the camera is not to be trusted now
 
     def update(self) -> TargetEstimate | None:
         """The target by the newest picture; None before it was seen."""

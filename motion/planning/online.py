@@ -87,7 +87,7 @@ class OnlinePlanner:
 
     def _samples(self, plan: Trajectory) -> ToolSamples:
         values, left = self._parameters, plan.duration - self._parameters.fine_time
-        times: FloatArray = np.arange(round(values.fine_time / values.fine) + 1) * values.fine
+        times = np.linspace(0.0, values.fine_time, round(values.fine_time / values.fine) + 1)
         if left > values.fine:
             count = min(values.rest, int(left / values.fine))
             times = np.append(times, np.linspace(values.fine_time, plan.duration, count + 1)[1:])

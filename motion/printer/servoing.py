@@ -64,8 +64,8 @@ class Servo:
     def trajectories(self, tool: Callable[[], RigidTransform]) -> Iterator[Trajectory | None]:
         """A trajectory for each tick, None to keep the last one, until the tool has come to the goal.
 
-        `tool` gives world_from_tool as read. Raises PlanningError with TARGET_NOT_SEEN, TARGET_TOO_FAST, TIMED_OUT,
-        OUT_OF_REACH or MOTION_BLOCKED.
+        `tool` gives world_from_tool as read. Raises PlanningError with TARGET_NOT_SEEN, CAMERA_FAILED,
+        TARGET_TOO_FAST, TIMED_OUT, OUT_OF_REACH or MOTION_BLOCKED.
         """
         values, begin = self._parameters, self._clock.now()
         planned, plan, steady_since = begin, None, None
@@ -73,8 +73,10 @@ class Servo:
             now = self._clock.now()
             seen = self._target.update()
             if now - (begin if seen is None else seen.stamp) > values.lost:
-                why = f"the target was not seen for {values.lost:g} s: {self._target.why}"
-                raise PlanningError(PrinterCause.TARGET_NOT_SEEN, why)
+                why, trouble = f"the target was not seen for {values.lost:g} s", self._target.trouble
+                if trouble is not None:
+                    raise PlanningError(CauseCode.CAMERA_FAILED, f"{why}: {trouble}")
+                raise PlanningError(PrinterCause.TARGET_NOT_SEEN, f"{why}: {self._target.why}")
             if now - begin > values.timeout:
                 why = f"the hand did not come to rest at the target in {values.timeout:g} s"
                 raise PlanningError(CauseCode.TIMED_OUT, f"{why}: {1e3 * self.off:.1f} mm are left")

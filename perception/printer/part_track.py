@@ -63,7 +63,7 @@ class PartTracker:
         self._yaw, self._yaw_variance = 0.0, 1.0
         self._off = 0  # outliers in a row
         self._number = -1
-        self.why = "there is no picture yet"  # why the last picture told nothing
+        self.why, self.trouble = "there is no picture yet", self._perception.trouble(self._camera)
 
     @counts_as("perception")
     def update(self) -> TargetEstimate | None:
@@ -71,11 +71,9 @@ class PartTracker:
         frame = self._perception.frame(self._camera)
         if frame is not None and frame.stamp >= self._since and frame.number != self._number:
             self._number = frame.number
-            trouble = self._perception.trouble(self._camera)
-            if trouble is None:
+            if self._perception.trouble(self._camera) is None:
                 self._take(frame)
-            else:
-                self.why = trouble
+        self.trouble = self._perception.trouble(self._camera)
         return self._estimate()
 
     def _take(self, frame: RgbdFrame) -> None:

@@ -2,8 +2,10 @@
 
 from collections.abc import Mapping
 
+import numpy as np
+
 from regrasp.interfaces.printer.cell import PrinterCell
-from regrasp.interfaces.printer.fault import DoorJams, HandleMoves
+from regrasp.interfaces.printer.fault import DoorJams, HandleMoves, PartFloats, PartKnocked, PartTaken
 from regrasp.sim.engine import Engine
 from regrasp.sim.faults.effects import Effect, TaskEffects
 from regrasp.sim.faults.faults import TriggerState
@@ -41,7 +43,18 @@ class PrinterObjects(TaskObjects):
             seconds = 0.2  # slow enough that friction holds the door meanwhile
             return Effect(step=lambda t: self.door.shift_handle(min(1.0, t / seconds) * fault.by), seconds=seconds)
 
-        return {DoorJams: jams, HandleMoves: moves}
+        def knocked(fault: PartKnocked, *_: object) -> Effect:
+            seconds, way = 0.2, np.array([*fault.by, 0.0])  # slow enough that bond and catch hold
+            return Effect(step=lambda t: self.part.slide(min(1.0, t / seconds) * way), seconds=seconds)
+
+        def floats(fault: PartFloats, *_: object) -> Effect:
+            velocity = np.array(fault.velocity)
+            return Effect(lambda: self.part.float_off(velocity), lambda: self.part.float_off(np.zeros(3)))
+
+        def taken(*_: object) -> Effect:
+            return Effect(self.part.take_away)
+
+        return {DoorJams: jams, HandleMoves: moves, PartKnocked: knocked, PartFloats: floats, PartTaken: taken}
 
     def after_step(self) -> None:
         """See `TaskObjects`: the catch or the bond may let go."""

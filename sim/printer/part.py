@@ -80,8 +80,6 @@ class SimPart:
         hold = Hold(BodyLink(engine.client, self.part), self._on_plate, base=self.plate, pivot=foot)
         self._hold, self._foot = hold, np.array(foot)
         self.bond = PartBond(hold, hidden.bond)
-        if hidden.part_absent:
-            self._take_away()
 
     def pose(self, body: int) -> RigidTransform:
         """The true pose of the plate's or the part's middle, world_from_body."""
@@ -118,8 +116,8 @@ class SimPart:
             quaternion = at.rotation.as_quat().tolist()
             self._hold.move((at.translation + way).tolist(), quaternion)
 
-    def _take_away(self) -> None:
-        """The part stands out of everyone's sight, under the floor."""
+    def take_away(self) -> None:
+        """Put the part out of everyone's sight, under the floor."""
         self.float_off(None)
         away = RigidTransform.from_translation([0.0, 0.0, -2.0])
         position = away.translation.tolist()

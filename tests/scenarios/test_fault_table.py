@@ -39,7 +39,8 @@ def test_a_row_says_what_its_scenario_says(name: str) -> None:
     scenario, row = load_scenario(FOLDER + name), rows()[name]
     file = scenario.file
     assert {fault.type for fault in file.faults} == set(row[0].split(", "))
-    job_done = "door open" if scenario.task is printer.TASK else "stowed"
+    of_printer = "part held" if file.expect.model_dump().get("part_held") else "door open"
+    job_done = of_printer if scenario.task is printer.TASK else "stowed"
     assert row[-1] == (f"safe stop: {file.expect.cause}" if file.expect.cause else job_done)
 
 

@@ -1,5 +1,6 @@
 from collections.abc import Callable
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -29,6 +30,19 @@ def distance_to_path(point: FloatArray, path: FloatArray) -> float:
         s = np.clip((point - a) @ (b - a) / max((b - a) @ (b - a), 1e-12), 0, 1)
         best = min(best, float(np.linalg.norm(a + s * (b - a) - point)))
     return best
+
+
+def test_a_smooth_line_of_many_waypoints_along_which_the_solver_fails() -> None:
+    """Found in the habitat: toppra fails with all 62 waypoints of this line, and not with half of them."""
+    path = np.load(Path(__file__).with_name("line_of_62_waypoints.npy"))
+    limits = JointLimits(
+        np.array([0.5, 3.14, 3.14, 3.14, 3.14, 3.14, 3.14]), np.array([1.0, 5.0, 5.0, 5.0, 5.0, 5.0, 5.0])
+    )
+    with pytest.raises(RuntimeError, match="no timing"):
+        time_path(path, limits, 0.3, TimingParameters(thinned=(1,)))
+    trajectory = time_path(path, limits, 0.3)
+    assert trajectory.positions[-1] == pytest.approx(path[-1], abs=1e-6)
+    assert all(distance_to_path(q, path) < 2e-3 for q in trajectory.positions[::5])
 
 
 @settings(max_examples=40, deadline=None)
