@@ -1,24 +1,21 @@
 """What a hand goes to: where its target is, and how it moves."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 from regrasp.interfaces.arrays import FloatArray
-
-if TYPE_CHECKING:
-    from scipy.spatial.transform import RigidTransform
 
 
 @dataclass(frozen=True, eq=False)
 class TargetEstimate:
     """The middle of the front of what a hand shall take, as it was at `stamp` s.
 
-    `pose` is world_from_target: x points into it, z up. `velocity` (3,) m/s in the world. `deviation` (m, each axis)
-    and `yaw_deviation` (rad) are standard deviations.
+    `pose` (4, 4) is world_from_target: x points into it, z up. `velocity` (3,) m/s in the world. `deviation` (m, each
+    axis) and `yaw_deviation` (rad) are standard deviations.
     """
 
     stamp: float
-    pose: "RigidTransform"
+    pose: FloatArray
     velocity: FloatArray
     deviation: float
     yaw_deviation: float

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from ruckig import InputParameter, Result, Ruckig, Synchronization, Trajectory
-from scipy.spatial.transform import RigidTransform, Rotation
+from scipy.spatial.transform import Rotation
 
 from regrasp.interfaces.arrays import FloatArray
 
@@ -21,7 +21,7 @@ class OnlineParameters:
     turn_jerk: float = 12.0  # rad/s3; choice
     fine: float = 0.025  # s between the samples of ...
     fine_time: float = 0.2  # s at the beginning, which are driven before the next plan ...
-    rest: int = 12  # and the samples of what comes after; choice
+    rest: int = 8  # and the samples of what comes after; choice
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,10 +37,10 @@ class OnlinePlanner:
 
     It plans the offset from the goal :math:`p(t) - g(t)` to zero (Ruckig: Berscheid, Kröger 2021, "Jerk-limited
     Real-time Trajectory Generation with Arbitrary Target States"), and the rotation vector from the goal's orientation
-    likewise. `pose` is where the tool rests at first, world_from_tool.
+    likewise. `pose` (4, 4) is where the tool rests at first, world_from_tool.
     """
 
-    def __init__(self, pose: RigidTransform, parameters: OnlineParameters = OnlineParameters()) -> None:
+    def __init__(self, pose: FloatArray, parameters: OnlineParameters = OnlineParameters()) -> None:
         self._parameters = parameters
         self._ruckig, self._input = Ruckig(6), InputParameter(6)
         values, three = parameters, [1.0] * 3
@@ -52,29 +52,29 @@ class OnlinePlanner:
             setattr(self._input, name, [along * x for x in three] + [about * x for x in three])
         self._input.synchronization = Synchronization.Phase
         self._input.target_position = [0.0] * 6
-        self._place, self._turn = pose.translation, pose.rotation
+        self._place, self._turn = pose[:3, 3], Rotation.from_matrix(pose[:3, :3])
         self._rates = np.zeros((2, 6))  # velocity and acceleration in the world
         self._plan: Trajectory | None = None
-        self._goal, self._drift = pose, np.zeros(3)
+        self._goal, self._goal_turn, self._drift = self._place, self._turn, np.zeros(3)
 
     def advance(self, elapsed: float) -> None:
         """Take it that the tool followed the last plan for `elapsed` s."""
         if self._plan is None:
             return
         offset, velocity, acceleration = (np.array(x) for x in self._plan.at_time(elapsed))
-        self._place = self._goal.translation + self._drift * elapsed + offset[:3]
-        self._turn = self._goal.rotation * Rotation.from_rotvec(offset[3:])
+        self._place = self._goal + self._drift * elapsed + offset[:3]
+        self._turn = self._goal_turn * Rotation.from_rotvec(offset[3:])
         self._rates = np.array([velocity, acceleration])
         self._rates[0, :3] += self._drift
 
-    def replan(self, goal: RigidTransform, drift: FloatArray) -> ToolSamples:
-        """The way from where the tool is to a goal (world_from_tool) that drifts with (3,) m/s.
+    def replan(self, goal: FloatArray, drift: FloatArray) -> ToolSamples:
+        """The way from where the tool is to a goal (4, 4), world_from_tool, that drifts with (3,) m/s.
 
         Raises:
             ValueError: there is none within the limits.
         """
-        self._goal, self._drift = goal, drift
-        offset = np.concatenate([self._place - goal.translation, (goal.rotation.inv() * self._turn).as_rotvec()])
+        self._goal, self._goal_turn, self._drift = goal[:3, 3], Rotation.from_matrix(goal[:3, :3]), drift
+        offset = np.concatenate([self._place - self._goal, (self._goal_turn.inv() * self._turn).as_rotvec()])
         rates = self._rates.copy()
         rates[0, :3] -= drift
         self._input.current_position = offset.tolist()
@@ -92,8 +92,8 @@ class OnlinePlanner:
             count = min(values.rest, int(left / values.fine))
             times = np.append(times, np.linspace(values.fine_time, plan.duration, count + 1)[1:])
         offsets = np.array([plan.at_time(float(t))[0] for t in times])
-        turns = self._goal.rotation * Rotation.from_rotvec(offsets[:, 3:])
+        turns = self._goal_turn * Rotation.from_rotvec(offsets[:, 3:])
         poses = np.tile(np.eye(4), (len(times), 1, 1))
         poses[:, :3, :3] = turns.as_matrix()
-        poses[:, :3, 3] = self._goal.translation + times[:, None] * self._drift + offsets[:, :3]
+        poses[:, :3, 3] = self._goal + times[:, None] * self._drift + offsets[:, :3]
         return ToolSamples(times, poses)

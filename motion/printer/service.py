@@ -243,10 +243,14 @@ class PrinterMotion(Motion):
         def steps() -> Iterator[None]:
             start = self.execution.standing(arm)
             model = self.model(arm, without=self.things(self.parameters.servo_spares))
-            servo = Servo(self.kinematics[arm], start, target, before, self._clock, model, self.parameters.servo)
-            yield from self.execution.stream(arm, servo.trajectories(lambda: self.tool(arm)), self._guard.free)
+            kin = self.kinematics[arm]
+            servo = Servo(kin, start, target, before, self._clock, model, self.parameters.servo)
+            yield from self.execution.stream(
+                arm, servo.trajectories(lambda: kin.tool_matrix(self.joints(arm))), self._guard.free
+            )
             if servo.goal is not None:
-                self._section = servo.goal * RigidTransform.from_translation([before + self._half_section, 0.0, 0.0])
+                goal = RigidTransform.from_matrix(servo.goal)
+                self._section = goal * RigidTransform.from_translation([before + self._half_section, 0.0, 0.0])
                 self.believe_part(self._section.translation)
 
         return self.execution.request(arm, steps())

@@ -4,7 +4,6 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cause import CauseCode
@@ -16,6 +15,7 @@ from regrasp.motion.failure import PlanningError
 from regrasp.motion.planning.following import FollowingParameters, followed
 from regrasp.motion.planning.online import OnlineParameters, OnlinePlanner, ToolSamples
 from regrasp.motion.robots.kinematics import ArmKinematics
+from regrasp.motion.robots.poses import rotation_vector
 from regrasp.motion.scene.collision import CollisionModel
 
 
@@ -57,14 +57,14 @@ class Servo:
         self._kin, self._target, self._before = kin, target, before
         self._joints, self._speeds = start, np.zeros(len(start))
         self._clock, self._model, self._parameters = clock, model, parameters
-        self._online = OnlinePlanner(kin.tool(start), parameters.online)
-        self.goal: RigidTransform | None = None  # the last one
+        self._online = OnlinePlanner(kin.tool_matrix(start), parameters.online)
+        self.goal: FloatArray | None = None  # the last one (4, 4), world_from_tool
         self.off = np.inf  # m from it
 
-    def trajectories(self, tool: Callable[[], RigidTransform]) -> Iterator[Trajectory | None]:
+    def trajectories(self, tool: Callable[[], FloatArray]) -> Iterator[Trajectory | None]:
         """A trajectory for each tick, None to keep the last one, until the tool has come to the goal.
 
-        `tool` gives world_from_tool as read. Raises PlanningError with TARGET_NOT_SEEN, CAMERA_FAILED,
+        `tool` gives world_from_tool (4, 4) as read. Raises PlanningError with TARGET_NOT_SEEN, CAMERA_FAILED,
         TARGET_TOO_FAST, TIMED_OUT, OUT_OF_REACH or MOTION_BLOCKED.
         """
         values, begin = self._parameters, self._clock.now()
@@ -98,27 +98,25 @@ class Servo:
             plan, planned = self._trajectory(self._online.replan(self._aim(goal, tool()), seen.velocity)), now
             yield plan
 
-    def _goal(self, seen: TargetEstimate, now: float) -> RigidTransform:
-        """world_from_tool where it shall be now."""
-        drift = RigidTransform.from_translation(seen.velocity * (now - seen.stamp))
-        self.goal = drift * seen.pose * RigidTransform.from_translation([-self._before, 0.0, 0.0])
+    def _goal(self, seen: TargetEstimate, now: float) -> FloatArray:
+        """world_from_tool (4, 4) where it shall be now."""
+        self.goal = seen.pose.copy()
+        self.goal[:3, 3] += seen.velocity * (now - seen.stamp) - self._before * seen.pose[:3, 0]
         return self.goal
 
-    def _there(self, seen: TargetEstimate, goal: RigidTransform, tool: RigidTransform) -> bool:
-        values, left = self._parameters, goal.inv() * tool
-        self.off = float(np.linalg.norm(left.translation))
-        return (
-            self.off < values.tolerance
-            and float(left.rotation.magnitude()) < values.angle
-            and seen.deviation < values.deviation
-        )
+    def _there(self, seen: TargetEstimate, goal: FloatArray, tool: FloatArray) -> bool:
+        values, turn = self._parameters, rotation_vector(goal[:3, :3].T @ tool[:3, :3])
+        self.off = float(np.linalg.norm(tool[:3, 3] - goal[:3, 3]))
+        near = self.off < values.tolerance and float(np.linalg.norm(turn)) < values.angle
+        return near and seen.deviation < values.deviation
 
-    def _aim(self, goal: RigidTransform, tool: RigidTransform) -> RigidTransform:
+    def _aim(self, goal: FloatArray, tool: FloatArray) -> FloatArray:
         """Where to go now: before the goal, as long as the tool is beside its axis."""
-        values, left = self._parameters, (goal.inv() * tool).translation
+        values, left = self._parameters, goal[:3, :3].T @ (tool[:3, 3] - goal[:3, 3])
         beside = max(float(np.hypot(left[1], left[2])) - values.corridor, 0.0)
-        before = min(values.funnel * beside, values.most_before)
-        return goal * RigidTransform.from_translation([-before, 0.0, 0.0])
+        aim = goal.copy()
+        aim[:3, 3] -= min(values.funnel * beside, values.most_before) * goal[:3, 0]
+        return aim
 
     def _trajectory(self, samples: ToolSamples) -> Trajectory:
         """The joints along the tool's way. Raises PlanningError where the arm cannot follow or would meet something."""

@@ -40,7 +40,7 @@ class HandView:
     """
 
     def __init__(self, tool_from_camera: RigidTransform, parameters: HandViewParameters = HandViewParameters()) -> None:
-        self._camera_from_tool, self._parameters = tool_from_camera.inv(), parameters
+        self._mount, self._parameters = tool_from_camera.inv().as_matrix(), parameters
         self._mean: NDArray[np.float32] | None = None
         self._depths: list[FloatArray] = []
         self._count = 0
@@ -48,16 +48,19 @@ class HandView:
         self.deviation: FloatArray = np.full(3, parameters.mount_deviation)
 
     @property
-    def camera_from_tool(self) -> RigidTransform:
-        """The mount as measured: as known until the fingers were seen."""
-        return RigidTransform.from_translation(self.offset) * self._camera_from_tool
+    def camera_from_tool(self) -> FloatArray:
+        """The mount (4, 4) as measured: as known until the fingers were seen."""
+        measured = self._mount.copy()
+        measured[:3, 3] += self.offset
+        return measured
 
     def feed(self, frame: RgbdFrame, gap: float) -> None:
         """Take a picture in, made with the pads about `gap` m apart by the encoder."""
         values, k = self.parameters, frame.intrinsics
         if abs(gap - values.gap) > values.gap_slack:
             return
-        tip = self._camera_from_tool.apply([0.5 * values.length - values.behind, 0.0, 0.5 * values.height])
+        place = np.array([0.5 * values.length - values.behind, 0.0, 0.5 * values.height])
+        tip = self._mount[:3, :3] @ place + self._mount[:3, 3]
         u, v = k.fx * tip[0] / tip[2] + k.cx, k.fy * tip[1] / tip[2] + k.cy
         separation, slack = k.fx * gap / tip[2], k.fx * values.gap_slack / tip[2]
         half = round(0.5 * k.fx * values.gap / tip[2]) + 2 * values.search

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.spatial.transform import RigidTransform, Rotation
+from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.frame import RgbdFrame
@@ -77,18 +77,19 @@ class PartTracker:
         return self._estimate()
 
     def _take(self, frame: RgbdFrame) -> None:
-        tool = self._tool_of(frame)
+        world_from_tool = self._tool_of(frame)
         if self._hand is None:
-            self._hand = HandView(tool.inv() * self._perception.pose_of(frame), self._parameters.hand)
+            self._hand = HandView(world_from_tool.inv() * self._perception.pose_of(frame), self._parameters.hand)
         self._hand.feed(frame, self._gap())
         seen = self._section.find(frame, self._hand.camera_from_tool)
         if isinstance(seen, NoSection):
             self.why = seen.why
             return
-        way = tool.rotation.apply([np.cos(seen.yaw), np.sin(seen.yaw), 0.0])
+        tool = world_from_tool.as_matrix()
+        way = tool[:3, :3] @ [np.cos(seen.yaw), np.sin(seen.yaw), 0.0]
         yaw = float(np.arctan2(way[1], way[0]))
         deviation = float(np.hypot(seen.deviation, self._hand.deviation.max()))
-        self._measure(frame.stamp, tool.apply(seen.front), deviation, yaw, seen.yaw_deviation)
+        self._measure(frame.stamp, tool[:3, :3] @ seen.front + tool[:3, 3], deviation, yaw, seen.yaw_deviation)
 
     def _measure(self, stamp: float, place: FloatArray, deviation: float, yaw: float, yaw_deviation: float) -> None:
         values = self._parameters
@@ -122,8 +123,8 @@ class PartTracker:
         if self._stamp is None:
             return None
         x, y = np.cos(self._yaw), np.sin(self._yaw)
-        turn = Rotation.from_matrix([[x, -y, 0.0], [y, x, 0.0], [0.0, 0.0, 1.0]])
-        pose = RigidTransform.from_components(self._place[0], turn)
+        pose = np.array([[x, -y, 0.0, 0.0], [y, x, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
+        pose[:3, 3] = self._place[0]
         return TargetEstimate(
             self._stamp,
             pose,

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import DepthImage, FloatArray, Mask
 from regrasp.interfaces.frame import Intrinsics, RgbdFrame
@@ -18,6 +17,8 @@ from regrasp.perception.camera.model import NEAREST_DEPTH, pixel_rays
 class SectionViewParameters:
     """How the section is measured. Lengths in m."""
 
+    search_step: int = 2  # of so many pixels one is looked at for the section's colour; choice
+    grown: float = 1.3  # sizes of the section's box to each side of it, where the part may be; choice
     least_area: int = 60  # px of its colour; choice: it has 900 at 0.6 m
     least_readings: int = 30  # of depth on its front; choice
     near: float = 0.003  # from a plane that counts as on it: the noise at 0.6 m is 2 mm; choice
@@ -30,7 +31,7 @@ class SectionViewParameters:
     deviation_distance: float = 0.2  # m
     yaw_deviation: float = 0.005  # rad there; it grows with the distance's square
     unknown_yaw: float = 0.2  # rad, where there is no depth
-    most_pixels: int = 6000  # from which the plane is fitted: more from nearby tell no more
+    most_pixels: int = 3000  # from which the plane is fitted: more from nearby tell no more
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,19 +70,17 @@ class SectionView:
             [(x, y, z) for x in (0.0, depth) for y in (-width / 2, width / 2) for z in (-height / 2, height / 2)]
         )
 
-    def find(self, frame: RgbdFrame, camera_from_tool: RigidTransform) -> SectionSighting | NoSection:
-        """The section in one picture."""
-        values, k = self._parameters, frame.intrinsics
-        blue = color_mask(frame.rgb, self._blue)
-        blob = _largest(blue)
-        if blob is None or blob[4] < values.least_area:
-            return NoSection(
-                frame.stamp, f"{0 if blob is None else blob[4]} pixels have its colour, {values.least_area} are needed"
-            )
-        near = _grown(blob, k, 2.5)
-        on_section = blue[near] > 0
-        on_part = color_mask(frame.rgb[near], self._red) > 0
-        turn = camera_from_tool.rotation.as_matrix()
+    def find(self, frame: RgbdFrame, camera_from_tool: FloatArray) -> SectionSighting | NoSection:
+        """The section in one picture of a camera at `camera_from_tool` (4, 4)."""
+        values, k, step = self._parameters, frame.intrinsics, self._parameters.search_step
+        blob = _largest(color_mask(np.ascontiguousarray(frame.rgb[::step, ::step]), self._blue))
+        area = 0 if blob is None else int(blob[4]) * step**2
+        if blob is None or area < values.least_area:
+            return NoSection(frame.stamp, f"{area} pixels have its colour, {values.least_area} are needed")
+        near = _grown(step * blob, k, values.grown)
+        rgb = np.ascontiguousarray(frame.rgb[near])
+        on_section, on_part = color_mask(rgb, self._blue) > 0, color_mask(rgb, self._red) > 0
+        turn = camera_from_tool[:3, :3].astype(np.float32)
         few = (slice(None, None, max(1, round(np.sqrt(on_section.size / (8 * values.most_pixels))))),) * 2
         rays = pixel_rays(k)[near][few] @ turn  # in the tool's axes
         by_size = False
@@ -134,7 +133,7 @@ class SectionView:
         outline: tuple[float, float, float],
         plane: FloatArray,
         by_size: bool,
-        camera_from_tool: RigidTransform,
+        camera_from_tool: FloatArray,
     ) -> SectionSighting | NoSection:
         """The place at which the section's outline would have the seen sides and the seen upper edge.
 
@@ -142,7 +141,7 @@ class SectionView:
         """
         values, k = self._parameters, frame.intrinsics
         left, right, top = outline[0] + near[1].start, outline[1] + near[1].start, outline[2] + near[0].start
-        turn, shift = camera_from_tool.rotation.as_matrix(), camera_from_tool.translation
+        turn, shift = camera_from_tool[:3, :3], camera_from_tool[:3, 3]
         camera = -shift @ turn  # in the tool's frame
         yaw = float(np.arctan(-plane[1]))
         c, s = np.cos(yaw), np.sin(yaw)
