@@ -1,6 +1,7 @@
 """Where a picture shows the printed part's gripping section: by its colour, its known shape and the depth image."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -91,7 +92,9 @@ class SectionView:
             plane, by_size = np.array([ahead, 0.0]), True
         return self._fitted(frame, near, outline, plane, by_size, camera_from_tool)
 
-    def _plane(self, depth: DepthImage, rays: FloatArray, section: Mask, part: Mask) -> FloatArray | None:
+    def _plane(
+        self, depth: DepthImage, rays: NDArray[np.floating[Any]], section: Mask, part: Mask
+    ) -> FloatArray | None:
         """The upright plane of the section's front, x = a + b y in the tool's axes about the camera: (a, b).
 
         The front of the part behind it is parallel, and both are fitted together.

@@ -8,6 +8,7 @@ import pytest
 import yaml
 
 import regrasp
+from regrasp.app.files.findings import Findings
 from regrasp.app.files.resources import shipped
 from regrasp.app.scenario.load import load_scenario
 
@@ -40,3 +41,24 @@ def test_the_same_seed_gives_the_same_bytes(tmp_path: Path) -> None:
         run([], tmp_path / name)
     one, two = (tmp_path / name / "run" / "ticks.jsonl" for name in ("one", "two"))
     assert one.read_bytes() == two.read_bytes()
+
+
+@pytest.mark.parametrize("approach", ["servo", "three_step"])
+def test_the_part_is_taken_by_each_approach(approach: str, tmp_path: Path) -> None:
+    scenario = load_scenario("printer_grasp", ["gravity=earth", f"inputs.approach={approach}"])
+    result = regrasp.run(scenario, seed=4, out=tmp_path / "run")
+    assert result.succeeded, [str(e) for e in result.expectations]
+    assert result.measured["part_held"] is True
+
+
+def test_an_approach_that_there_is_not_is_found_by_the_check(tmp_path: Path) -> None:
+    tree = shipped("tree")["printer_grasp"].read_text(encoding="utf-8").replace('method="{approach}"', 'method="two"')
+    (tmp_path / "mine.xml").write_text(tree)
+    text = (
+        shipped("scenario")["printer_grasp"]
+        .read_text(encoding="utf-8")
+        .replace("tree: printer_grasp", "tree: mine.xml")
+    )
+    (tmp_path / "mine.yaml").write_text(text)
+    with pytest.raises(Findings, match="two_step"):
+        load_scenario(str(tmp_path / "mine.yaml"))

@@ -113,12 +113,13 @@ def calibrate_approach(
         from regrasp.app.scenario.cell_file import load_cell
         from regrasp.app.tasks.printer.studies.approach_calibration import calibrated, write_tables
         from regrasp.interfaces.printer.cell import PrinterCell
+        from regrasp.interfaces.request import RequestError
     read = load_cell(path)
     if not isinstance(read, PrinterCell):
         raise Findings([Finding("--cell", 0, f"{quoted(cell)} has no printer; name a cell that has one")])
     try:
         tables = calibrated(read)
-    except ValueError as error:
+    except (ValueError, RequestError) as error:
         raise Findings([Finding("--cell", 0, f"{error}; is the door of {quoted(cell)} open?")]) from None
     write_tables(tables, out)
 

@@ -138,10 +138,10 @@ class _Trial:
         except RequestError as error:
             return Trial(*self._what, None, f"{error.code}: {error}", self._seconds(), grasped, self._path)
         x, y, z = self._off().tolist()
-        settle = self._seconds()
+        settle, path = self._seconds(), list(self._path)
         if block != "C":
             grasped = self._grasps()
-        return Trial(*self._what, (x, y, z), "", settle, grasped, self._path)
+        return Trial(*self._what, (x, y, z), "", settle, grasped, path)
 
     def _grasps(self) -> bool:
         hand = self._hand
