@@ -373,7 +373,7 @@ def test_of_an_empty_file_one_thing_is_told(scenario: Path) -> None:
 def test_after_an_unknown_name_a_few_are_named_and_how_to_see_all(scenario: Path) -> None:
     [told] = findings(name="xyzzy")
     assert told.startswith(
-        "xyzzy: no scenario named 'xyzzy'; the shipped ones are no_obstacle, printer_door, printer_grasp, random_scene, r"
+        "xyzzy: no scenario named 'xyzzy'; the shipped ones are no_obstacle, printer_door, printer_grasp, random_sc"
     )
     assert "regrasp scenarios list shows" in told
     assert len(told) < 250
