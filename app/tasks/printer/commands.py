@@ -12,7 +12,6 @@ from regrasp.app.files.findings import Finding, Findings
 from regrasp.app.files.resources import resolve
 from regrasp.app.interrupts import late_imports
 from regrasp.app.records import folders
-from regrasp.interfaces.printer.actions import Approach
 from regrasp.interfaces.quote import nearest, quoted
 
 Block = Literal["A", "A0", "B", "C"]
@@ -70,7 +69,9 @@ def approach(
         typer.Option(help="Folder of approach.json, approach.csv and plots. The same command again goes on there."),
     ] = None,
 ) -> None:
-    """Measure how near each approach brings the hand to the printed part, and whether it then takes it.
+    """Measure how near each approach brings the hand to the part.
+
+    And whether the hand then takes it.
 
     As the source's Table 4-5: the errors of the tool from its goal, in the Y-Z plane, along X and in all three. In C
     only the servo is tried. A trial takes about 5 seconds: a seed 41 trials, with A0 73.
@@ -80,6 +81,8 @@ def approach(
       regrasp study approach --seeds 0:2 --blocks A --out results/approach
       regrasp study approach --seeds 0:20 --approaches servo --out results/servo
     """
+    from regrasp.interfaces.printer.actions import Approach  # late: --help needs no numpy
+
     chosen = parse_seeds(seeds)
     wrong = [] if out is None else list(folders.folder_findings(out))
     picked = [_names("--blocks", blocks, get_args(Block)), _names("--approaches", approaches, get_args(Approach))]
@@ -97,7 +100,9 @@ def calibrate_approach(
     out: Annotated[Path, typer.Option("-o", "--out", metavar="FILE", help="The tables, a new JSON file.")],
     cell: Annotated[str, typer.Option(help="The cell with the printer, its door open.")] = "habitat_open",
 ) -> None:
-    """Make the tables of the source's approaches from rendered pictures of a printed part.
+    """Make the tables of the source's approaches to a part.
+
+    From rendered pictures of the printed part.
 
     From a hand that is aligned with the part, 0.15 to 0.55 m before its goal: the area of the part's box, and the
     metres that a pixel shows.
