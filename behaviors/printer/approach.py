@@ -5,9 +5,9 @@ from typing import Any
 
 from regrasp.behaviors.printer.services import PrinterServices
 from regrasp.interfaces.printer.actions import Approach, ImageGoal, PoseRelGoal
+from regrasp.interfaces.printer.cell import PART_AND_BED
 from regrasp.interfaces.request import Request
 
-NEAR = ("part", "section", "plate", "plate_bed")  # what the hand comes near to on purpose
 BUFFER = 0.25  # m before the goal at which three_step stops; the source's
 
 
@@ -46,4 +46,4 @@ def _step(
     x, y, z = (float(value) for value in services.perception.offset_by_tables(seen))
     say("saw the part", offset=seen.offset, area=seen.area, goal=[round(value, 4) for value in (x, y, z)])
     ahead = 0.0 if stop is None else min(x + stop, 0.0)  # never back, as the source
-    yield services.manipulator.send(PoseRelGoal((ahead, y, z), NEAR))
+    yield services.manipulator.send(PoseRelGoal((ahead, y, z), PART_AND_BED))

@@ -3,10 +3,11 @@
 from typing import Any, ClassVar, get_args
 
 from regrasp.behaviors.leaf import LeafFailed, LeafPort, LeafSteps
-from regrasp.behaviors.printer.approach import NEAR, approach_steps
+from regrasp.behaviors.printer.approach import approach_steps
 from regrasp.behaviors.printer.leaf import PrinterLeaf
 from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.printer.actions import Approach, PoseGoal, RailGoal
+from regrasp.interfaces.printer.cell import PART_AND_BED
 
 
 class RailToPart(PrinterLeaf):
@@ -43,7 +44,7 @@ class HandBeforePart(PrinterLeaf):
         goal = self.services.motion.part_goal(self.get_input("before"))
         start = RigidTransform.from_translation([self.get_input(name) for name in ("dx", "dy", "dz")]) * goal
         onward = start.inv() * goal, RigidTransform.from_translation([self.get_input("deeper"), 0.0, 0.0])
-        yield self.services.manipulator.send(PoseGoal(start, may_touch=NEAR, onward=onward))
+        yield self.services.manipulator.send(PoseGoal(start, may_touch=PART_AND_BED, onward=onward))
 
 
 class ApproachPart(PrinterLeaf):

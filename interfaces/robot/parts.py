@@ -139,6 +139,8 @@ class LinkageGripper(_Gripper):
     joint: str  # the driven one; it closes upwards
     pads: tuple[LinkName, LinkName]  # left and right
     thickness: Annotated[float, Field(ge=0, le=0.05)]  # m of a pad: its link's origin lies in its middle
+    length: Length | None = None  # m of a pad along the finger; needed by what looks for the pads in a picture ...
+    height: Length | None = None  # and this, too
 
 
 Gripper = Annotated[ParallelGripper | LinkageGripper, Field(discriminator="type")]

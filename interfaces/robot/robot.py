@@ -204,6 +204,11 @@ class Robot(Model):
         pads = zip(gripper.pads.links, self.parallel_jaw.pads, strict=True)
         return np.array([(self.tree.frame(link, positions) @ pose)[:3, 3] for link, pose in pads])
 
+    def pads_in_tool(self, opening: float) -> FloatArray:
+        """The pads' middles (2, 3), m, in the tool's frame, at this opening, m."""
+        tool = self.tree.frame(self.tool.link) @ urdf.pose_of(self.tool.xyz, self.tool.rpy)
+        return (self.pad_places(opening) - tool[:3, 3]) @ tool[:3, :3]
+
     @cached_property
     def parallel_jaw(self) -> ParallelJaw:
         """How the jaw of a parallel gripper opens."""

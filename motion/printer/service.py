@@ -13,7 +13,7 @@ from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.cell import Box, WristMount
 from regrasp.interfaces.devices import Arm, Clock, Gripper
 from regrasp.interfaces.frame import RgbdFrame
-from regrasp.interfaces.printer.cell import PrinterKnown
+from regrasp.interfaces.printer.cell import PART_AND_BED, PrinterKnown
 from regrasp.interfaces.printer.target import TargetTracker
 from regrasp.interfaces.quote import nearest, quoted
 from regrasp.interfaces.request import Request
@@ -46,7 +46,6 @@ class PrinterMotionParameters(MotionParameters):
     gives: int = 10  # times at most
     give_time: float = 0.1  # s until the efforts are read again
     part_force: float = 20.0  # N a finger: the pads hold 24 N by friction, and its catch lets go of the plate at 6 N
-    servo_spares: tuple[str, ...] = ("part", "section", "plate", "plate_bed")  # that a servo's way may touch
     servo: ServoParameters = field(default_factory=ServoParameters)
     sphere_spacing: float = 0.016  # m between the spheres that stand for what the hand holds; choice
 
@@ -103,14 +102,14 @@ class PrinterMotion(Motion):
             self.believe_door(self.door_opening)
         return off
 
-    def believe_part(self, section: FloatArray) -> None:
+    def believe_part(self, section: FloatArray, alone: bool = False) -> None:
         """Take the part's gripping section to be at a place (3,) m, from now on.
 
-        Part, plate and the bed under the plate are taken to be as far off, since they lie on each other.
+        Part, plate and the bed under the plate are taken to be as far off, since they lie on each other; of a part
+        that stands elsewhere on its plate, or floats, it `alone`.
         """
-        names = ("plate_bed", "plate", "part", "section")
         off = finite("the section's place", section) - self.things(["section"])[0].center
-        for box in self.things(names):
+        for box in self.things(["part", "section"] if alone else PART_AND_BED):
             moved = tuple((np.array(box.center) + off).tolist())
             self._fixed[self._fixed.index(box)] = box.model_copy(update={"center": moved})
         self.believe_door(self.door_opening)
@@ -242,7 +241,7 @@ class PrinterMotion(Motion):
 
         def steps() -> Iterator[None]:
             start = self.execution.standing(arm)
-            model = self.model(arm, without=self.things(self.parameters.servo_spares))
+            model = self.model(arm, without=self.things(PART_AND_BED))
             kin = self.kinematics[arm]
             servo = Servo(kin, start, target, before, self._clock, model, self.parameters.servo)
             yield from self.execution.stream(
@@ -251,7 +250,7 @@ class PrinterMotion(Motion):
             if servo.goal is not None:
                 goal = RigidTransform.from_matrix(servo.goal)
                 self._section = goal * RigidTransform.from_translation([before + self._half_section, 0.0, 0.0])
-                self.believe_part(self._section.translation)
+                self.believe_part(self._section.translation, alone=True)
 
         return self.execution.request(arm, steps())
 
@@ -273,11 +272,11 @@ class PrinterMotion(Motion):
         between the pads. It fails as `shift` and `close` do.
         """
         positive("the way", deeper)
-        thickness, spared = self.known.printer.part.section.size[1], self.parameters.servo_spares
+        thickness = self.known.printer.part.section.size[1]
 
         def steps() -> Generator[None, None, float]:
             way = self.tool(arm).rotation.apply([deeper, 0.0, 0.0])
-            yield from self._done(self.shift(arm, way, without=self.things(spared)))
+            yield from self._done(self.shift(arm, way, without=self.things(PART_AND_BED)))
             yield from self.execution.close_jaw(arm, thickness, force=self.parameters.part_force)
             yield from self._give_way(arm)
             return self.grippers[arm].reading().gap

@@ -65,7 +65,7 @@ class Servo:
         """A trajectory for each tick, None to keep the last one, until the tool has come to the goal.
 
         `tool` gives world_from_tool (4, 4) as read. Raises PlanningError with TARGET_NOT_SEEN, CAMERA_FAILED,
-        TARGET_TOO_FAST, TIMED_OUT, OUT_OF_REACH or MOTION_BLOCKED.
+        TARGET_TOO_FAST, TIMED_OUT, PLANNING_FAILED, OUT_OF_REACH or MOTION_BLOCKED.
         """
         values, begin = self._parameters, self._clock.now()
         planned, plan, steady_since = begin, None, None
@@ -95,7 +95,11 @@ class Servo:
             if plan is not None:
                 self._online.advance(now - planned)
                 self._joints, self._speeds = plan.sample(now - planned)
-            plan, planned = self._trajectory(self._online.replan(self._aim(goal, tool()), seen.velocity)), now
+            try:
+                samples = self._online.replan(self._aim(goal, tool()), seen.velocity)
+            except ValueError as error:
+                raise PlanningError(CauseCode.PLANNING_FAILED, str(error)) from error
+            plan, planned = self._trajectory(samples), now
             yield plan
 
     def _goal(self, seen: TargetEstimate, now: float) -> FloatArray:

@@ -8,10 +8,10 @@ from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.frame import RgbdFrame
-from regrasp.interfaces.printer.cell import KnownPrinter
+from regrasp.interfaces.printer.cell import PrinterKnown
 from regrasp.interfaces.printer.target import TargetEstimate
 from regrasp.interfaces.wall_time import counts_as
-from regrasp.perception.printer.hand_view import HandView, HandViewParameters
+from regrasp.perception.printer.hand_view import HandView, HandViewParameters, Pads
 from regrasp.perception.printer.section_view import NoSection, SectionView, SectionViewParameters
 from regrasp.perception.service import Perception
 
@@ -47,21 +47,22 @@ class PartTracker:
     def __init__(
         self,
         perception: Perception,
-        printer: KnownPrinter,
+        known: PrinterKnown,
         tool_of: Callable[[RgbdFrame], RigidTransform],
         gap: Callable[[], float],
         since: float,
         parameters: PartTrackParameters = PartTrackParameters(),
     ) -> None:
-        self._perception, self._camera, self._tool_of, self._gap = perception, printer.camera, tool_of, gap
+        self._perception, self._camera, self._tool_of, self._gap = perception, known.printer.camera, tool_of, gap
         self._since, self._parameters = since, parameters
-        self._section = SectionView(printer.part, parameters.section)
+        self._section = SectionView(known.printer.part, parameters.section)
+        self._pads = Pads.of(known.arm(known.printer.hand).robot)
         self._hand: HandView | None = None
         self._stamp: float | None = None
         self._place: FloatArray = np.zeros((2, 3))  # of the front's middle: m, and m/s
         self._covariance: FloatArray = np.zeros((2, 2))
         self._yaw, self._yaw_variance = 0.0, 1.0
-        self._off = 0  # outliers in a row
+        self._outliers: list[tuple[float, FloatArray]] = []  # in a row: stamps, and places (3,) m
         self._number = -1
         self.why, self.trouble = "there is no picture yet", self._perception.trouble(self._camera)
 
@@ -78,18 +79,26 @@ class PartTracker:
 
     def _take(self, frame: RgbdFrame) -> None:
         world_from_tool = self._tool_of(frame)
-        if self._hand is None:
-            self._hand = HandView(world_from_tool.inv() * self._perception.pose_of(frame), self._parameters.hand)
-        self._hand.feed(frame, self._gap())
-        seen = self._section.find(frame, self._hand.camera_from_tool)
+        camera_from_tool, mount_deviation = self._mount(frame, world_from_tool)
+        seen = self._section.find(frame, camera_from_tool)
         if isinstance(seen, NoSection):
             self.why = seen.why
             return
         tool = world_from_tool.as_matrix()
         way = tool[:3, :3] @ [np.cos(seen.yaw), np.sin(seen.yaw), 0.0]
         yaw = float(np.arctan2(way[1], way[0]))
-        deviation = float(np.hypot(seen.deviation, self._hand.deviation.max()))
+        deviation = float(np.hypot(seen.deviation, mount_deviation))
         self._measure(frame.stamp, tool[:3, :3] @ seen.front + tool[:3, 3], deviation, yaw, seen.yaw_deviation)
+
+    def _mount(self, frame: RgbdFrame, world_from_tool: RigidTransform) -> tuple[FloatArray, float]:
+        """Where the camera sits, camera_from_tool (4, 4), and its standard deviation in m: as measured if it can be."""
+        as_known = world_from_tool.inv() * self._perception.pose_of(frame)
+        if self._pads is None:
+            return as_known.inv().as_matrix(), self._parameters.hand.mount_deviation
+        if self._hand is None:
+            self._hand = HandView(as_known, self._pads, self._parameters.hand)
+        self._hand.feed(frame, self._gap())
+        return self._hand.camera_from_tool, float(self._hand.deviation.max())
 
     def _measure(self, stamp: float, place: FloatArray, deviation: float, yaw: float, yaw_deviation: float) -> None:
         values = self._parameters
@@ -101,11 +110,11 @@ class PartTracker:
             covariance = step @ self._covariance @ step.T + spread
             off = place - predicted[0]
             limit = max(values.gate * float(np.sqrt(covariance[0, 0] + deviation**2)), values.gate_least)
-            if float(np.linalg.norm(off)) > limit and self._off < values.outliers:
-                self._off += 1
+            if float(np.linalg.norm(off)) > limit and len(self._outliers) < values.outliers:
+                self._outliers.append((stamp, place))
                 self.why = f"it seems to have jumped by {1e3 * float(np.linalg.norm(off)):.0f} mm"
                 return
-            if self._off < values.outliers:
+            if len(self._outliers) < values.outliers:
                 gain = covariance[:, 0] / (covariance[0, 0] + deviation**2)
                 self._place = predicted + gain[:, None] * off
                 self._covariance = covariance - np.outer(gain, covariance[0])
@@ -113,11 +122,15 @@ class PartTracker:
                 share = self._yaw_variance / (self._yaw_variance + yaw_deviation**2)
                 self._yaw += share * float(np.arctan2(np.sin(yaw - self._yaw), np.cos(yaw - self._yaw)))
                 self._yaw_variance *= 1.0 - share
-                self._stamp, self._off = stamp, 0
+                self._stamp, self._outliers = stamp, []
                 return
         self._place = np.array([place, np.zeros(3)])
         self._covariance = np.diag([deviation**2, values.start_speed**2])
-        self._yaw, self._yaw_variance, self._stamp, self._off = yaw, yaw_deviation**2, stamp, 0
+        if self._outliers:  # one that was knocked lies where the outliers were, one that goes fast went on from there
+            before, there = self._outliers[0]
+            self._place[1] = (place - there) / (stamp - before)
+            self._covariance[1, 1] += 2.0 * (deviation / (stamp - before)) ** 2
+        self._yaw, self._yaw_variance, self._stamp, self._outliers = yaw, yaw_deviation**2, stamp, []
 
     def _estimate(self) -> TargetEstimate | None:
         if self._stamp is None:

@@ -44,7 +44,7 @@ class PrinterPerception(Perception):
         parameters: PrinterPerceptionParameters = PrinterPerceptionParameters(),
     ) -> None:
         super().__init__(known, cameras, clock, pose_of, arm_spheres, parameters)
-        self._printer = known.printer
+        self._known_printer = known
         self.tables: ApproachTables | None = None  # None: the shipped ones, once they are asked for
         self._color = SegmentationParameters.for_color(known.printer.door.handle.color)
 
@@ -55,7 +55,7 @@ class PrinterPerception(Perception):
 
         `tool_of` gives world_from_tool at a frame's exposure, `gap` what the finger encoder reads (m).
         """
-        return PartTracker(self, self._printer, tool_of, gap, since, self.parameters.track)
+        return PartTracker(self, self._known_printer, tool_of, gap, since, self.parameters.track)
 
     def offset_by_tables(self, seen: Sighting) -> FloatArray:
         """Offset (3,) m in the world from the tool to its goal before the part, see `ApproachTables`."""

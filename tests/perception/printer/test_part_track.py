@@ -11,7 +11,7 @@ from regrasp.app.files.resources import shipped
 from regrasp.app.scenario.cell_file import load_cell
 from regrasp.app.tasks.printer.studies.hand_placed import HandPlaced
 from regrasp.interfaces.printer.cell import PrinterCell
-from regrasp.perception.printer.hand_view import HandView
+from regrasp.perception.printer.hand_view import HandView, Pads
 from regrasp.perception.printer.part_track import PartTracker
 from regrasp.perception.printer.section_view import NoSection, SectionSighting, SectionView
 
@@ -36,7 +36,7 @@ def before(hand: HandPlaced, x: float, y: float = 0.0, z: float = 0.0) -> RigidT
 def view_of(hand: HandPlaced) -> HandView:
     motion: Any = hand.services.motion
     frame = hand.picture()
-    view = HandView(motion.tool_at(frame).inv() * motion.camera_pose(frame))
+    view = HandView(motion.tool_at(frame).inv() * motion.camera_pose(frame), pads_of(hand))
     view.feed(frame, hand.arm.gripper.reading().gap)
     return view
 
@@ -74,15 +74,28 @@ def _without(view: HandView) -> Any:
     return mount
 
 
-def test_a_jaw_that_stands_otherwise_open_tells_nothing_of_the_mount(hand: HandPlaced) -> None:
-    hand.place(before(hand, 0.2))
-    view = view_of(hand)
-    motion: Any = hand.services.motion
-    frame = hand.picture()
-    other = HandView(motion.tool_at(frame).inv() * motion.camera_pose(frame))
-    other.feed(frame, 0.08)
-    assert np.linalg.norm(view.offset) > 1e-3
-    assert not other.offset.any()
+def pads_of(hand: HandPlaced) -> Pads:
+    pads = Pads.of(hand.world.cell.known.arm("arm").robot)
+    assert pads is not None
+    return pads
+
+
+@pytest.mark.parametrize("gap", [0.04, 0.06])
+def test_a_jaw_that_stands_otherwise_open_tells_the_same(gap: float) -> None:
+    offsets = []
+    for opening in (0.05, gap):
+        with HandPlaced(the_cell(), 3, gap=opening) as hand:
+            hand.place(before(hand, 0.2))
+            hand.world.advance(1.0)
+            offsets.append(view_of(hand).offset)
+    assert offsets[0] == pytest.approx(offsets[1], abs=1.2e-3)
+    assert np.linalg.norm(offsets[0]) > 3e-3
+
+
+def test_pads_of_unknown_size_are_not_looked_for() -> None:
+    robot = load_cell(shipped("cell")["habitat"]).known.arm("arm").robot
+    gripper = robot.gripper.model_copy(update={"length": None})
+    assert Pads.of(robot.model_copy(update={"gripper": gripper})) is None
 
 
 def test_a_part_that_is_turned_and_elsewhere() -> None:
@@ -150,3 +163,19 @@ def test_a_part_that_is_knocked_is_tracked_anew(hand: HandPlaced) -> None:
     assert first is not None
     assert last is not None
     assert (last.pose - first.pose)[:3, 3] == pytest.approx([0.0, 0.03, 0.0], abs=0.002)
+
+
+def test_a_part_that_goes_fast_is_known_to_go_fast(hand: HandPlaced) -> None:
+    hand.place(before(hand, 0.35))
+    tracker = tracker_of(hand)
+    for _ in range(10):
+        hand.world.advance(0.05)
+        tracker.update()
+    hand.world.objects.part.float_off(np.array([0.0, -0.3, 0.0]))
+    speeds = []
+    for _ in range(12):
+        hand.world.advance(0.05)
+        seen = tracker.update()
+        assert seen is not None
+        speeds.append(float(np.linalg.norm(seen.velocity)))
+    assert max(speeds) == pytest.approx(0.3, abs=0.08)

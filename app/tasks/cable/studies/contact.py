@@ -1,6 +1,5 @@
 """Contact study: an arm that moves freely, and a foam block that nobody told it of in its way."""
 
-import json
 import statistics
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,9 +13,8 @@ from pydantic import TypeAdapter
 from regrasp.app.campaigns.digest import digest_of
 from regrasp.app.campaigns.statistics import wilson_interval
 from regrasp.app.campaigns.table import print_table
-from regrasp.app.files.whole_file import write_whole
-from regrasp.app.records.result import plain, versions
 from regrasp.app.scenario.load import load_scenario
+from regrasp.app.studies.figures import write_figures
 from regrasp.app.studies.scene_tasks import SceneTask, run_tasks
 from regrasp.app.tasks.cable.placement import cable_at_start
 from regrasp.interfaces.arrays import FloatArray
@@ -227,9 +225,8 @@ def _halted(
 def _write(out: Path | None, trials: Sequence[ContactTrial], seeds: range) -> None:
     if out is None or not trials:
         return
-    figures = {"schema": 1, "seeds": list(seeds), "versions": versions(), **contact_figures(trials)}
     rows = TypeAdapter(list[ContactTrial]).dump_python(list(trials), mode="json")
-    write_whole(out / "contact.json", json.dumps(plain({**figures, "trials": rows}), indent=2, allow_nan=False) + "\n")
+    write_figures(out / "contact.json", seeds, contact_figures(trials) | {"trials": rows})
 
 
 def _lines(figures: dict[str, Any]) -> list[tuple[str, str]]:

@@ -6,7 +6,6 @@ part. The error is that of the true tool point from the true goal, at the approa
 
 import csv
 import io
-import json
 import statistics
 from collections.abc import Iterable, Sequence
 from functools import partial
@@ -21,8 +20,8 @@ from regrasp.app.campaigns.statistics import wilson_interval
 from regrasp.app.campaigns.table import print_table
 from regrasp.app.files.resources import shipped
 from regrasp.app.files.whole_file import write_whole
-from regrasp.app.records.result import plain, versions
 from regrasp.app.scenario.cell_file import load_cell
+from regrasp.app.studies.figures import write_figures
 from regrasp.app.studies.scene_tasks import SceneTask, run_tasks
 from regrasp.app.tasks.printer.studies.approach_plots import write_plots
 from regrasp.app.tasks.printer.studies.approach_trial import ApproachParameters, Block, Trial, run_trial
@@ -75,9 +74,7 @@ def run_approach(
     }
     trials, code = run_tasks(tasks, jobs, out, KIND, _TRIALS)
     if out is not None and trials:
-        out.mkdir(parents=True, exist_ok=True)
-        whole = {"schema": 1, "seeds": list(seeds), "versions": versions(), **approach_figures(trials)}
-        write_whole(out / "approach.json", json.dumps(plain(whole), indent=2, allow_nan=False) + "\n")
+        write_figures(out / "approach.json", seeds, approach_figures(trials))
         write_whole(out / "approach.csv", _table(trials))
         write_plots(trials, out)
     _print(trials)

@@ -11,13 +11,11 @@ from scipy.spatial.transform import RigidTransform
 from regrasp.app.tasks.printer.services import printer_services
 from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.frame import RgbdFrame
-from regrasp.interfaces.printer.cell import PrinterCell
+from regrasp.interfaces.printer.cell import PART_AND_BED, PrinterCell
 from regrasp.interfaces.request import RequestError
 from regrasp.interfaces.scene import Gravity
 from regrasp.sim.printer.objects import PrinterObjects
 from regrasp.sim.world import World
-
-_NEAR = ("part", "section", "plate", "plate_bed")
 
 
 class HandPlaced:
@@ -61,7 +59,7 @@ class HandPlaced:
         q[0] = self.rail
         ends = [end for end in kin.ik(tool, q) if abs(end[0] - self.rail) < 1e-9]
         ways = [tool.inv() * pose for pose in onward]
-        free = [end for end in ends if motion.leads_on(self.name, end, ways, _NEAR)]
+        free = [end for end in ends if motion.leads_on(self.name, end, ways, PART_AND_BED)]
         if not free:
             raise RequestError(
                 CauseCode.OUT_OF_REACH, f"no joints bring the tool to {tool.translation.round(3).tolist()}"

@@ -5,7 +5,6 @@ its whole job, from the door's handle to the tray, by the motion service that th
 end at once, so nothing but the planning is tried. Times are those of the thread's processor.
 """
 
-import json
 import statistics
 import time
 from collections.abc import Iterator, Sequence
@@ -22,16 +21,15 @@ from regrasp.app.campaigns.digest import digest_of
 from regrasp.app.campaigns.statistics import wilson_interval
 from regrasp.app.campaigns.table import print_table
 from regrasp.app.files.resources import shipped
-from regrasp.app.files.whole_file import write_whole
-from regrasp.app.records.result import plain, versions
 from regrasp.app.scenario.cell_file import load_cell
+from regrasp.app.studies.figures import write_figures
 from regrasp.app.studies.scene_tasks import SceneTask, run_tasks
 from regrasp.app.studies.standing import InstantArm, RunningClock, StandingGripper
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.devices import TICK
 from regrasp.interfaces.printer.actions import Action, JointGoal, PoseGoal, PoseRelGoal, RailGoal
-from regrasp.interfaces.printer.cell import PrinterCell
+from regrasp.interfaces.printer.cell import PART_AND_BED, PrinterCell
 from regrasp.interfaces.request import Request, RequestError
 from regrasp.motion.planning.planner import plan
 from regrasp.motion.printer.devices import ArmManipulator, ArmRail, OneAtATime
@@ -117,10 +115,8 @@ def run_reach(seeds: range, jobs: int, out: Path | None, parameters: ReachParame
     }
     rows, code = run_tasks(tasks, jobs, out, KIND, _ROWS)
     if out is not None and rows:
-        out.mkdir(parents=True, exist_ok=True)
-        whole = {"schema": 1, "seeds": list(seeds), "versions": versions(), **reach_figures(rows)}
-        whole["rows"] = _ROWS.dump_python(rows, mode="json")
-        write_whole(out / "reach.json", json.dumps(plain(whole), indent=2, allow_nan=False) + "\n")
+        figures = reach_figures(rows) | {"rows": _ROWS.dump_python(rows, mode="json")}
+        write_figures(out / "reach.json", seeds, figures)
     _print(rows)
     return code
 
@@ -199,7 +195,7 @@ class _Job:
         along = RigidTransform.from_translation
         deeper = self._parameters.deeper
         onward = along([deeper, 0.0, 0.0]), along([deeper - self._parameters.out, 0.0, 0.0])
-        yield "goal", iter([self._go(goal, *onward, may_touch=("section", "part", "plate", "plate_bed"))])
+        yield "goal", iter([self._go(goal, *onward, may_touch=PART_AND_BED)])
         yield "section", iter([self._by(-self._parameters.deeper, 0.0, 0.0, "section", "part")])
         yield "out of the printer", self._draw_out()
         yield "clamp", self._to_clamp()

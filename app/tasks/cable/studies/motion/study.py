@@ -5,7 +5,6 @@ has no say in it. Those that a straight motion solves are left out. What is infe
 (`infeasible.py`). Times are those of the thread's processor: what other programs do on the machine does not count.
 """
 
-import json
 import statistics
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
@@ -21,8 +20,7 @@ from pydantic import TypeAdapter
 from regrasp.app.campaigns.digest import digest_of
 from regrasp.app.campaigns.statistics import wilson_interval
 from regrasp.app.campaigns.table import print_table
-from regrasp.app.files.whole_file import write_whole
-from regrasp.app.records.result import plain, versions
+from regrasp.app.studies.figures import write_figures
 from regrasp.app.studies.scene_tasks import SceneTask, run_tasks
 from regrasp.app.tasks.cable.cells import cable_cell
 from regrasp.app.tasks.cable.studies.motion.infeasible import INFEASIBLE
@@ -61,10 +59,8 @@ def run_motion(seeds: range, jobs: int, out: Path | None, parameters: TrialParam
     rows, code = run_tasks(tasks, jobs, out, KIND, _ROWS)
     figures = motion_figures(rows, parameters)
     if out is not None and rows:  # else nothing was done: no file that would refuse another try
-        out.mkdir(parents=True, exist_ok=True)
-        whole = {"schema": 1, "seeds": list(seeds), "versions": versions() | _extras(), **figures}
-        whole["rows"] = _ROWS.dump_python(rows, mode="json")
-        write_whole(out / "motion.json", json.dumps(plain(whole), indent=2, allow_nan=False) + "\n")
+        found = figures | {"rows": _ROWS.dump_python(rows, mode="json")}
+        write_figures(out / "motion.json", seeds, found, **_extras())
     _print(rows, figures)
     return code
 

@@ -1,4 +1,4 @@
-"""The habitat's first job, end to end. Its faults are rows of `test_fault_table.py`."""
+"""The habitat's jobs, end to end. Their faults are rows of `test_fault_table.py`."""
 
 import json
 from pathlib import Path

@@ -1,0 +1,97 @@
+"""The servo in the habitat's world: why it ends where it cannot come to its target."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import RigidTransform
+
+from regrasp.app.files.resources import shipped
+from regrasp.app.scenario.cell_file import load_cell
+from regrasp.app.tasks.printer.studies.hand_placed import HandPlaced
+from regrasp.behaviors.printer.approach import approach_steps
+from regrasp.interfaces.cause import CauseCode
+from regrasp.interfaces.printer.cause import PrinterCause
+from regrasp.interfaces.printer.cell import PrinterCell
+from regrasp.interfaces.request import RequestError
+from regrasp.motion.printer.servoing import ServoParameters
+
+
+def cell() -> PrinterCell:
+    found = load_cell(shipped("cell")["habitat_open"])
+    assert isinstance(found, PrinterCell)
+    return found
+
+
+def placed() -> HandPlaced:
+    hand = HandPlaced(cell(), 2)
+    hand.place(RigidTransform.from_translation([0.3, 0.0, 0.0]) * hand.goal)
+    hand.world.advance(0.5)
+    return hand
+
+
+def served(hand: HandPlaced) -> None:
+    [request] = approach_steps(hand.services, "servo", 0.02)
+    end = hand.world.now() + 30.0
+    while not request.poll():
+        assert hand.world.now() < end, "the servo does not end"
+        hand.world.advance(0.05)
+
+
+def test_a_part_that_flies_away_is_too_fast() -> None:
+    with placed() as hand:
+        hand.world.objects.part.float_off(np.array([0.0, -0.2, 0.0]))
+        with pytest.raises(RequestError, match="the hand follows 0.1 m/s") as error:
+            served(hand)
+        assert error.value.code == PrinterCause.TARGET_TOO_FAST
+        hand.world.advance(0.5)
+        assert not hand.arm.is_moving()
+
+
+def test_a_part_that_is_taken_away_on_the_way_is_not_seen() -> None:
+    with placed() as hand:
+        [request] = approach_steps(hand.services, "servo", 0.02)
+        for _ in range(20):
+            request.poll()
+            hand.world.advance(0.05)
+        hand.world.objects.part.take_away()
+        with pytest.raises(RequestError, match="0 pixels have its colour") as error:
+            while not request.poll():
+                hand.world.advance(0.05)
+        assert error.value.code == PrinterCause.TARGET_NOT_SEEN
+
+
+def test_a_way_that_is_closed_is_not_gone() -> None:
+    """The door stands before the part as the arm believes, though the camera sees the part."""
+    with placed() as hand:
+        motion: Any = hand.services.motion
+        motion.believe_door(0.0)
+        with pytest.raises(RequestError, match="door") as error:
+            served(hand)
+        assert error.value.code == CauseCode.MOTION_BLOCKED
+        assert not hand.world.contact_peaks
+
+
+def test_a_hand_that_does_not_come_to_rest_gives_up() -> None:
+    with placed() as hand:
+        motion: Any = hand.services.motion
+        parameters = ServoParameters(tolerance=1e-6, timeout=5.0)
+        motion.parameters = motion.parameters.__class__(servo=parameters)
+        with pytest.raises(RequestError, match="mm are left") as error:
+            served(hand)
+        assert error.value.code == CauseCode.TIMED_OUT
+
+
+def test_a_servo_that_is_cancelled_stops_the_arm() -> None:
+    with placed() as hand:
+        [request] = approach_steps(hand.services, "servo", 0.02)
+        for _ in range(20):
+            request.poll()
+            hand.world.advance(0.05)
+        assert hand.arm.is_moving()
+        request.cancel()
+        hand.world.advance(0.3)
+        assert not hand.arm.is_moving()
+        at = hand.tool().translation
+        hand.world.advance(0.5)
+        assert hand.tool().translation == pytest.approx(at, abs=1e-3)
