@@ -6,7 +6,7 @@ cancelled at any time; a new goal preempts the one under way. A goal that cannot
 
 from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Generic, Literal, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, Literal, Protocol, TypeVar, get_args
 
 from regrasp.interfaces.arguments import finite, finite_pose, not_negative, positive, vector
 from regrasp.interfaces.arrays import FloatArray
@@ -22,7 +22,10 @@ Result = TypeVar("Result")
 Goal = TypeVar("Goal", contravariant=True)
 
 Approach = Literal["one_step", "two_step", "three_step", "servo"]  # ways to the part; the first three the source's
-Target = Literal["obj", "targ"]  # the source's classes: the red part, and its blue gripping section
+Target = Literal["obj", "targ"]  # what to look for: the red part, and its blue gripping section
+# The source's classes: also the left and the right finger, as the picture shows them.
+PartClass = Literal["obj", "targ", "lgrip", "rgrip"]
+CLASSES: tuple[PartClass, ...] = get_args(PartClass)
 
 
 class Action(Request[Result], Generic[Feedback, Result]):

@@ -32,7 +32,15 @@ from regrasp.interfaces.frame import RgbdFrame
 from regrasp.interfaces.tag import TAG_DICTIONARY
 from regrasp.perception.camera.color import SegmentationParameters, color_mask
 from regrasp.perception.camera.registration import FIXED_CAMERA_ERRORS, register
-from regrasp.perception.pose.detector import Detector, letterboxed, network_input, pixel_sizes, shipped_network
+from regrasp.perception.detection import letterboxed
+from regrasp.perception.pose.detector import (
+    NETWORK_HEIGHT,
+    NETWORK_WIDTH,
+    Detector,
+    network_input,
+    pixel_sizes,
+    shipped_network,
+)
 from regrasp.perception.pose.estimate import NoEstimate
 from regrasp.perception.pose.fused.fused import Fused
 from regrasp.perception.pose.rgbd import Rgbd
@@ -241,7 +249,9 @@ def detector_stages(cell: CableCell, width: int) -> dict[str, tuple[Call, Call]]
     network = cv2.dnn.readNetFromONNX(np.frombuffer(shipped_network(), np.uint8))
 
     def make_input() -> Any:
-        return network_input(letterboxed(frame.rgb)[0], pixel_sizes(frame.depth, frame.intrinsics))[None]
+        return network_input(
+            letterboxed(frame.rgb, (NETWORK_HEIGHT, NETWORK_WIDTH))[0], pixel_sizes(frame.depth, frame.intrinsics)
+        )[None]
 
     inputs = make_input()
 

@@ -9,19 +9,21 @@ import typer
 
 from regrasp.app.cli.options import parse_seeds
 from regrasp.app.files.findings import Finding, Findings
-from regrasp.app.files.resources import resolve
 from regrasp.app.interrupts import late_imports
 from regrasp.app.records import folders
+from regrasp.app.tasks.printer.detector_commands import evaluate_part_detector, train_part_detector
 from regrasp.interfaces.quote import nearest, quoted
 
 Block = Literal["A", "A0", "B", "C"]
 
 
 def add_commands(app: typer.Typer, study: typer.Typer) -> None:
-    """Add the studies to `regrasp study`, and `regrasp calibrate-approach`."""
+    """Add the studies to `regrasp study`, and the commands about the approach and the detector."""
     study.command(reach.__name__)(reach)
     study.command(approach.__name__)(approach)
     app.command("calibrate-approach")(calibrate_approach)
+    for command in (train_part_detector, evaluate_part_detector):
+        app.command()(command)
 
 
 def reach(
@@ -113,15 +115,11 @@ def calibrate_approach(
     """
     if wrong := folders.file_findings(out, new=True):
         raise Findings(wrong)
-    path = resolve("cell", cell, Path())
     with late_imports():
-        from regrasp.app.scenario.cell_file import load_cell
+        from regrasp.app.tasks.printer.cells import printer_cell
         from regrasp.app.tasks.printer.studies.approach_calibration import calibrated, write_tables
-        from regrasp.interfaces.printer.cell import PrinterCell
         from regrasp.interfaces.request import RequestError
-    read = load_cell(path)
-    if not isinstance(read, PrinterCell):
-        raise Findings([Finding("--cell", 0, f"{quoted(cell)} has no printer; name a cell that has one")])
+    read = printer_cell(cell)
     try:
         tables = calibrated(read)
     except (ValueError, RequestError) as error:

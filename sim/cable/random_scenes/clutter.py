@@ -1,6 +1,5 @@
-"""Parts of random scenes: colours, layouts of the cell, cables with connectors, look-alikes and clutter."""
+"""Parts of random scenes: layouts of the cell, cables with connectors, look-alikes and clutter."""
 
-import colorsys
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,28 +11,9 @@ from regrasp.interfaces.cable.cell import CableKnown, Connector, Socket
 from regrasp.interfaces.cell import Box
 from regrasp.interfaces.fields import Color
 from regrasp.sim.bodies import OUT_OF_SIGHT
+from regrasp.sim.random_scenes import contrasting_color, random_color, set_pose, similar_color, visual_body
 
 _HIDDEN_POSITION = OUT_OF_SIGHT.translation.tolist()
-_ALONG_X = (0.0, np.sqrt(0.5), 0.0, np.sqrt(0.5))  # PyBullet's cylinders and capsules lie along z
-
-
-def random_color(rng: np.random.Generator, value: tuple[float, float] = (0.1, 0.95)) -> Color:
-    """RGB of a random hue, often greyish, with a brightness (HSV value) in the range `value`."""
-    saturation = float(rng.beta(1.0, 1.5))
-    return colorsys.hsv_to_rgb(float(rng.random()), saturation, float(rng.uniform(*value)))
-
-
-def similar_color(color: Color, rng: np.random.Generator) -> Color:
-    """RGB near `color`: hue within 10 degrees, saturation down to three quarters, brightness within a quarter."""
-    hue, saturation, value = colorsys.rgb_to_hsv(*color)
-    saturation, value = saturation * float(rng.uniform(0.75, 1.0)), min(1.0, value * float(rng.uniform(0.75, 1.25)))
-    return colorsys.hsv_to_rgb((hue + float(rng.uniform(-10, 10)) / 360) % 1.0, saturation, value)
-
-
-def contrasting_color(color: Color, rng: np.random.Generator) -> Color:
-    """RGB with a hue at least 60 degrees away from that of `color`."""
-    hue = colorsys.rgb_to_hsv(*color)[0] + float(rng.uniform(60, 300)) / 360
-    return colorsys.hsv_to_rgb(hue % 1.0, float(rng.uniform(0.5, 1.0)), float(rng.uniform(0.3, 0.9)))
 
 
 def repainted(known: CableKnown, rng: np.random.Generator, own_share: float = 0.5) -> CableKnown:
@@ -65,19 +45,6 @@ def rearranged(known: CableKnown, rng: np.random.Generator) -> CableKnown:
 
     boxes, sockets = tuple(map(moved, known.boxes)), tuple(map(placed, known.cable.sockets))
     return known.model_copy(update={"boxes": boxes}).with_cable(sockets=sockets)
-
-
-def visual_body(client: int, kind: int, color: Color, **size: object) -> int:
-    """Id of a new body without a collision shape, out of sight; cylinders and capsules lie along its x axis."""
-    turned = {} if kind in (p.GEOM_BOX, p.GEOM_SPHERE) else {"visualFrameOrientation": _ALONG_X}
-    visual = p.createVisualShape(kind, rgbaColor=[*color, 1], **size, **turned, physicsClientId=client)
-    return int(p.createMultiBody(0, -1, visual, _HIDDEN_POSITION, physicsClientId=client))
-
-
-def set_pose(client: int, body: int, pose: RigidTransform) -> None:
-    """Set a body's pose to `pose`, world_from_body."""
-    turn = pose.rotation.as_quat().tolist()
-    p.resetBasePositionAndOrientation(body, pose.translation.tolist(), turn, physicsClientId=client)
 
 
 def _rotations_of_x(directions: FloatArray) -> FloatArray:

@@ -1,8 +1,7 @@
 """Random pictures of the connector with its true mask, to train and test a detector. No physics runs."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
-import cv2
 import numpy as np
 import pybullet as p
 from numpy.typing import NDArray
@@ -13,32 +12,20 @@ from regrasp.interfaces.cable.cell import CableCell
 from regrasp.interfaces.cell import OPTICAL, CameraSpec, WristMount
 from regrasp.sim.bodies import OUT_OF_SIGHT, build_box
 from regrasp.sim.cable.fixtures import build_fixtures
-from regrasp.sim.cable.random_scenes.clutter import (
+from regrasp.sim.cable.random_scenes.clutter import make_cable, make_clutter, rearranged, repainted
+from regrasp.sim.random_scenes import (
+    LightRange,
+    Triple,
     contrasting_color,
-    make_cable,
-    make_clutter,
+    painted,
     random_color,
-    rearranged,
-    repainted,
     set_pose,
     similar_color,
     visual_body,
 )
-from regrasp.sim.render.picture import BACKGROUND, Image, LightState
 from regrasp.sim.render.renderer import RendererName, make_renderer
 from regrasp.sim.render.visuals import Visuals
 from regrasp.sim.robot.arm import SimArm
-
-Triple = tuple[float, float, float]
-
-
-@dataclass(frozen=True)
-class LightRange:
-    """Range of random light: mean direction to it, and ranges of its strengths."""
-
-    direction: Triple
-    ambient: tuple[float, float]
-    diffuse: tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -56,8 +43,8 @@ class RandomSceneParameters:
     sleeping_share: float = 0.3  # of the arms are at their sleep position
     # rad, standard deviations of the other arms' joints about the arm stretched forward
     arm_deviation: tuple[float, ...] = (0.6, 0.5, 0.5, 0.8, 0.6, 1.5)
-    light: LightRange = LightRange((-0.5, 0.3, 1.0), (0.2, 0.7), (0.15, 0.7))
-    held_out_light: LightRange = LightRange((-0.2, -1.2, 0.6), (0.3, 0.8), (0.05, 0.5))
+    light: LightRange = field(default_factory=lambda: LightRange((-0.5, 0.3, 1.0), (0.2, 0.7), (0.15, 0.7)))
+    held_out_light: LightRange = field(default_factory=lambda: LightRange((-0.2, -1.2, 0.6), (0.3, 0.8), (0.05, 0.5)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,7 +122,7 @@ class RandomScene:
         k = spec.intrinsics
         self._lay_cables(pose, present)
         self._scatter(pose, camera, present)
-        poses, light = self._visuals.snapshot(), self._draw_light()
+        poses, light = self._visuals.snapshot(), self._light.draw(self._rng)
         image = self._renderer.render(poses, camera, k, light)
         mask, occlusion = image.ids == self._cable.end, float("nan")
         if measured and mask.any():
@@ -143,7 +130,7 @@ class RandomScene:
             alone[self._visuals.ids != self._cable.end, :, 3] = OUT_OF_SIGHT.translation
             whole = self._renderer.render(alone, camera, k, light).ids == self._cable.end
             occlusion = 1.0 - np.count_nonzero(mask) / np.count_nonzero(whole)
-        return Shot(self._recolor(image), image.depth, mask, occlusion, spec, camera, pose)
+        return Shot(painted(image, self._walls, self._rng), image.depth, mask, occlusion, spec, camera, pose)
 
     def _make_arm(self, name: str) -> SimArm:
         return SimArm(self._client, self._cell, name, self._rng)
@@ -248,27 +235,3 @@ class RandomScene:
         reach = float(np.abs(turn.inv().apply(side)) @ half)
         depth = float(np.abs(turn.inv().apply(ray)) @ half)
         return RigidTransform.from_components(edge + reach * side - (depth + rng.uniform(0.012, 0.1)) * ray, turn)
-
-    def _draw_light(self) -> LightState:
-        rng, light = self._rng, self._light
-        direction = np.asarray(light.direction) + rng.normal(size=3) * [1.0, 1.0, 0.5]
-        return LightState(direction, float(rng.uniform(*light.ambient)), float(rng.uniform(*light.diffuse)))
-
-    def _recolor(self, image: Image) -> NDArray[np.uint8]:
-        """The picture (H, W, 3) in light of a random colour, with textures on some walls and on the background."""
-        rng = self._rng
-        rgb = cv2.multiply(image.rgb, (*rng.uniform(0.85, 1.0, 3), 1.0))
-        for body in (-1, *self._walls):
-            if rng.random() < 0.4:
-                there = image.ids == body
-                paint = np.array(random_color(rng)) / np.array(BACKGROUND) if body == -1 else np.ones(3)
-                shade = _texture(image.ids.shape, rng)[there, None] * paint
-                rgb[there] = np.clip(rgb[there] * shade, 0, 255)
-        return np.asarray(rgb, np.uint8)
-
-
-def _texture(shape: tuple[int, int], rng: np.random.Generator) -> NDArray[np.float32]:
-    """Smooth random brightness (H, W) about 1: blots of a random size and aspect, up to stripes."""
-    size = rng.integers([3, 3], [40, 60])
-    blots = rng.uniform(-1, 1, size).astype(np.float32) * np.float32(rng.uniform(0.05, 0.4))
-    return 1.0 + cv2.resize(blots, shape[::-1], interpolation=cv2.INTER_CUBIC)

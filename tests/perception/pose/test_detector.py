@@ -13,13 +13,14 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.frame import Intrinsics, RgbdFrame
 from regrasp.perception.camera.model import project
+from regrasp.perception.detection import intersection_over_union, letterboxed
 from regrasp.perception.pose.detector import (
     MIN_PIXEL_SIZE,
+    NETWORK_HEIGHT,
+    NETWORK_WIDTH,
     Detector,
     DetectorParameters,
     decode,
-    intersection_over_union,
-    letterboxed,
     network_input,
     pixel_sizes,
 )
@@ -190,7 +191,7 @@ def test_a_box_elsewhere_counts_though_its_cell_is_next_to_a_likelier_one() -> N
 def test_a_picture_is_shrunk_without_a_change_of_shape() -> None:
     rgb = np.zeros((480, 640, 3), np.uint8)
     cv2.circle(rgb, (320, 240), 100, (255, 255, 255), -1)
-    small, scale = letterboxed(rgb)
+    small, scale = letterboxed(rgb, (NETWORK_HEIGHT, NETWORK_WIDTH))
     assert small.shape == (240, 432, 3)
     assert scale == 0.5
     _, _, width, height = cv2.boundingRect((small[..., 0] > 127).astype(np.uint8))
@@ -203,7 +204,7 @@ def test_a_pixel_of_the_input_shows_as_much_as_geometry_says(z: float, size: tup
     k = Intrinsics.from_fov(*size, np.deg2rad(fov))
     sizes = pixel_sizes(np.full(size[::-1], z, np.float32), k)
     assert sizes.shape == (120, 216)
-    _, scale = letterboxed(np.zeros(size[::-1], np.uint8))
+    _, scale = letterboxed(np.zeros(size[::-1], np.uint8), (NETWORK_HEIGHT, NETWORK_WIDTH))
     assert sizes.max() * scale / 2 * size[0] == pytest.approx(2 * z * np.tan(np.deg2rad(fov) / 2), rel=1e-5)
     given_to_network = network_input(np.zeros((240, 432, 3), np.uint8), sizes)[12]
     assert given_to_network.max() == pytest.approx(max(0, np.log(sizes.max() / MIN_PIXEL_SIZE) / 2), abs=1e-5)

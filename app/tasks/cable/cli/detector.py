@@ -1,23 +1,20 @@
 """`regrasp train-detector` and `evaluate-detector`, for the network of the technique `detector`."""
 
 import json
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from regrasp.app.cli.training import HELD_OUT_SEED, TRAINING_SEED, counted, evaluation_findings, training_findings
 from regrasp.app.files.findings import Finding, Findings, shown
 from regrasp.app.files.resources import resolve
 from regrasp.app.files.whole_file import write_whole
-from regrasp.app.records import folders
 from regrasp.interfaces.seed import MAX_SEED
 
 if TYPE_CHECKING:
     from regrasp.interfaces.cable.cell import CableCell
 
-TRAINING_SEED, HELD_OUT_SEED = 0, 1_000_000  # choice: far apart, so that nobody trains on held-out pictures
 _Cell = Annotated[str, typer.Option("--cell", help="A shipped cell's name, or a path to a .yaml file.")]
 _Seed = Annotated[int, typer.Option(min=0, max=MAX_SEED, help="Draws the pictures and all else.")]
 
@@ -51,37 +48,24 @@ def train_detector(
       regrasp train-detector --out results/more \\
         --start perception/pose/detector.onnx
     """
-    wrong = folders.folder_findings(out)
-    if (out / "detector.onnx").exists():
-        wrong.append(Finding(shown(out), 0, "already holds detector.onnx; name another folder"))
-    try:
-        import onnx  # noqa: F401 - torch exports through it
-        import torch  # noqa: F401
-    except ImportError as error:
-        wrong.append(
-            Finding(
-                "train-detector", 0, f"{error.name} is not installed; pip install -e '.[train]' in the project's folder"
-            )
-        )
-    if start is not None and not start.is_file():
-        wrong.append(Finding(shown(start), 0, "is no file; name an ONNX file that `regrasp train-detector` made"))
-    if wrong:
+    if wrong := training_findings("train-detector", out, "detector.onnx", start):
         raise Findings(wrong)
     loaded = _load(cell)
+    from regrasp.app.studies.detector.network import read_weights
     from regrasp.app.tasks.cable.studies.detector.data import make_pictures
-    from regrasp.app.tasks.cable.studies.detector.train import read_weights, train
+    from regrasp.app.tasks.cable.studies.detector.train import NETWORK, train
 
-    weights = None
-    if start is not None:
-        try:
-            weights = read_weights(start.read_bytes())
-        except ValueError as error:
-            raise Findings([Finding(shown(start), 0, f"{error}; name one that `train-detector` made")]) from None
+    model = None if start is None else start.read_bytes()
+    try:
+        if model is not None:
+            read_weights(model, NETWORK)
+    except ValueError as error:
+        raise Findings([Finding(shown(start or Path()), 0, f"{error}; name one that `train-detector` made")]) from None
     out.mkdir(parents=True, exist_ok=True)
-    with _progress("drawing pictures", pictures) as tell:
+    with counted("drawing pictures", pictures) as tell:
         drawn = make_pictures(loaded, seed, pictures, tell)
-    with _progress("training", steps) as tell:
-        train(drawn, seed, steps, lambda model, _score: write_whole(out / "detector.onnx", model), tell, weights)
+    with counted("training", steps) as tell:
+        train(drawn, seed, steps, lambda best, _score: write_whole(out / "detector.onnx", best), tell, model)
     evaluate_detector(out / "detector.onnx", cell, held_out, out=out / "evaluation.json")
 
 
@@ -102,18 +86,13 @@ def evaluate_detector(
     Example:
       regrasp evaluate-detector my/detector.onnx --out evaluation.json
     """
-    wrong = folders.file_findings(out, new=True) if out else []
-    if out is not None and out.suffix.lower() == ".onnx":
-        wrong.append(Finding(shown(out), 0, "is a network's name, and the figures are JSON; end it in .json"))
-    if model is not None and not model.is_file():
-        wrong.append(Finding(shown(model), 0, "is no file; name an ONNX file that `regrasp train-detector` made"))
-    if wrong:
+    if wrong := evaluation_findings("train-detector", model, out):
         raise Findings(wrong)
     loaded = _load(cell)
     from regrasp.app.tasks.cable.studies.detector.score import detector_figures, held_out_shots, score_picture
 
     detector = _detector(loaded, model)
-    with _progress("drawing held-out pictures", 5 * held_out) as tell:
+    with counted("drawing held-out pictures", 5 * held_out) as tell:
         shots = held_out_shots(loaded, seed, held_out, report_progress=tell)
     figures = detector_figures([score_picture(detector, shot, loaded, number) for number, shot in enumerate(shots)])
     if out is not None:
@@ -164,23 +143,3 @@ def _print(figures: dict[str, Any]) -> None:
     typer.echo(f"a false box in {false} of {empty} pictures without the connector")
     if angle is not None and place is not None:
         typer.echo(f"median error: axis in the image {angle:.1f} degrees, position {1000 * place:.1f} mm")
-
-
-@contextmanager
-def _progress(what: str, total: int) -> Iterator[Callable[..., None]]:
-    """A callback (done, words) that shows progress on stderr: a bar on a terminal, else a line for every tenth."""
-    from rich.console import Console
-    from rich.progress import Progress
-
-    console = Console(stderr=True, highlight=False, markup=False, soft_wrap=True)
-    if console.is_terminal:
-        with Progress(console=console, transient=True) as progress:
-            task = progress.add_task(what, total=total)
-            yield lambda done, words="": progress.update(task, completed=done, description=f"{what} {words}")
-        return
-
-    def line(done: int, words: str = "") -> None:
-        if done * 10 // total > (done - 1) * 10 // total:
-            console.print(f"{what}: {done} of {total} {words}".rstrip())
-
-    yield line

@@ -4,14 +4,16 @@ The augmentation is that of Hwang 2024, section 3.2.2: flips, turns by 90 and up
 hue +-25 degrees, saturation, brightness and exposure 25 %, blur, noise 5 %, three cutouts of 10 %, mosaic.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from regrasp.app.studies.detector.recoloring import RecoloringParameters, recolored
+from regrasp.app.studies.detector.wanted import wanted_maps
 from regrasp.app.tasks.cable.studies.detector.data import Pictures
-from regrasp.perception.pose.detector import NETWORK_HEIGHT, NETWORK_WIDTH, STRIDE
+from regrasp.perception.pose.detector import NETWORK_HEIGHT, NETWORK_WIDTH
 
 
 @dataclass(frozen=True)
@@ -34,16 +36,7 @@ class AugmentationParameters:
     cutouts: int = 3  # rectangles; Hwang's
     cutout_fraction: int = 10  # a rectangle's edges are this fraction, one tenth, of a whole picture's; Hwang's
     cutout_depth: tuple[float, float] = (0.6, 1.0)  # a cutout's depth over that of what it covers; choice
-    color_share: float = 0.5  # crops with another hue and saturation; choice
-    max_hue: float = 25.0  # degrees; Hwang's
-    max_saturation: float = 0.25  # relative change; Hwang's
-    exposure_share: float = 0.5  # crops with another gamma and gain; choice
-    max_log_gamma: float = 0.4  # natural logarithm of the exponent; choice: changes middle grey by about 25 %
-    max_gain: float = 0.25  # relative change; Hwang's
-    blur_share: float = 0.3  # choice
-    blur: tuple[float, float] = (0.3, 1.25)  # px, standard deviation; Hwang's 2.5 px of the camera's own picture
-    noise_share: float = 0.3  # choice
-    max_noise: float = 0.05  # standard deviation over the full range; Hwang's
+    recoloring: RecoloringParameters = field(default_factory=RecoloringParameters)
 
 
 @dataclass(frozen=True)
@@ -68,7 +61,7 @@ def draw_crop(
     size, half = parameters.crop_size, parameters.crop_size // 2
     if rng.random() >= parameters.mosaic_share:
         image, sizes, targets = _cut_crop(pictures, rng, size, parameters)
-        return _recolored(image, rng, parameters), sizes, targets
+        return recolored(image, rng, parameters.recoloring), sizes, targets
     out, out_sizes = np.zeros((size, size, 3), np.uint8), np.zeros((half, half), np.float32)
     all_targets = []
     for u, v in ((0, 0), (half, 0), (0, half), (half, half)):
@@ -77,7 +70,7 @@ def draw_crop(
         for t in targets:
             box = (t.box[0] + u, t.box[1] + v, t.box[2] + u, t.box[3] + v)
             all_targets.append(Target(box, t.axis, t.counts))
-    return _recolored(out, rng, parameters), out_sizes, all_targets
+    return recolored(out, rng, parameters.recoloring), out_sizes, all_targets
 
 
 def _cut_crop(
@@ -165,56 +158,15 @@ def _cut_out(
         sizes[v // 2 : (v + height) // 2, u // 2 : (u + width) // 2] = depth_ratio * sizes[v // 2, u // 2]
 
 
-def _recolored(
-    image: NDArray[np.uint8], rng: np.random.Generator, parameters: AugmentationParameters
-) -> NDArray[np.uint8]:
-    """Another hue, saturation, brightness and exposure; blur; noise."""
-    if rng.random() < parameters.color_share:
-        hsv = cv2.cvtColor(image, cv2.COLOR_RGB2HSV).astype(np.float32)
-        hsv[..., 0] = (hsv[..., 0] + rng.uniform(-parameters.max_hue, parameters.max_hue) / 2) % 180
-        hsv[..., 1] *= rng.uniform(1 - parameters.max_saturation, 1 + parameters.max_saturation)
-        image = cv2.cvtColor(np.clip(hsv, 0, 255).astype(np.uint8), cv2.COLOR_HSV2RGB)
-    if rng.random() < parameters.exposure_share:
-        gamma = np.exp(rng.uniform(-parameters.max_log_gamma, parameters.max_log_gamma))
-        gain = rng.uniform(1 - parameters.max_gain, 1 + parameters.max_gain)
-        table = np.clip(255 * gain * (np.arange(256) / 255) ** gamma, 0, 255).astype(np.uint8)
-        image = np.asarray(cv2.LUT(image, table), np.uint8)
-    if rng.random() < parameters.blur_share:
-        image = np.asarray(cv2.GaussianBlur(image, (0, 0), rng.uniform(*parameters.blur)), np.uint8)
-    if rng.random() < parameters.noise_share:
-        deviation = rng.uniform(0, parameters.max_noise) * 255
-        noisy = image + rng.normal(0, deviation, image.shape).astype(np.float32)
-        image = np.clip(noisy, 0, 255).astype(np.uint8)
-    return image
-
-
 def target_maps(targets: list[Target], size: int = AugmentationParameters.crop_size) -> NDArray[np.float32]:
     """What the network should answer for a crop of `size` px: (9, n, n) for n = size / 8 cells along an edge.
 
-    Maps 0 to 6 are those of `regrasp.perception.pose.detector.decode`. Map 7 is the weight of maps 1 to 6 in the loss.
-    Map 8 is the weight of map 0: it is 0 around a connector of which too little is visible.
+    Maps 0 to 6 are those of `regrasp.perception.pose.detector.decode`, the last two the weights of `wanted_maps`.
     """
-    n = size // STRIDE
-    maps = np.zeros((9, n, n), np.float32)
-    maps[8] = 1.0
-    cells = np.arange(n) + 0.5
-    for target in targets:
-        u0, v0, u1, v1 = np.array(target.box) / STRIDE
-        middle, edges = ((u0 + u1) / 2, (v0 + v1) / 2), (u1 - u0, v1 - v0)
-        # Gaussian that grows with the box, but at least so wide that the nearest cells get a share.
-        sigma_u, sigma_v = (max(0.6, edge / 8) for edge in edges)
-        du, dv = middle[0] - cells[None], middle[1] - cells[:, None]
-        heat = np.exp(-0.5 * ((du / sigma_u) ** 2 + (dv / sigma_v) ** 2))
-        if not target.counts:
-            maps[8][heat > 0.05] = 0.0
-            continue
-        heat[int(min(middle[1], n - 0.5)), int(min(middle[0], n - 0.5))] = 1.0
-        nearest = (heat > 0.4) & (heat > maps[7])
-        angle, length = np.arctan2(target.axis[1], target.axis[0]), float(np.hypot(*target.axis)) ** 2
-        maps[1], maps[2] = np.where(nearest, du, maps[1]), np.where(nearest, dv, maps[2])
-        values = (*np.log(edges), length * np.cos(2 * angle), length * np.sin(2 * angle))
-        for k, value in enumerate(values, start=3):
-            maps[k][nearest] = value
-        maps[7] = np.where(nearest, heat, maps[7])
-        maps[0] = np.maximum(maps[0], heat)
-    return maps
+    return wanted_maps([(t.box, t.counts, _axis_values(t.axis)) for t in targets], (size, size), values=6)
+
+
+def _axis_values(axis: tuple[float, float]) -> tuple[float, float]:
+    """in_plane^2 (cos 2 angle, sin 2 angle) of an axis in the image; see `decode`."""
+    angle, length = np.arctan2(axis[1], axis[0]), float(np.hypot(*axis)) ** 2
+    return float(length * np.cos(2 * angle)), float(length * np.sin(2 * angle))

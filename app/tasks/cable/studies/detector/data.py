@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from regrasp.interfaces.cable.cell import CableCell
 from regrasp.perception.camera.color import SegmentationParameters, color_mask
 from regrasp.perception.camera.model import project
-from regrasp.perception.pose.detector import NETWORK_HEIGHT, NETWORK_WIDTH, letterboxed, pixel_sizes
+from regrasp.perception.detection import letterboxed
+from regrasp.perception.pose.detector import NETWORK_HEIGHT, NETWORK_WIDTH, pixel_sizes
 from regrasp.sim.cable.random_scenes.scene import RandomScene, Shot
 from regrasp.sim.cameras.depth_noise import DepthNoise
 
@@ -69,10 +70,10 @@ def make_pictures(
         noise = {spec.name: DepthNoise(spec, cell.hidden.errors, seed + first) for spec in cell.known.cameras}
         for i in range(first, min(first + parameters.shots_per_scene, count)):
             shot = scene.shot(present=(i + 1) % parameters.absent_every != 0)
-            out.images[i], _ = letterboxed(shot.rgb)
+            out.images[i], _ = letterboxed(shot.rgb, (NETWORK_HEIGHT, NETWORK_WIDTH))
             depth = noise[shot.camera.name].apply(shot.depth, i)
             out.sizes[i] = np.clip(1e6 * pixel_sizes(depth, shot.camera.intrinsics), 0, 65535).round()
-            out.masks[i] = letterboxed(shot.mask * np.uint8(255))[0]
+            out.masks[i] = letterboxed(shot.mask * np.uint8(255), (NETWORK_HEIGHT, NETWORK_WIDTH))[0]
             out.axes[i] = axis_in_image(shot)
             out.look_alikes[i] = _look_alike_pixels(
                 out.images[i], out.masks[i], color, parameters.look_alike_pixels, rng

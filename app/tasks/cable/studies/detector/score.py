@@ -12,10 +12,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from regrasp.app.studies.detector.precision import area_under_curve, precision_bounds, scored_hits
 from regrasp.app.tasks.cable.studies.detector.data import axis_in_image
 from regrasp.interfaces.cable.cell import CableCell
 from regrasp.interfaces.frame import RgbdFrame
-from regrasp.perception.pose.detector import Detection, Detector, DetectorParameters, PixelBox, intersection_over_union
+from regrasp.perception.detection import PixelBox, intersection_over_union
+from regrasp.perception.pose.detector import Detection, Detector, DetectorParameters
 from regrasp.perception.pose.estimate import Estimate
 from regrasp.sim.cable.random_scenes.scene import RandomScene, Shot
 from regrasp.sim.cameras.depth_noise import DepthNoise
@@ -30,7 +32,6 @@ class ScoreParameters:
     min_recorded_score: float = 0.01  # of the boxes in the average precision; choice: far below any that counts
     min_visible_area: int = 100  # px of the camera's picture; choice: a seventh of the connector at 0.75 m
     shots_per_scene: int = 8  # choice
-    bootstrap_samples: int = 1000  # choice: the interval's ends are then known to a tenth of its width
     min_in_plane: float = 0.5  # of the axis' length; choice: along the view its angle in the image says nothing
 
 
@@ -76,44 +77,18 @@ class ScoredPicture:
 
 
 def average_precision(pictures: Sequence[ScoredPicture]) -> float:
-    r"""Area under the precision-recall curve, precision made non-increasing (all points, as in PASCAL VOC 2010).
-
-    .. math:: AP = \sum_i (r_i - r_{i-1}) \max_{j \ge i} p_j
-
-    with precision p and recall r after the i likeliest boxes of all pictures.
-    """
-    return _area(np.vstack([np.empty((0, 2)), *map(_hits, pictures)]), sum(a.truth is not None for a in pictures))
+    """That of the boxes in all pictures."""
+    return area_under_curve(*_hits_and_things(pictures))
 
 
-def precision_interval(
-    pictures: Sequence[ScoredPicture], samples: int = ScoreParameters.bootstrap_samples
-) -> tuple[float, float]:
-    """The 95 % interval of the average precision by the percentile bootstrap (Efron 1979): `samples` resamplings."""
-    hits, there = [_hits(a) for a in pictures], np.array([a.truth is not None for a in pictures])
-    rng, areas = np.random.default_rng(0), []
-    for _ in range(samples):
-        some = rng.integers(len(pictures), size=len(pictures))
-        areas.append(_area(np.concatenate([hits[i] for i in some]), int(there[some].sum())))
-    low, high = np.quantile(areas, [0.025, 0.975]).tolist()
-    return low, high
+def precision_interval(pictures: Sequence[ScoredPicture]) -> tuple[float, float]:
+    """The 95 % interval of the average precision."""
+    return precision_bounds(*_hits_and_things(pictures))
 
 
-def _hits(picture: ScoredPicture) -> NDArray[np.float64]:
-    """For each box its score, and 1 if it is right, else 0: (n, 2)."""
-    return np.array([(d.score, r) for d, r in zip(picture.detections, picture.correct(), strict=True)], float).reshape(
-        -1, 2
-    )
-
-
-def _area(hits: NDArray[np.float64], total: int) -> float:
-    """The area of `average_precision` for boxes (n, 2) as from `_hits` and `total` connectors."""
-    if not len(hits) or not total:
-        return 0.0
-    right = hits[np.argsort(-hits[:, 0], kind="stable"), 1]
-    recall = np.cumsum(right) / total
-    precision = np.cumsum(right) / np.arange(1, len(right) + 1)
-    falling = np.maximum.accumulate(precision[::-1])[::-1]
-    return float(np.sum(np.diff(recall, prepend=0.0) * falling))
+def _hits_and_things(pictures: Sequence[ScoredPicture]) -> tuple[list[NDArray[np.float64]], NDArray[np.intp]]:
+    hits = [scored_hits([d.score for d in a.detections], a.correct()) for a in pictures]
+    return hits, np.array([int(a.truth is not None) for a in pictures])
 
 
 def held_out_shots(

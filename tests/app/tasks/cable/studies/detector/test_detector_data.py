@@ -51,7 +51,7 @@ def test_crops_depend_on_the_generator_alone(pictures: Pictures) -> None:
 def test_crops_keep_the_connector_in_its_box(pictures: Pictures, monkeypatch: pytest.MonkeyPatch) -> None:
     """A white connector in a black picture reaches all four edges of its box, and no pixel of it is outside."""
     monkeypatch.setattr("regrasp.app.tasks.cable.studies.detector.crops._cut_out", lambda *_: None)
-    monkeypatch.setattr("regrasp.app.tasks.cable.studies.detector.crops._recolored", lambda image, *_: image)
+    monkeypatch.setattr("regrasp.app.tasks.cable.studies.detector.crops.recolored", lambda image, *_: image)
     white = replace(pictures, images=np.zeros_like(pictures.images))
     white.images[pictures.masks >= 128] = 255
     compared = 0

@@ -34,14 +34,15 @@ def test_a_tiny_training_leaves_a_network_and_its_figures_and_the_seed_decides(t
 
 
 def test_another_training_goes_on_from_a_network(tmp_path: Path) -> None:
-    from regrasp.app.tasks.cable.studies.detector.train import Network, load_weights, read_weights, to_onnx
+    from regrasp.app.studies.detector.network import Network, load_weights, read_weights
+    from regrasp.app.tasks.cable.studies.detector.train import NETWORK, onnx_file
 
     model = shipped_network()
-    network = Network()
+    network = Network(NETWORK)
     inputs = np.random.default_rng(0).random((4, 13, 120, 216), np.float32)
-    load_weights(network, read_weights(model), torch.from_numpy(inputs))
+    load_weights(network, read_weights(model, NETWORK), torch.from_numpy(inputs))
     answers = []
-    for file in (model, to_onnx(network)):
+    for file in (model, onnx_file(network)):
         net = cv2.dnn.readNetFromONNX(np.frombuffer(file, np.uint8))
         net.setInput(inputs[:1])
         answers.append(net.forward())
@@ -75,6 +76,7 @@ def test_what_is_no_network_of_ours_is_no_start(tmp_path: Path, content: bytes) 
 
 
 def test_ctrl_c_keeps_the_best_so_far(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from regrasp.app.studies.detector.training import TrainingParameters
     from regrasp.app.tasks.cable.studies.detector import train as detector_train
 
     batch = detector_train._batch
@@ -86,7 +88,7 @@ def test_ctrl_c_keeps_the_best_so_far(tmp_path: Path, monkeypatch: pytest.Monkey
         drawn.append(1)
         return batch(*args)
 
-    every_step = partial(detector_train.train, parameters=detector_train.TrainingParameters(check_every=1))
+    every_step = partial(detector_train.train, parameters=TrainingParameters(check_every=1))
     monkeypatch.setattr(detector_train, "train", every_step)
     monkeypatch.setattr(detector_train, "_batch", interrupted)
     assert train(tmp_path / "out").exit_code == 130
@@ -94,15 +96,16 @@ def test_ctrl_c_keeps_the_best_so_far(tmp_path: Path, monkeypatch: pytest.Monkey
 
 
 def test_opencv_computes_what_torch_does() -> None:
-    from regrasp.app.tasks.cable.studies.detector.train import Network, to_onnx
+    from regrasp.app.studies.detector.network import Network
+    from regrasp.app.tasks.cable.studies.detector.train import NETWORK, onnx_file
 
     torch.manual_seed(1)
-    network = Network()
+    network = Network(NETWORK)
     image = np.random.default_rng(0).random((1, 13, 120, 216), np.float32)
     with torch.no_grad():
         network(torch.from_numpy(image))  # fills the running means
         expected = network.eval()(torch.from_numpy(image)).numpy()
-    net = cv2.dnn.readNetFromONNX(np.frombuffer(to_onnx(network), np.uint8))
+    net = cv2.dnn.readNetFromONNX(np.frombuffer(onnx_file(network), np.uint8))
     net.setInput(image)
     assert np.abs(net.forward() - expected).max() < 1e-5
     assert expected.std(axis=(2, 3)).min() > 1e-5  # the picture matters

@@ -1,0 +1,1 @@
+"""What the detectors' trainings and their evaluations share."""

@@ -1,0 +1,1 @@
+"""The training of the printed part's detector, and its evaluation."""
