@@ -4,8 +4,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 from regrasp.behaviors.printer.services import PrinterServices
-from regrasp.interfaces.printer.actions import Approach, ImageGoal, PoseRelGoal
-from regrasp.interfaces.printer.cell import PART_AND_BED
+from regrasp.interfaces.printer.actions import PART_AND_BED, Approach, ImageGoal, PoseRelGoal
 from regrasp.interfaces.request import Request
 
 BUFFER = 0.25  # m before the goal at which three_step stops; the source's

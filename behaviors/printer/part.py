@@ -6,8 +6,7 @@ from regrasp.behaviors.leaf import LeafFailed, LeafPort, LeafSteps
 from regrasp.behaviors.printer.approach import approach_steps
 from regrasp.behaviors.printer.leaf import PrinterLeaf
 from regrasp.interfaces.cause import CauseCode
-from regrasp.interfaces.printer.actions import Approach, PoseGoal, RailGoal
-from regrasp.interfaces.printer.cell import PART_AND_BED
+from regrasp.interfaces.printer.actions import PART_AND_BED, Approach, PoseGoal, RailGoal
 
 
 class RailToPart(PrinterLeaf):

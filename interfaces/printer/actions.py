@@ -26,6 +26,8 @@ Target = Literal["obj", "targ"]  # what to look for: the red part, and its blue 
 # The source's classes: also the left and the right finger, as the picture shows them.
 PartClass = Literal["obj", "targ", "lgrip", "rgrip"]
 CLASSES: tuple[PartClass, ...] = get_args(PartClass)
+# The part and what it lies on, by their names; a cell's file names the box under the plate so.
+PART_AND_BED = ("part", "section", "plate", "plate_bed")
 
 
 class Action(Request[Result], Generic[Feedback, Result]):

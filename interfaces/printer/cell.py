@@ -114,10 +114,6 @@ class Clamp(Model):
     color: Color = (0.15, 0.16, 0.18)
 
 
-# The part and what it lies on, by their names; a cell's file names the box under the plate so.
-PART_AND_BED = ("part", "section", "plate", "plate_bed")
-
-
 class KnownPrinter(Model):
     """What the robot is told about the printer, and which arm works at it."""
 

@@ -13,7 +13,8 @@ from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.cell import Box, WristMount
 from regrasp.interfaces.devices import Arm, Clock, Gripper
 from regrasp.interfaces.frame import RgbdFrame
-from regrasp.interfaces.printer.cell import PART_AND_BED, PrinterKnown
+from regrasp.interfaces.printer.actions import PART_AND_BED
+from regrasp.interfaces.printer.cell import PrinterKnown
 from regrasp.interfaces.printer.target import TargetTracker
 from regrasp.interfaces.quote import nearest, quoted
 from regrasp.interfaces.request import Request

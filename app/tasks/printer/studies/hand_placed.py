@@ -11,7 +11,8 @@ from scipy.spatial.transform import RigidTransform
 from regrasp.app.tasks.printer.services import printer_services
 from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.frame import RgbdFrame
-from regrasp.interfaces.printer.cell import PART_AND_BED, PrinterCell
+from regrasp.interfaces.printer.actions import PART_AND_BED
+from regrasp.interfaces.printer.cell import PrinterCell
 from regrasp.interfaces.request import RequestError
 from regrasp.interfaces.scene import Gravity
 from regrasp.sim.printer.objects import PrinterObjects

@@ -28,8 +28,8 @@ from regrasp.app.studies.standing import InstantArm, RunningClock, StandingGripp
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.devices import TICK
-from regrasp.interfaces.printer.actions import Action, JointGoal, PoseGoal, PoseRelGoal, RailGoal
-from regrasp.interfaces.printer.cell import PART_AND_BED, PrinterCell
+from regrasp.interfaces.printer.actions import PART_AND_BED, Action, JointGoal, PoseGoal, PoseRelGoal, RailGoal
+from regrasp.interfaces.printer.cell import PrinterCell
 from regrasp.interfaces.request import Request, RequestError
 from regrasp.motion.planning.planner import plan
 from regrasp.motion.printer.devices import ArmManipulator, ArmRail, OneAtATime
