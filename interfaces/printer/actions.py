@@ -224,11 +224,17 @@ class ImageFeedback:
 
 @dataclass(frozen=True)
 class Sighting:
-    """A target in a picture: its box's centre from the picture's centre, px right and down, and its area, px2."""
+    """A target in a picture: its box's centre from the picture's centre, px right and down, and its area, px2.
+
+    `box` is (u0, v0, u1, v1) px, by the edges of pixels: pixel u covers u - 0.5 to u + 0.5. `confidence` is the
+    network's, 0 to 1; None: it saw nothing, and the target was found by its colour.
+    """
 
     offset: tuple[float, float]
     area: float
     stamp: float  # s, of the picture
+    box: tuple[float, float, float, float]
+    confidence: float | None = None
 
 
 class GripperDevice(Device[GripperGoal, GripperState, GripperState], Protocol):

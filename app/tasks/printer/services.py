@@ -8,7 +8,7 @@ from regrasp.interfaces.devices import Clock
 from regrasp.interfaces.printer.cell import PrinterKnown
 from regrasp.motion.printer.devices import ArmGripper, ArmManipulator, ArmRail, OneAtATime
 from regrasp.motion.printer.service import PrinterMotion
-from regrasp.perception.printer.analyzer import ColorAnalyzer
+from regrasp.perception.printer.analyzer import PartAnalyzer
 from regrasp.perception.printer.service import PrinterPerception
 from regrasp.sim.printer.objects import PrinterObjects
 from regrasp.sim.world import World
@@ -33,7 +33,7 @@ def _with_devices(
         manipulator=ArmManipulator(motion, hand, arm_and_rail),
         gripper=ArmGripper(motion, hand, jaw),
         rail=ArmRail(motion, hand, arm_and_rail),
-        analyzer=ColorAnalyzer(perception, known.printer, clock),
+        analyzer=PartAnalyzer(perception, known.printer, clock),
         arm_and_rail=arm_and_rail,
         jaw=jaw,
     )

@@ -27,6 +27,7 @@ from regrasp.interfaces.printer.cause import PrinterCause
 from regrasp.interfaces.printer.cell import PrinterCell
 from regrasp.interfaces.request import RequestError
 from regrasp.motion.printer.service import TO_THE_PRINTER, PrinterMotion
+from regrasp.perception.printer.detector import PartDetector
 from regrasp.sim.printer.objects import PrinterObjects
 from regrasp.sim.world import World
 
@@ -157,9 +158,28 @@ def test_the_analyzer_finds_what_the_camera_shows(rig: Rig) -> None:
     assert abs(section.offset[0]) < 15.0  # px; the camera is off by 2 mm and 0.3 degrees
     assert section.offset[1] > 40.0
     assert part.area > 3.0 * section.area
+    assert part.box[0] < section.box[0] < section.box[2] < part.box[2]  # px: the section stands before the part
+    assert part.confidence is not None
+    assert part.confidence > 0.5
     near = section.area
     rig.run(rig.services.manipulator.send(PoseRelGoal((-0.05, 0.0, 0.0))))
     assert rig.run(rig.services.analyzer.send(ImageGoal("targ"))).area > 1.15 * near
+
+
+def test_a_target_that_the_network_does_not_see_is_found_by_its_colour(
+    rig: Rig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    door = rig.services.known.printer.door
+    p.resetJointState(rig.world.objects.door.body, 0, door.travel, physicsClientId=rig.world.client)
+    assert isinstance(rig.services.motion, PrinterMotion)
+    rig.services.motion.believe_door(door.travel)
+    x, y, z = rig.services.known.printer.part.section.center
+    rig.run(rig.services.manipulator.send(PoseGoal(pose(x + 0.25, y, z))))
+    by_network = rig.run(rig.services.analyzer.send(ImageGoal("obj")))
+    monkeypatch.setattr(PartDetector, "detect", lambda *_: [])
+    by_color = rig.run(rig.services.analyzer.send(ImageGoal("obj")))
+    assert by_color.confidence is None
+    np.testing.assert_allclose(by_color.box, by_network.box, atol=3.0)  # px; the camera's noise
 
 
 @pytest.mark.parametrize(

@@ -36,7 +36,7 @@ def test_beyond_the_knots_the_first_and_the_last_piece_go_on() -> None:
 def test_a_box_right_of_and_below_the_middle_is_to_the_right_and_below() -> None:
     """The hand points along -x, so that right in the picture is +y in the world."""
     tables = ApproachTables.model_validate(GOOD)
-    offset = tables.offset(Sighting((100.0, 50.0), 4000.0, 0.0))
+    offset = tables.offset(Sighting((100.0, 50.0), 4000.0, 0.0, (0.0, 0.0, 100.0, 40.0)))
     assert offset == pytest.approx([-0.3, 0.08, -0.04])
 
 

@@ -11,7 +11,7 @@ from regrasp.app.files.whole_file import write_whole
 from regrasp.app.tasks.printer.studies.hand_placed import HandPlaced
 from regrasp.interfaces.printer.actions import Sighting
 from regrasp.interfaces.printer.cell import PrinterCell
-from regrasp.perception.printer.analyzer import ColorAnalyzer
+from regrasp.perception.printer.analyzer import PartAnalyzer
 from regrasp.perception.printer.approach_tables import ApproachTables
 
 
@@ -33,7 +33,7 @@ def calibrated(cell: PrinterCell, parameters: CalibrationParameters = Calibratio
     """
     with HandPlaced(without_errors(cell), 0) as hand:
         perception: Any = hand.services.perception
-        analyzer = ColorAnalyzer(perception, cell.known.printer, hand.world)
+        analyzer = PartAnalyzer(perception, cell.known.printer, hand.world)
         count = round((parameters.farthest - parameters.nearest) / parameters.step) + 1
         distances = np.linspace(parameters.nearest, parameters.farthest, count)
         rows = [_knot(hand, analyzer, float(distance), parameters.aside) for distance in distances]
@@ -63,16 +63,14 @@ def without_errors(cell: PrinterCell) -> PrinterCell:
     return cell.model_copy(update={"hidden": hidden})
 
 
-def _knot(
-    hand: HandPlaced, analyzer: ColorAnalyzer, distance: float, aside: float
-) -> tuple[float, float, float, float]:
+def _knot(hand: HandPlaced, analyzer: PartAnalyzer, distance: float, aside: float) -> tuple[float, float, float, float]:
     """The box's area, the scale, and how far left and up its middle lies (m), with the hand so far from its goal."""
     seen = [_seen(hand, analyzer, distance, y) for y in (-aside, 0.0, aside)]
     scale = 2 * aside / abs(seen[2].offset[0] - seen[0].offset[0])
     return seen[1].area, scale, -scale * seen[1].offset[0], -scale * seen[1].offset[1]
 
 
-def _seen(hand: HandPlaced, analyzer: ColorAnalyzer, distance: float, y: float) -> Sighting:
+def _seen(hand: HandPlaced, analyzer: PartAnalyzer, distance: float, y: float) -> Sighting:
     hand.place(RigidTransform.from_translation([distance, y, 0.0]) * hand.goal)
     found = analyzer.find(hand.picture(), "obj")
     if found is None:
