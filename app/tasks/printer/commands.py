@@ -102,7 +102,7 @@ def calibrate_approach(
     out: Annotated[Path, typer.Option("-o", "--out", metavar="FILE", help="The tables, a new JSON file.")],
     cell: Annotated[str, typer.Option(help="The cell with the printer, its door open.")] = "habitat_open",
 ) -> None:
-    """Make the tables of the source's approaches to a part.
+    """Make the tables of the source's approaches.
 
     From rendered pictures of the printed part.
 

@@ -35,11 +35,11 @@ def train_part_detector(
     held_out: Annotated[int, typer.Option(min=1, help="Pictures to evaluate on at the end.")] = 400,
     seed: _Seed = TRAINING_SEED,
 ) -> None:
-    """Train the network that finds the printed part and the fingers.
+    """Train the network that finds the printed part.
 
-    On random pictures of a cell; then it is evaluated. Needs the extra `train` (torch, onnx), about an hour on one
-    core, and 4 GB of free memory. Ctrl-C keeps the best network so far. To use it, put its file in the place of
-    perception/printer/part_detector.onnx.
+    And the fingers. It learns from random pictures of a cell; then it is evaluated. Needs the extra `train` (torch,
+    onnx), about an hour on one core, and 4 GB of free memory. Ctrl-C keeps the best network so far. To use it, put its
+    file in the place of perception/printer/part_detector.onnx.
 
     \b
     Example:
@@ -76,7 +76,7 @@ def evaluate_part_detector(
     seed: _Seed = HELD_OUT_SEED,
     out: Annotated[Path | None, typer.Option(metavar="FILE", help="Write the figures as JSON, too.")] = None,
 ) -> None:
-    """Measure how well the network finds the printed part.
+    """Measure how well that network finds the part.
 
     In pictures unlike those of its training: another chamber, other light and other clutter. Up to 70 % of the part
     is hidden, and a quarter of the pictures shows none. The network was trained on pictures of the software renderer.
