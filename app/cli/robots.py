@@ -16,9 +16,7 @@ if TYPE_CHECKING:
     from regrasp.app.robots.proposal import Margins
     from regrasp.interfaces.robot.robot import Robot
 
-app = typer.Typer(
-    no_args_is_help=True, rich_markup_mode=None, help="List and check robots; fit collision spheres."
-)
+app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="List and check robots; fit collision spheres.")
 Name = Annotated[str, typer.Argument(help="A name that `regrasp robots list` tells, or a path to a .yaml file.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print it as JSON, for a program; SI units.")]
 LEAST_MARGIN, MOST_MARGIN = 0.002, 0.2  # m; choice: below, a link takes hundreds of spheres, above, a room
