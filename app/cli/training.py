@@ -4,9 +4,13 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from regrasp.app.files.findings import Finding, shown
+from regrasp.app.files.findings import Finding, Findings, shown
 from regrasp.app.records import folders
+
+if TYPE_CHECKING:
+    from regrasp.app.studies.detector.network import NetworkParameters
 
 TRAINING_SEED, HELD_OUT_SEED = 0, 1_000_000  # choice: far apart, so that nobody trains on held-out pictures
 
@@ -23,6 +27,20 @@ def training_findings(command: str, out: Path, file: str, start: Path | None) ->
     if start is not None and not start.is_file():
         wrong.append(Finding(shown(start), 0, f"is no file; name an ONNX file that `regrasp {command}` made"))
     return wrong
+
+
+def checked_start(command: str, start: Path | None, network: "NetworkParameters") -> bytes | None:
+    """The file of the network `start`. Raises `Findings` if it is none that `command` made."""
+    from regrasp.app.studies.detector.network import read_weights
+
+    if start is None:
+        return None
+    model = start.read_bytes()
+    try:
+        read_weights(model, network)
+    except ValueError as error:
+        raise Findings([Finding(shown(start), 0, f"{error}; name one that `{command}` made")]) from None
+    return model
 
 
 def evaluation_findings(command: str, model: Path | None, out: Path | None) -> list[Finding]:

@@ -1,11 +1,32 @@
-"""The average precision of a detector's boxes, and its interval."""
+"""True boxes, which of a detector's boxes are right, their average precision, and its interval."""
 
 from collections.abc import Sequence
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from regrasp.interfaces.arrays import Mask
+from regrasp.perception.detection import PixelBox, intersection_over_union
+
 Hits = NDArray[np.float64]  # (n, 2): of each box in a picture its score, and 1 if it is right, else 0
+
+
+def true_box(mask: Mask) -> PixelBox | None:
+    """The box (u0, v0, u1, v1) px around a mask (H, W), None if it is empty. Pixel u covers u - 0.5 to u + 0.5."""
+    if not mask.any():
+        return None
+    u, v, width, height = cv2.boundingRect(mask.astype(np.uint8))
+    return u - 0.5, v - 0.5, u + width - 0.5, v + height - 0.5
+
+
+def right_boxes(boxes: Sequence[PixelBox], truth: PixelBox | None, min_overlap: float) -> list[bool]:
+    """For each of the boxes, likeliest first, whether it is the thing; a second box on the thing is wrong."""
+    out: list[bool] = []
+    for box in boxes:
+        fits = truth is not None and intersection_over_union(box, truth) >= min_overlap
+        out.append(fits and not any(out))
+    return out
 
 
 def scored_hits(scores: Sequence[float], right: Sequence[bool]) -> Hits:

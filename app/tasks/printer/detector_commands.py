@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from regrasp.app.cli.training import HELD_OUT_SEED, TRAINING_SEED, counted, evaluation_findings, training_findings
+from regrasp.app.cli.training import (
+    HELD_OUT_SEED,
+    TRAINING_SEED,
+    checked_start,
+    counted,
+    evaluation_findings,
+    training_findings,
+)
 from regrasp.app.files.findings import Finding, Findings, shown
 from regrasp.app.files.whole_file import write_whole
 from regrasp.app.interrupts import late_imports
@@ -48,18 +55,12 @@ def train_part_detector(
     if wrong := training_findings("train-part-detector", out, FILE, start):
         raise Findings(wrong)
     with late_imports():
-        from regrasp.app.studies.detector.network import read_weights
         from regrasp.app.tasks.printer.cells import printer_cell
         from regrasp.app.tasks.printer.studies.detector.pictures import make_pictures
         from regrasp.app.tasks.printer.studies.detector.train import NETWORK, train
 
     loaded = printer_cell(cell)
-    model = None if start is None else start.read_bytes()
-    try:
-        if model is not None:
-            read_weights(model, NETWORK)
-    except ValueError as error:
-        raise Findings([Finding(shown(start or Path()), 0, f"{error}; {MADE}")]) from None
+    model = checked_start("train-part-detector", start, NETWORK)
     out.mkdir(parents=True, exist_ok=True)
     with counted("drawing pictures", pictures) as tell:
         drawn = make_pictures(loaded, seed, pictures, tell)

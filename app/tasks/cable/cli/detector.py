@@ -6,7 +6,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from regrasp.app.cli.training import HELD_OUT_SEED, TRAINING_SEED, counted, evaluation_findings, training_findings
+from regrasp.app.cli.training import (
+    HELD_OUT_SEED,
+    TRAINING_SEED,
+    checked_start,
+    counted,
+    evaluation_findings,
+    training_findings,
+)
 from regrasp.app.files.findings import Finding, Findings, shown
 from regrasp.app.files.resources import resolve
 from regrasp.app.files.whole_file import write_whole
@@ -51,16 +58,10 @@ def train_detector(
     if wrong := training_findings("train-detector", out, "detector.onnx", start):
         raise Findings(wrong)
     loaded = _load(cell)
-    from regrasp.app.studies.detector.network import read_weights
     from regrasp.app.tasks.cable.studies.detector.data import make_pictures
     from regrasp.app.tasks.cable.studies.detector.train import NETWORK, train
 
-    model = None if start is None else start.read_bytes()
-    try:
-        if model is not None:
-            read_weights(model, NETWORK)
-    except ValueError as error:
-        raise Findings([Finding(shown(start or Path()), 0, f"{error}; name one that `train-detector` made")]) from None
+    model = checked_start("train-detector", start, NETWORK)
     out.mkdir(parents=True, exist_ok=True)
     with counted("drawing pictures", pictures) as tell:
         drawn = make_pictures(loaded, seed, pictures, tell)

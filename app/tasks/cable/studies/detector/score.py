@@ -8,15 +8,20 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from regrasp.app.studies.detector.precision import area_under_curve, precision_bounds, scored_hits
+from regrasp.app.studies.detector.precision import (
+    area_under_curve,
+    precision_bounds,
+    right_boxes,
+    scored_hits,
+    true_box,
+)
 from regrasp.app.tasks.cable.studies.detector.data import axis_in_image
 from regrasp.interfaces.cable.cell import CableCell
 from regrasp.interfaces.frame import RgbdFrame
-from regrasp.perception.detection import PixelBox, intersection_over_union
+from regrasp.perception.detection import PixelBox
 from regrasp.perception.pose.detector import Detection, Detector, DetectorParameters
 from regrasp.perception.pose.estimate import Estimate
 from regrasp.sim.cable.random_scenes.scene import RandomScene, Shot
@@ -53,11 +58,7 @@ class ScoredPicture:
 
     def correct(self) -> list[bool]:
         """For each detection whether it is the connector; a second box on the connector is wrong."""
-        out: list[bool] = []
-        for detection in self.detections:
-            fits = self.truth is not None and intersection_over_union(detection.box, self.truth) >= self.min_overlap
-            out.append(fits and not any(out))
-        return out
+        return right_boxes([d.box for d in self.detections], self.truth, self.min_overlap)
 
     @property
     def detected(self) -> bool:
@@ -128,14 +129,6 @@ def occlusion_class(shot: Shot, min_visible_area: int = ScoreParameters.min_visi
     if inner < max(min_visible_area, seen):
         return None
     return next((i for i, (low, high) in enumerate(OCCLUSION) if low <= shot.occlusion < high), None)
-
-
-def true_box(mask: NDArray[np.bool_]) -> PixelBox | None:
-    """The box (u0, v0, u1, v1) px around a mask (H, W), None if it is empty. Pixel u covers u - 0.5 to u + 0.5."""
-    if not mask.any():
-        return None
-    u, v, width, height = cv2.boundingRect(mask.astype(np.uint8))
-    return u - 0.5, v - 0.5, u + width - 0.5, v + height - 0.5
 
 
 def score_picture(

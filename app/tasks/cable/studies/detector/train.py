@@ -8,11 +8,12 @@ import numpy as np
 import torch
 
 from regrasp.app.studies.detector.network import Network, NetworkParameters, read_weights, to_onnx
+from regrasp.app.studies.detector.precision import true_box
 from regrasp.app.studies.detector.training import Batch, TrainingParameters
 from regrasp.app.studies.detector.training import train as train_network
 from regrasp.app.tasks.cable.studies.detector.crops import AugmentationParameters, draw_crop, target_maps
 from regrasp.app.tasks.cable.studies.detector.data import Pictures
-from regrasp.app.tasks.cable.studies.detector.score import ScoredPicture, ScoreParameters, average_precision, true_box
+from regrasp.app.tasks.cable.studies.detector.score import ScoredPicture, ScoreParameters, average_precision
 from regrasp.perception.pose.detector import NETWORK_HEIGHT, NETWORK_INPUT, NETWORK_WIDTH, decode, network_input
 
 TRAINING = TrainingParameters()

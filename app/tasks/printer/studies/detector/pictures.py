@@ -7,12 +7,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from regrasp.app.studies.detector.precision import true_box
 from regrasp.app.studies.detector.recoloring import recolored
 from regrasp.app.studies.detector.wanted import Thing, wanted_maps
-from regrasp.interfaces.arrays import FloatArray, Mask
+from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.printer.actions import CLASSES
 from regrasp.interfaces.printer.cell import PrinterCell
-from regrasp.perception.detection import PixelBox, letterboxed
+from regrasp.perception.detection import letterboxed
 from regrasp.perception.printer.detector import NETWORK_SHAPE
 from regrasp.sim.printer.random_scene import PartScene
 
@@ -75,14 +76,6 @@ def make_pictures(
             report_progress(i + 1)
         scene.close()
     return out
-
-
-def true_box(mask: Mask) -> PixelBox | None:
-    """The box (u0, v0, u1, v1) px around a mask (H, W), None if it is empty. Pixel u covers u - 0.5 to u + 0.5."""
-    if not mask.any():
-        return None
-    u, v, width, height = cv2.boundingRect(mask.astype(np.uint8))
-    return u - 0.5, v - 0.5, u + width - 0.5, v + height - 0.5
 
 
 def changed(

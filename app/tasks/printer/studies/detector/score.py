@@ -6,8 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from regrasp.app.studies.detector.precision import Hits, area_under_curve, precision_bounds, scored_hits
-from regrasp.app.tasks.printer.studies.detector.pictures import true_box
+from regrasp.app.studies.detector.precision import (
+    Hits,
+    area_under_curve,
+    precision_bounds,
+    right_boxes,
+    scored_hits,
+    true_box,
+)
 from regrasp.interfaces.printer.actions import CLASSES, PartClass
 from regrasp.interfaces.printer.cell import PrinterCell
 from regrasp.perception.detection import PixelBox, intersection_over_union
@@ -76,13 +82,9 @@ def hits_of(
     truth: Truth,
     min_overlap: float = ScoreParameters.min_overlap,
 ) -> Hits:
-    """The boxes of one class in a picture; a second one on the same thing is wrong."""
-    boxes = [d for d in detections if d.name == name]
-    right: list[bool] = []
-    for d in boxes:
-        fits = truth is not None and intersection_over_union(d.box, truth) >= min_overlap
-        right.append(fits and not any(right))
-    return scored_hits([d.score for d in boxes], right)
+    """The boxes of one class in a picture, and whether they are right."""
+    found = [d for d in detections if d.name == name]
+    return scored_hits([d.score for d in found], right_boxes([d.box for d in found], truth, min_overlap))
 
 
 def part_detector_figures(

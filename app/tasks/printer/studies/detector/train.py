@@ -1,10 +1,11 @@
 """The training of the part's detector, in torch; nothing but `regrasp train-part-detector` imports this."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import partial
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 
 from regrasp.app.studies.detector.network import Network, NetworkParameters, read_weights, to_onnx
 from regrasp.app.studies.detector.precision import area_under_curve
@@ -63,7 +64,7 @@ def _batch(pictures: PartPictures, rng: np.random.Generator, count: int) -> Batc
     return _inputs(images).contiguous(memory_format=torch.channels_last), torch.from_numpy(np.stack(wanted))
 
 
-def _inputs(images: "np.typing.NDArray[np.uint8] | tuple[np.typing.NDArray[np.uint8], ...]") -> torch.Tensor:
+def _inputs(images: Iterable[NDArray[np.uint8]]) -> torch.Tensor:
     return torch.from_numpy(np.stack([network_input(image) for image in images]))
 
 

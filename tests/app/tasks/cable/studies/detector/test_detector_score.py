@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from regrasp.app.studies.detector.precision import true_box
 from regrasp.app.tasks.cable.studies.detector.score import (
     OCCLUSION,
     ScoredPicture,
@@ -9,7 +10,6 @@ from regrasp.app.tasks.cable.studies.detector.score import (
     held_out_shots,
     occlusion_class,
     precision_interval,
-    true_box,
 )
 from regrasp.interfaces.cable.cell import CableCell
 from regrasp.perception.pose.detector import Detection
