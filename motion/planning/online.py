@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from ruckig import InputParameter, Result, Ruckig, Synchronization, Trajectory
+from ruckig import InputParameter, Result, Ruckig, RuckigError, Synchronization, Trajectory
 from scipy.spatial.transform import Rotation
 
 from regrasp.interfaces.arrays import FloatArray
@@ -50,7 +50,6 @@ class OnlinePlanner:
             ("max_jerk", values.jerk, values.turn_jerk),
         ):
             setattr(self._input, name, [along * x for x in three] + [about * x for x in three])
-        self._input.synchronization = Synchronization.Phase
         self._input.target_position = [0.0] * 6
         self._place, self._turn = pose[:3, 3], Rotation.from_matrix(pose[:3, :3])
         self._rates = np.zeros((2, 6))  # velocity and acceleration in the world
@@ -79,11 +78,23 @@ class OnlinePlanner:
         rates[0, :3] -= drift
         self._input.current_position = offset.tolist()
         self._input.current_velocity, self._input.current_acceleration = rates.tolist()
-        self._plan = Trajectory(6)
-        result = self._ruckig.calculate(self._input, self._plan)
-        if result not in (Result.Working, Result.Finished):
-            raise ValueError(f"no way to the goal: {result}")
+        self._plan = self._trajectory()
         return self._samples(self._plan)
+
+    def _trajectory(self) -> Trajectory:
+        """All axes arrive together; where Ruckig's arithmetic fails at that, each as soon as it can."""
+        failures = []
+        for synchronization in (Synchronization.Phase, Synchronization.No):
+            self._input.synchronization, trajectory = synchronization, Trajectory(6)
+            try:
+                result = self._ruckig.calculate(self._input, trajectory)
+            except RuckigError as error:
+                failures.append(str(error))
+                continue
+            if result in (Result.Working, Result.Finished):
+                return trajectory
+            failures.append(str(result))
+        raise ValueError(f"no way to the goal: {failures[-1]}")
 
     def _samples(self, plan: Trajectory) -> ToolSamples:
         values, left = self._parameters, plan.duration - self._parameters.fine_time

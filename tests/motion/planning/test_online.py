@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
@@ -35,6 +35,7 @@ def driven(planner: OnlinePlanner, goals: Any, ticks: int, drift: Any = (0.0, 0.
 
 @settings(max_examples=30, deadline=None)
 @given(places, turns)
+@example((0.0, 0.0, 0.0), (0.0, 0.25, 0.2109375))  # axes that cannot be timed together, by Ruckig's arithmetic
 def test_it_comes_to_rest_at_its_goal_within_the_limits(place: Any, turn: Any) -> None:
     goal = pose(place, turn)
     way = driven(OnlinePlanner(np.eye(4)), lambda n: goal, 160)

@@ -108,8 +108,8 @@ def changed(
 def _inside(box: FloatArray, counts: bool, least: float) -> list[Thing]:
     """The part of a box that lies in the picture; it counts if it has the share `least` of the box."""
     height, width = NETWORK_SHAPE
-    clipped = np.clip(box, 0.0, [width, height, width, height])
-    edges, whole = clipped[2:] - clipped[:2], box[2:] - box[:2]
+    seen = np.clip(box, 0.0, [width, height, width, height])
+    edges, whole = seen[2:] - seen[:2], box[2:] - box[:2]
     if not (edges > 0.5).all():  # NaN compares false
         return []
-    return [(tuple(clipped.tolist()), counts and float(edges.prod()) >= least * float(whole.prod()), ())]
+    return [(tuple(seen.tolist()), counts and float(edges.prod()) >= least * float(whole.prod()), ())]
