@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from regrasp.app.cli import calibrate, campaign, migrate, records, robots, run, scenarios, snapshot, trees
+from regrasp.app.cli import calibrate, campaign, migrate, perceive, records, robots, run, scenarios, snapshot, trees
 from regrasp.app.cli.options import EXIT_BAD_INPUT, EXIT_UNMET
 from regrasp.app.files.findings import Findings
 from regrasp.app.interrupts import EXIT_INTERRUPTED
@@ -25,6 +25,7 @@ COMMANDS = (  # in the order in which a newcomer uses them; those that only a ta
     "robots",
     "study",
     "doctor",
+    "perceive",
     "snapshot",
     "calibrate",
 )
@@ -68,6 +69,7 @@ app.add_typer(robots.app, name="robots")
 study = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Run many episodes or scenes, and count.")
 app.add_typer(study, name="study")
 calibrate.add_to(app)
+perceive.add_to(app)
 snapshot.add_to(app)
 migrate.add_to(app)
 for task in tasks():

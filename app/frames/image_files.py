@@ -1,4 +1,4 @@
-"""Reads a user's colour and depth images into arrays."""
+"""Reads a user's colour and depth images into arrays, and writes pictures."""
 
 import os
 from pathlib import Path
@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regrasp.app.files.findings import Finding, Findings, shown, why_no_file
+from regrasp.app.files.whole_file import write_whole
 from regrasp.interfaces.quote import quoted
 
 
@@ -46,6 +47,14 @@ def read_depth(path: Path, unit: float, min_median: float = 0.05, max_median: fl
             path, f"its middle reading is {middle:.3g} m, expected {min_median} to {max_median:.0f} m; {right}"
         )
     return depth
+
+
+def write_picture(path: Path, rgb: NDArray[np.uint8]) -> None:
+    """Write a colour image (H, W, 3) RGB as PNG or JPEG, by the file's suffix; its folder is made if need be."""
+    ok, data = cv2.imencode(path.suffix, cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR))
+    assert ok
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_whole(path, data.tobytes())
 
 
 def _decoded(path: Path, flags: int) -> NDArray[np.generic] | None:

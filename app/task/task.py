@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from regrasp.app.task.part import Part
+from regrasp.app.task.technique import Technique
 
 if TYPE_CHECKING:
     from enum import StrEnum
@@ -62,5 +63,6 @@ class Task:
     words: Part["Words"] = Part("regrasp.app.task.words:PLAIN")
     old_outcomes: Mapping[str, str] = field(default_factory=dict)  # of schema 1, and what is written today
     old_cell_keys: Mapping[str, str] = field(default_factory=dict)  # of cell files from before there were sections
+    techniques: Mapping[str, Technique] = field(default_factory=dict)  # of `regrasp perceive`, by name
     # Adds commands to the command line, and to `regrasp study`, both of them Typer's.
     commands: Part["Callable[[Any, Any], None]"] | None = None

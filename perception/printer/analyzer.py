@@ -11,7 +11,7 @@ from regrasp.interfaces.arrays import ColorImage
 from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.devices import Clock
 from regrasp.interfaces.frame import RgbdFrame
-from regrasp.interfaces.printer.actions import Action, ImageFeedback, ImageGoal, Sighting, Target
+from regrasp.interfaces.printer.actions import Action, ImageFeedback, ImageGoal, PartClass, Sighting, Target
 from regrasp.interfaces.printer.cause import PrinterCause
 from regrasp.interfaces.printer.cell import KnownPrinter
 from regrasp.interfaces.request import RequestError
@@ -30,13 +30,61 @@ class AnalyzerParameters:
     least_area: int = 100  # px in its colour; choice: the gripping section has 600 at 0.7 m
 
 
-class PartAnalyzer:
-    """Implements `regrasp.interfaces.printer.actions.ImageAnalyzer` by a network, or else by the targets' colours.
+class PartFinder:
+    """Finds a target in a picture by a network, or else by its colour.
 
     Of the network's boxes of the target's class the largest counts, as in the source. Its edges are off by 7 % of a
     box, so they are moved to the target's colour there. Where the network sees none, the largest connected blob of that
-    colour in the whole picture is the target.
+    colour in the whole picture is the target. The fingers' colour is not told: the network alone finds them.
     """
+
+    def __init__(self, printer: KnownPrinter, parameters: AnalyzerParameters = AnalyzerParameters()) -> None:
+        self._detector: PartDetector | None = None  # read when it is first asked
+        self._colors: dict[PartClass, SegmentationParameters] = {
+            "obj": SegmentationParameters.for_color(printer.part.color),
+            "targ": SegmentationParameters.for_color(printer.part.section.color),
+        }
+        self._parameters = parameters
+
+    def find(self, rgb: ColorImage, target: PartClass, stamp: float = 0.0) -> Sighting | None:
+        """The target in a picture (H, W, 3) of the time `stamp`; None if it shows too little of it."""
+        seen = self._by_network(rgb, target, stamp)
+        return self._by_color(rgb, target, stamp) if seen is None else seen
+
+    def _by_network(self, rgb: ColorImage, target: PartClass, stamp: float) -> Sighting | None:
+        if self._detector is None:
+            self._detector = PartDetector()
+        found = [d for d in self._detector.detect(rgb) if d.name == target]
+        if not found:
+            return None
+        largest = max(found, key=lambda d: d.area)
+        return _sighting(rgb, stamp, self._refined(rgb, target, largest.box), largest.score)
+
+    def _refined(self, rgb: ColorImage, target: PartClass, box: PixelBox) -> PixelBox:
+        """The box round what has the target's colour there; the network's own where that is another thing."""
+        if target not in self._colors:
+            return box
+        values, (rows, columns) = self._parameters, rgb.shape[:2]
+        u, v = values.grown * (box[2] - box[0]), values.grown * (box[3] - box[1])
+        left, top = max(int(box[0] - u), 0), max(int(box[1] - v), 0)
+        right, bottom = min(int(box[2] + u) + 2, columns), min(int(box[3] + v) + 2, rows)
+        found = _largest_blob(
+            color_mask(np.ascontiguousarray(rgb[top:bottom, left:right]), self._colors[target]), values.least_area
+        )
+        if found is None:
+            return box
+        seen = (found[0] + left, found[1] + top, found[2] + left, found[3] + top)
+        return seen if intersection_over_union(seen, box) >= values.min_overlap else box
+
+    def _by_color(self, rgb: ColorImage, target: PartClass, stamp: float) -> Sighting | None:
+        if target not in self._colors:
+            return None
+        box = _largest_blob(color_mask(rgb, self._colors[target]), self._parameters.least_area)
+        return None if box is None else _sighting(rgb, stamp, box, None)
+
+
+class PartAnalyzer:
+    """Implements `regrasp.interfaces.printer.actions.ImageAnalyzer` by a `PartFinder` on fresh pictures."""
 
     def __init__(
         self,
@@ -45,13 +93,8 @@ class PartAnalyzer:
         clock: Clock,
         parameters: AnalyzerParameters = AnalyzerParameters(),
     ) -> None:
-        self._detector: PartDetector | None = None  # read when it is first asked
         self._perception, self._camera, self._clock = perception, printer.camera, clock
-        self._colors: dict[Target, SegmentationParameters] = {
-            "obj": SegmentationParameters.for_color(printer.part.color),
-            "targ": SegmentationParameters.for_color(printer.part.section.color),
-        }
-        self._parameters = parameters
+        self._finder = PartFinder(printer, parameters)
         self._under_way: Action[ImageFeedback, Sighting] | None = None
 
     def send(self, goal: ImageGoal) -> Action[ImageFeedback, Sighting]:
@@ -80,36 +123,8 @@ class PartAnalyzer:
         raise RequestError(PrinterCause.TARGET_NOT_SEEN, why)
 
     def find(self, frame: RgbdFrame, target: Target) -> Sighting | None:
-        """The target in a picture; None if it shows too little of it."""
-        seen = self._by_network(frame, target)
-        return self._by_color(frame, target) if seen is None else seen
-
-    def _by_network(self, frame: RgbdFrame, target: Target) -> Sighting | None:
-        if self._detector is None:
-            self._detector = PartDetector()
-        found = [d for d in self._detector.detect(frame.rgb) if d.name == target]
-        if not found:
-            return None
-        largest = max(found, key=lambda d: d.area)
-        return _sighting(frame, self._refined(frame.rgb, target, largest.box), largest.score)
-
-    def _refined(self, rgb: ColorImage, target: Target, box: PixelBox) -> PixelBox:
-        """The box round what has the target's colour there; the network's own where that is another thing."""
-        values, (rows, columns) = self._parameters, rgb.shape[:2]
-        u, v = values.grown * (box[2] - box[0]), values.grown * (box[3] - box[1])
-        left, top = max(int(box[0] - u), 0), max(int(box[1] - v), 0)
-        right, bottom = min(int(box[2] + u) + 2, columns), min(int(box[3] + v) + 2, rows)
-        found = _largest_blob(
-            color_mask(np.ascontiguousarray(rgb[top:bottom, left:right]), self._colors[target]), values.least_area
-        )
-        if found is None:
-            return box
-        seen = (found[0] + left, found[1] + top, found[2] + left, found[3] + top)
-        return seen if intersection_over_union(seen, box) >= values.min_overlap else box
-
-    def _by_color(self, frame: RgbdFrame, target: Target) -> Sighting | None:
-        box = _largest_blob(color_mask(frame.rgb, self._colors[target]), self._parameters.least_area)
-        return None if box is None else _sighting(frame, box, None)
+        """The target in a frame; None if it shows too little of it."""
+        return self._finder.find(frame.rgb, target, frame.stamp)
 
 
 def _largest_blob(mask: NDArray[np.uint8], least_area: int) -> PixelBox | None:
@@ -122,7 +137,7 @@ def _largest_blob(mask: NDArray[np.uint8], least_area: int) -> PixelBox | None:
     return left - 0.5, top - 0.5, left + width - 0.5, top + height - 0.5
 
 
-def _sighting(frame: RgbdFrame, box: PixelBox, confidence: float | None) -> Sighting:
-    rows, columns = frame.rgb.shape[:2]
+def _sighting(rgb: ColorImage, stamp: float, box: PixelBox, confidence: float | None) -> Sighting:
+    rows, columns = rgb.shape[:2]
     offset = 0.5 * (box[0] + box[2] + 1.0 - columns), 0.5 * (box[1] + box[3] + 1.0 - rows)
-    return Sighting(offset, (box[2] - box[0]) * (box[3] - box[1]), frame.stamp, box, confidence)
+    return Sighting(offset, (box[2] - box[0]) * (box[3] - box[1]), stamp, box, confidence)

@@ -1,9 +1,13 @@
 """The cable task: two arms unplug a cable, lose its end, and get it back with cameras alone."""
 
+from typing import Any
+
 from regrasp.app.task.part import Part
 from regrasp.app.task.task import Task
+from regrasp.app.task.technique import Technique
 
 _HERE = "regrasp.app.tasks.cable"
+_PERCEIVE: Part[Any] = Part(f"{_HERE}.perceive:perceive_connector")
 
 TASK = Task(
     name="cable",
@@ -31,6 +35,12 @@ TASK = Task(
         "known.cable_length": "known.cable.length",
         "hidden.connector_mass": "hidden.cable.connector_mass",
         "hidden.connector_friction": "hidden.cable.connector_friction",
+    },
+    techniques={
+        "fused": Technique("the connector's pose, by its shape, colour and depth together", _PERCEIVE),
+        "rgbd": Technique("the connector's pose, by its colour and depth", _PERCEIVE),
+        "detector": Technique("the connector's pose, by a network and depth", _PERCEIVE),
+        "fiducial": Technique("the connector's pose, by its tag; needs no depth", _PERCEIVE),
     },
     commands=Part(f"{_HERE}.cli:add_to"),
 )

@@ -1,23 +1,24 @@
 """`regrasp perceive`: from a user's own frames to the connector's pose, or why there is none, as JSON."""
 
-import json
-import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 import typer
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.app.files.findings import Finding, Findings, real_path, shown
-from regrasp.app.files.whole_file import write_whole
+from regrasp.app.files.json_text import json_text
+from regrasp.app.files.resources import resolve
 from regrasp.app.frames.camera_pose_file import load_camera_pose
 from regrasp.app.frames.frame_files import read_frame
+from regrasp.app.frames.image_files import write_picture
+from regrasp.app.task.technique import FrameFiles, PerceiveRequest
+from regrasp.app.tasks.cable.cells import cable_cell
 from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.cell import FixedMount
 from regrasp.interfaces.frame import RgbdFrame
@@ -30,17 +31,6 @@ NEEDS_NO_DEPTH = ("fiducial",)
 TIP_NOT_TOLD = "the picture does not tell which end is the tip"
 
 
-@dataclass(frozen=True)
-class FrameFiles:
-    """The files of one frame, the name of its camera in the cell, and the file of the camera's pose."""
-
-    rgb: Path
-    depth: Path | None
-    intrinsics: Path
-    camera: str | None
-    pose: Path | None
-
-
 @dataclass(frozen=True, eq=False)
 class FrameResult:
     """A frame, its camera's pose, and the technique's result."""
@@ -51,19 +41,16 @@ class FrameResult:
     result: Estimate | NoEstimate
 
 
-def run_perceive(
-    technique: str, files: Sequence[FrameFiles], known: CableKnown, unit: float, draw: Path | None
-) -> bool:
-    """Print the result as JSON, and draw it on the first frame, to the file `draw`; whether the connector is found.
+def perceive_connector(request: PerceiveRequest) -> bool:
+    """Print the result as JSON, and draw it on the first frame; whether the connector is found.
 
-    Poses are in the world of `known` where the poses of all cameras are known, else in the frame of the one camera.
-    `unit`: metres that an integer of a depth image counts.
+    Poses are in the cell's world where the poses of all cameras are known, else in the frame of the one camera.
 
     Raises:
-        Findings: a file, an option or the technique is wrong.
+        Findings: a file or an option is wrong.
     """
-    name = _technique(technique)
-    frames = _frames(name, files, known, unit)
+    name, files, known = _technique(request.technique), request.frames, _known(request)
+    frames = _frames(name, files, known, 0.001 if request.depth_unit is None else request.depth_unit)
     in_world = _in_world(files)
     cell = known if in_world else without_boxes(known)
     try:
@@ -91,9 +78,9 @@ def run_perceive(
             for each in results
         ],
     }
-    if draw is not None:
-        _draw(draw, results[0], result, cell, name)
-    typer.echo(_json(answer))
+    if request.draw is not None:
+        _draw(request.draw, results[0], result, cell, name)
+    typer.echo(json_text(answer))
     return bool(estimates)
 
 
@@ -103,16 +90,34 @@ def without_boxes(known: CableKnown) -> CableKnown:
 
 
 def _technique(name: str) -> TechniqueName:
-    for known in TECHNIQUES:
-        if name == known:
-            return known
-    raise Findings([Finding("--technique", 0, f"no technique {quoted(name)}; {nearest(name, TECHNIQUES)}")])
+    return next(known for known in TECHNIQUES if name == known)
+
+
+def _known(request: PerceiveRequest) -> CableKnown:
+    """What is known of the cell, with the connector as the user says it is."""
+    known = cable_cell(resolve("cell", request.cell or "thesis", Path()), laid_out=False).known
+    given = {"color": request.color, "length": request.length, "radius": request.radius}
+    told = {key: value for key, value in given.items() if value is not None}
+    connector = known.cable.connector.model_copy(update=told)
+    if 2 * connector.radius >= connector.length:
+        message = (
+            f"a connector {connector.length:g} m long and {2 * connector.radius:g} thick; one is longer than thick"
+        )
+        raise Findings([Finding("--radius", 0, message)])
+    return known.with_cable(connector=connector)
+
+
+def _intrinsics(files: FrameFiles) -> Path:
+    if files.intrinsics is None:
+        message = "a pose needs the camera's intrinsics; give --intrinsics FILE, which `regrasp calibrate` writes"
+        raise Findings([Finding("--intrinsics", 0, message)])
+    return files.intrinsics
 
 
 def _in_world(files: Sequence[FrameFiles]) -> bool:
     """Whether all cameras' poses are known. Raises `Findings` where only some of several cameras' are."""
     placed = [f.camera is not None or f.pose is not None for f in files]
-    if not all(placed) and (any(placed) or len({real_path(f.intrinsics) for f in files}) > 1):
+    if not all(placed) and (any(placed) or len({real_path(_intrinsics(f)) for f in files}) > 1):
         message = "frames of several cameras meet in the world; give --camera or --camera-pose for each, too"
         raise Findings([Finding("--intrinsics", 0, message)])
     return all(placed)
@@ -123,14 +128,14 @@ def _frames(
 ) -> list[tuple[RgbdFrame, RigidTransform]]:
     """Frames and their world_from_camera. Raises `Findings` with everything that is wrong in any file."""
     frames, wrong = [], []
-    number_of = {path: i for i, path in enumerate(dict.fromkeys(f.intrinsics for f in files), 1)}
+    number_of = {path: i for i, path in enumerate(dict.fromkeys(_intrinsics(f) for f in files), 1)}
     for number, f in enumerate(files, 1):
         try:
             if f.depth is None and technique not in NEEDS_NO_DEPTH:
                 message = f"the technique {technique} needs depth; give --depth FILE for each --rgb"
                 raise Findings([Finding("--depth", 0, message)])
-            camera = f.camera or ("camera" if len(number_of) == 1 else f"camera {number_of[f.intrinsics]}")
-            frame = read_frame(f.rgb, f.depth, f.intrinsics, unit=unit, camera=camera, number=number)
+            camera = f.camera or ("camera" if len(number_of) == 1 else f"camera {number_of[_intrinsics(f)]}")
+            frame = read_frame(f.rgb, f.depth, _intrinsics(f), unit=unit, camera=camera, number=number)
             frames.append((frame, _camera_pose(f, known)))
         except Findings as error:
             wrong += error.items
@@ -199,12 +204,6 @@ def _rounded(values: NDArray[np.float64], digits: int) -> list[float]:
     return [float(value) + 0.0 for value in values.round(digits)]  # + 0.0: no -0.0
 
 
-def _json(answer: dict[str, Any]) -> str:
-    """JSON, indented, each list of numbers on one line."""
-    text = json.dumps(answer, indent=2, allow_nan=False)
-    return re.sub(r"\[\n[-+.,e\d\s]+\]", lambda numbers: f"[{' '.join(numbers[0][1:-1].split())}]", text)
-
-
 def _draw(
     path: Path, frame_result: FrameResult, result: Estimate | NoEstimate, known: CableKnown, technique: str
 ) -> None:
@@ -219,10 +218,7 @@ def _draw(
     found = (result, camera_pose.inv()) if isinstance(result, Estimate) else None
     size = (known.cable.connector.radius, known.cable.connector.length)
     image = draw_pose(frame_result.frame.rgb, frame_result.frame.intrinsics, found, *size, _caption(technique, result))
-    ok, data = cv2.imencode(path.suffix, cv2.cvtColor(image, cv2.COLOR_RGB2BGR))
-    assert ok
-    path.parent.mkdir(parents=True, exist_ok=True)
-    write_whole(path, data.tobytes())
+    write_picture(path, image)
 
 
 def _caption(technique: str, result: Estimate | NoEstimate) -> list[str]:

@@ -2,6 +2,7 @@
 
 from regrasp.app.task.part import Part
 from regrasp.app.task.task import Task
+from regrasp.app.task.technique import Technique
 
 _HERE = "regrasp.app.tasks.printer"
 
@@ -20,5 +21,10 @@ TASK = Task(
     services=Part(f"{_HERE}.services:printer_services"),
     judge=Part(f"{_HERE}.judge:PrinterJudge"),
     words=Part(f"{_HERE}.words:WORDS"),
+    techniques={
+        "printer_part": Technique(
+            "the printed part, its section and the fingers in the picture", Part(f"{_HERE}.perceive:perceive_part")
+        )
+    },
     commands=Part(f"{_HERE}.commands:add_commands"),
 )

@@ -2,11 +2,10 @@
 
 import typer
 
-from regrasp.app.tasks.cable.cli import detector, perceive, studies
+from regrasp.app.tasks.cable.cli import detector, studies
 
 
 def add_to(app: typer.Typer, study: typer.Typer) -> None:
     """Add the commands to the command line, and the task's studies to `regrasp study`."""
-    perceive.add_to(app)
     detector.add_to(app)
     studies.add_to(study)
