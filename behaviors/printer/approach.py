@@ -25,7 +25,8 @@ def approach_steps(
     """
     if method == "servo":
         motion, gripper = services.motion, services.gripper
-        tracker = services.perception.part_tracker(motion.tool_at, lambda: gripper.state().gap, services.clock.now())
+        now = services.clock.now()
+        tracker = services.perception.part_tracker(motion.tool_at, lambda: gripper.state().gap, now, say)
         yield services.arm_and_rail.take(motion.servo(services.known.printer.hand, tracker, before), str)
         return
     if method != "one_step":

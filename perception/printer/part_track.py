@@ -41,7 +41,8 @@ class PartTracker:
 
     (Bar-Shalom, Li, Kirubarajan 2001, "Estimation with Applications to Tracking and Navigation", 6.2.2).
 
-    `tool_of` gives world_from_tool at a frame's exposure and `gap` the jaw's, by the encoders.
+    `tool_of` gives world_from_tool at a frame's exposure and `gap` the jaw's, by the encoders. `say` is told when the
+    section is first seen, and when it was knocked.
     """
 
     def __init__(
@@ -52,9 +53,10 @@ class PartTracker:
         gap: Callable[[], float],
         since: float,
         parameters: PartTrackParameters = PartTrackParameters(),
+        say: Callable[..., None] = lambda event, **values: None,
     ) -> None:
         self._perception, self._camera, self._tool_of, self._gap = perception, known.printer.camera, tool_of, gap
-        self._since, self._parameters = since, parameters
+        self._since, self._parameters, self._say = since, parameters, say
         self._section = SectionView(known.printer.part, parameters.section)
         self._pads = Pads.of(known.arm(known.printer.hand).robot)
         self._hand: HandView | None = None
@@ -124,6 +126,7 @@ class PartTracker:
                 self._yaw_variance *= 1.0 - share
                 self._stamp, self._outliers = stamp, []
                 return
+        self._say("saw the part" if self._stamp is None else "the part jumped", position=place.round(4).tolist())
         self._place = np.array([place, np.zeros(3)])
         self._covariance = np.diag([deviation**2, values.start_speed**2])
         if self._outliers:  # one that was knocked lies where the outliers were, one that goes fast went on from there

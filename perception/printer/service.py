@@ -49,13 +49,18 @@ class PrinterPerception(Perception):
         self._color = SegmentationParameters.for_color(known.printer.door.handle.color)
 
     def part_tracker(
-        self, tool_of: Callable[[RgbdFrame], RigidTransform], gap: Callable[[], float], since: float
+        self,
+        tool_of: Callable[[RgbdFrame], RigidTransform],
+        gap: Callable[[], float],
+        since: float,
+        say: Callable[..., None] = lambda event, **values: None,
     ) -> PartTracker:
         """What follows the part's section through the camera on the hand, in frames from the time `since` (s) on.
 
-        `tool_of` gives world_from_tool at a frame's exposure, `gap` what the finger encoder reads (m).
+        `tool_of` gives world_from_tool at a frame's exposure, `gap` what the finger encoder reads (m), and `say` is
+        told what the record should show.
         """
-        return PartTracker(self, self._known_printer, tool_of, gap, since, self.parameters.track)
+        return PartTracker(self, self._known_printer, tool_of, gap, since, self.parameters.track, say)
 
     def offset_by_tables(self, seen: Sighting) -> FloatArray:
         """Offset (3,) m in the world from the tool to its goal before the part, see `ApproachTables`."""
