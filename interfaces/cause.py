@@ -19,6 +19,7 @@ class CauseCode(StrEnum):
     GRIPPER_FAILED = "gripper_failed"
     SERVICE_FAILED = "service_failed"
     TOO_MANY_TRIES = "too_many_tries"
+    NO_PLAN = "no_plan"
     KEY_DIFFERS = "key_differs"
     KEY_MISSING = "key_missing"
     TIMED_OUT = "timed_out"

@@ -18,7 +18,7 @@ class TaskObjects:
     1. `build_fixed`, after the cell's boxes and before the obstacles,
     2. `build_moving`, after the arms,
     3. `lay_out`, before the cameras,
-    4. `forbidden`,
+    4. `forbidden` and `grips`,
     5. `effects`.
 
     Every physics step has the order: the arms' servos, the effects of faults, `before_step`, the step, `after_step`;
@@ -43,6 +43,10 @@ class TaskObjects:
 
     def forbidden(self) -> Mapping[int, str] | Mapping[tuple[int, int], str]:
         """The task's bodies that no arm must touch: names by ids, or by the ids of a body and its link."""
+        return {}
+
+    def grips(self) -> Mapping[tuple[int, int], tuple[int, int]]:
+        """Links (a body's id and a link's) that the pads of a hand may touch as long as both touch another link."""
         return {}
 
     def effects(self) -> TaskEffects:

@@ -67,7 +67,7 @@ class World(Generic[ObjectsT]):
         objects.lay_out(self._engine, self.fixed_bodies)
         named = (self._scene.forbidden, objects.forbidden())
         forbidden: dict[BodyOrLink, str] = {body: name for names in named for body, name in names.items()}
-        self._contacts = ContactWatch(self.client, self.arms, forbidden)
+        self._contacts = ContactWatch(self.client, self.arms, forbidden, objects.grips())
         self.contact_peaks = self._contacts.peaks
         self._devices.add_cameras(renderer)
         self.visuals, self.renderer = self._devices.visuals, self._devices.renderer

@@ -6,7 +6,19 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from regrasp.app.cli import calibrate, campaign, migrate, perceive, records, robots, run, scenarios, snapshot, trees
+from regrasp.app.cli import (
+    calibrate,
+    campaign,
+    migrate,
+    perceive,
+    plan,
+    records,
+    robots,
+    run,
+    scenarios,
+    snapshot,
+    trees,
+)
 from regrasp.app.cli.options import EXIT_BAD_INPUT, EXIT_UNMET
 from regrasp.app.files.findings import Findings
 from regrasp.app.interrupts import EXIT_INTERRUPTED
@@ -22,6 +34,7 @@ COMMANDS = (  # in the order in which a newcomer uses them; those that only a ta
     "scenarios",
     "migrate",
     "trees",
+    "plan",
     "robots",
     "study",
     "doctor",
@@ -65,6 +78,7 @@ records.add_to(app)
 app.add_typer(campaign.app, name="campaign")
 app.add_typer(scenarios.app, name="scenarios")
 app.add_typer(trees.app, name="trees")
+plan.add_to(app)
 app.add_typer(robots.app, name="robots")
 study = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Run many episodes or scenes, and count.")
 app.add_typer(study, name="study")

@@ -9,8 +9,14 @@ from regrasp.app.files.findings import Finding, Findings, shown, why_no_file
 from regrasp.interfaces.plugins import PluginError, installed, load
 from regrasp.interfaces.quote import closest, cut, quoted
 
-ResourceKind = Literal["scenario", "cell", "robot", "tree"]
-_SUFFIX: dict[ResourceKind, str] = {"scenario": ".yaml", "cell": ".yaml", "robot": ".yaml", "tree": ".xml"}
+ResourceKind = Literal["scenario", "cell", "robot", "tree", "network"]
+_SUFFIX: dict[ResourceKind, str] = {
+    "scenario": ".yaml",
+    "cell": ".yaml",
+    "robot": ".yaml",
+    "tree": ".xml",
+    "network": ".yaml",
+}
 # Entry points by which packages put in files: each is the path of one, such as Path(__file__).with_name("mine.yaml")
 GROUPS: dict[ResourceKind, str] = {"robot": "regrasp.robots"}
 MAX_NAMED = 5  # shipped names that are listed after an unknown one
@@ -19,7 +25,13 @@ MAX_BYTES = 256 * 1024  # of a file that a person writes
 
 def shipped(kind: ResourceKind) -> dict[str, Path]:
     """The files of this kind that come with Regrasp, by name and sorted; scenarios of faults come last."""
-    folders = {"scenario": "scenarios", "cell": "scenarios/cells", "robot": "scenarios/robots", "tree": "trees"}
+    folders = {
+        "scenario": "scenarios",
+        "cell": "scenarios/cells",
+        "robot": "scenarios/robots",
+        "tree": "trees",
+        "network": "trees/networks",
+    }
     folder = Path(str(files("regrasp"))) / folders[kind]
     names = {path.stem: path for path in sorted(folder.glob("*" + _SUFFIX[kind]))}
     if kind == "scenario":

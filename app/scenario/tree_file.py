@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from regrasp.app.files.findings import Finding, Findings, shown
 from regrasp.app.files.resources import read_text
+from regrasp.app.scenario.network_file import check_networks
 from regrasp.app.task import find
 from regrasp.trees import check_tree
 from regrasp.trees.leaf_sets import task_of
@@ -35,6 +36,7 @@ def check_tree_for(path: Path, where: "Place | None", cell: "Cell | None", task:
 def _check(path: Path, names: Mapping[str, Collection[str]], task: str | None) -> None:
     if found := [Finding(shown(path), line, message) for line, message in check_tree(path, names=names, task=task)]:
         raise Findings(found)
+    check_networks(path)
 
 
 def names_of(cell: "Cell | None", task: "Task | None") -> dict[str, dict[str, str]]:

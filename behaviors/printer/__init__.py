@@ -1,7 +1,7 @@
 """Leaves of the printer task."""
 
 from regrasp.behaviors.leaf import WithServices
-from regrasp.behaviors.printer import door, part, primitives
+from regrasp.behaviors.printer import door, part, primitives, transfer
 
 _LEAVES: tuple[type[WithServices], ...] = (
     primitives.AnalyzeImage,
@@ -21,6 +21,15 @@ _LEAVES: tuple[type[WithServices], ...] = (
     door.RailToHandle,
     door.ReachHandle,
     door.SlideDoor,
+    transfer.ClampPlate,
+    transfer.DrawOutPart,
+    transfer.GripPart,
+    transfer.MoveHeld,
+    transfer.OpenClamp,
+    transfer.PartOverTray,
+    transfer.PlateOverClamp,
+    transfer.ReleasePart,
+    transfer.TwistPart,
 )
 
 LEAVES: dict[str, type[WithServices]] = {leaf.__name__: leaf for leaf in _LEAVES}

@@ -200,6 +200,23 @@ class RailState:
 
 
 @dataclass(frozen=True)
+class ClampGoal:
+    """Close the clamp's jaws on what lies between them, or open them."""
+
+    closed: bool
+
+
+@dataclass(frozen=True)
+class ClampState:
+    """How far (m) each jaw of the clamp has gone in from where it is open, as read."""
+
+    travel: tuple[float, float]
+
+    def __str__(self) -> str:
+        return f"the clamp's jaws have gone in by {' and '.join(f'{1e3 * way:.1f}' for way in self.travel)} mm"
+
+
+@dataclass(frozen=True)
 class ImageGoal:
     """Find a target in the newest picture of the hand's camera; give up after `seconds` (simulated)."""
 
@@ -245,6 +262,23 @@ class GripperDevice(Device[GripperGoal, GripperState, GripperState], Protocol):
         ...
 
 
+class Clamp(Protocol):
+    """A clamp with two jaws, which press on what is between them."""
+
+    def close(self) -> None:
+        """Close the jaws, and press from now on."""
+        ...
+
+    def open(self) -> None:
+        """Open the jaws."""
+        ...
+
+    def travel(self) -> tuple[float, float]:
+        """How far, m, each jaw has gone in from where it is open, as read."""
+        ...
+
+
+ClampDevice = Device[ClampGoal, ClampState, ClampState]
 Manipulator = Device[ManipulatorGoal, ManipulatorState, ManipulatorState]
 Rail = Device[RailGoal, RailState, RailState]
 ImageAnalyzer = Device[ImageGoal, ImageFeedback, Sighting]

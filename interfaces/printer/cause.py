@@ -6,6 +6,8 @@ from enum import StrEnum
 class PrinterCause(StrEnum):
     """The causes."""
 
+    BOND_HOLDS = "bond_holds"  # the part was twisted, and did not come off its plate
+    CLAMP_EMPTY = "clamp_empty"  # the clamp closed on nothing
     HANDLE_NOT_FOUND = "handle_not_found"  # no camera showed the handle of the door
     PREEMPTED = "preempted"  # another goal took the device
     TARGET_NOT_SEEN = "target_not_seen"  # no picture showed the part, or its gripping section

@@ -7,7 +7,7 @@ from regrasp.interfaces.request import Request
 from regrasp.interfaces.services import MotionService, PerceptionService
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Collection
 
     from scipy.spatial.transform import RigidTransform
 
@@ -20,11 +20,16 @@ class PrinterPerceptionService(PerceptionService, Protocol):
     """What is seen of a printer."""
 
     def part_tracker(
-        self, tool_of: "Callable[[RgbdFrame], RigidTransform]", gap: "Callable[[], float]", since: float
+        self,
+        tool_of: "Callable[[RgbdFrame], RigidTransform]",
+        gap: "Callable[[], float]",
+        since: float,
+        say: "Callable[..., None]" = lambda event, **values: None,
     ) -> "TargetTracker":
         """What follows the part's section through the camera on the hand, in frames from the time `since` (s) on.
 
-        `tool_of` gives world_from_tool at a frame's exposure, `gap` what the finger encoder reads (m).
+        `tool_of` gives world_from_tool at a frame's exposure, `gap` what the finger encoder reads (m), and `say` is
+        told what the record should show.
         """
         ...
 
@@ -70,6 +75,44 @@ class PrinterMotionService(MotionService, Protocol):
 
     def take_part(self, arm: str, deeper: float) -> Request[float]:
         """Go straight on, close on the part's section and give way to it; the answer is the gap (m) of the pads."""
+        ...
+
+    def held_goal(self, arm: str, name: str, place: FloatArray) -> "RigidTransform":
+        """world_from_tool with which the held thing of this name has its middle at a place (3,) m, not turned."""
+        ...
+
+    def draw_out(self, arm: str, distance: float) -> Request[None]:
+        """Draw the part that the hand holds straight back, with its plate, by `distance` m."""
+        ...
+
+    def carry(
+        self,
+        arm: str,
+        goal: "RigidTransform",
+        onward: "Collection[RigidTransform]" = (),
+        may_touch: "Collection[str]" = (),
+    ) -> Request[None]:
+        """Bring the tool with what it holds to a pose, from which it must go on straight to `onward`."""
+        ...
+
+    def move_held(self, arm: str, way: FloatArray, may_touch: "Collection[str]") -> Request[None]:
+        """Bring what the hand holds straight on by (3,) m; it may touch the things of these names, and its plate."""
+        ...
+
+    def holds(self, arm: str, thickness: float) -> bool:
+        """Whether the pads stand as far apart as a thing of `thickness` m asks for that they hold."""
+        ...
+
+    def grip_part(self, arm: str) -> Request[float]:
+        """Close the jaw on the section between the pads; the part then counts as held. The answer is the gap (m)."""
+        ...
+
+    def twist(self, arm: str, angle: float) -> Request[None]:
+        """Turn the held part by an angle (rad) about the upright axis through its middle, and back."""
+        ...
+
+    def believe_placed(self, arm: str, names: "Collection[str]") -> None:
+        """What the hand held of these things stays where it is now."""
         ...
 
     def draw_back(self, arm: str, distance: float) -> Request[None]:

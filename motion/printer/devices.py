@@ -1,10 +1,15 @@
 """The arm, its rail and its gripper as devices that do one goal at a time, see `regrasp.interfaces.printer.actions`."""
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterator
+from dataclasses import dataclass
 from typing import Any, TypeVar
 
+from regrasp.interfaces.devices import Clock
 from regrasp.interfaces.printer.actions import (
     Action,
+    Clamp,
+    ClampGoal,
+    ClampState,
     GripperGoal,
     GripperState,
     JointGoal,
@@ -112,6 +117,43 @@ class ArmGripper(_Device):
     def state(self) -> GripperState:
         """The gap between the pads, as read."""
         return GripperState(self._motion.grippers[self._arm].reading().gap)
+
+
+@dataclass(frozen=True)
+class ClampParameters:
+    """When the clamp's jaws have come to rest."""
+
+    seconds: float = 2.0  # at most; they go 20 mm in one
+    still: float = 0.15  # s for which they must rest; choice
+    moves: float = 1e-4  # m in that time that count as rest; choice
+
+
+class DeskClamp:
+    """The clamp on the desk as a device: implements `regrasp.interfaces.printer.actions.ClampDevice`."""
+
+    def __init__(self, clamp: Clamp, clock: Clock, parameters: ClampParameters = ClampParameters()) -> None:
+        self._clamp, self._clock, self._parameters = clamp, clock, parameters
+        self._turn = OneAtATime()
+
+    def send(self, goal: ClampGoal) -> Action[ClampState, ClampState]:
+        """See `Device`. The action is done once the jaws rest."""
+        if not isinstance(goal, ClampGoal):
+            raise _foreign("clamp", "ClampGoal", goal)
+        return self._turn.take(Request(self._steps(goal.closed)), self.state, self.state)
+
+    def state(self) -> ClampState:
+        """Where the jaws stand, as read."""
+        return ClampState(self._clamp.travel())
+
+    def _steps(self, closed: bool) -> Iterator[None]:
+        values, begin = self._parameters, self._clock.now()
+        (self._clamp.close if closed else self._clamp.open)()
+        since, stood = begin, self._clamp.travel()
+        while self._clock.now() - since < values.still and self._clock.now() - begin < values.seconds:
+            yield
+            stands = self._clamp.travel()
+            if max(abs(a - b) for a, b in zip(stands, stood, strict=True)) > values.moves:
+                since, stood = self._clock.now(), stands
 
 
 def _foreign(device: str, takes: str, goal: object) -> TypeError:

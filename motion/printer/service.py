@@ -345,11 +345,15 @@ class PrinterMotion(Motion):
 
     def _force_across(self, arm: str) -> float:
         """The force (N) along y on the hand of an arm at rest, by its drives' efforts."""
-        reading, kin = self.arms[arm].reading(), self.kinematics[arm]
-        still = np.zeros(len(kin))
+        joints, efforts = self._outside_efforts(arm)
+        kin = self.kinematics[arm]
+        return float(tool_force(kin, joints, efforts, kin.tool_matrix(joints)[:3, 3])[1])
+
+    def _outside_efforts(self, arm: str) -> tuple[FloatArray, FloatArray]:
+        """The joints (n,) of an arm at rest, and its drives' efforts (n,) less those that it needs by itself."""
+        reading, still = self.arms[arm].reading(), np.zeros(len(self.kinematics[arm]))
         expected = self._dynamics[arm].efforts(reading.positions, still, still, self.arms[arm].gravity())
-        at = kin.tool_matrix(reading.positions)[:3, 3]
-        return float(tool_force(kin, reading.positions, reading.efforts - expected, at)[1])
+        return reading.positions, reading.efforts - expected
 
     def slide_door(self, arm: str, position: float) -> MotionRequest:
         """Bring the rail of an arm that holds the handle to a position (m along it): the door goes along.

@@ -6,9 +6,11 @@ from regrasp.interfaces.cell import Box
 from regrasp.interfaces.printer.cell import HiddenPrinter, KnownPrinter
 from regrasp.sim.bodies import box_shapes
 
+GEAR_FORCE = 2000.0  # N that the gear bears; choice: far more than the jaws press with
+
 
 class SimClamp:
-    """Two jaws on slides along y, each with a drive of its own; they begin open.
+    """Two jaws on slides along y, which a gear lets go in by the same way (a self-centring vise); they begin open.
 
     Nothing but the jaws' force and friction holds the plate. `jaws` are their links.
     """
@@ -47,10 +49,23 @@ class SimClamp:
                 self.body,
                 link,
                 lateralFriction=1.0,  # PyBullet multiplies it with the plate's
+                frictionAnchor=1,  # without it the plate creeps by half a millimetre a second
                 jointLowerLimit=0.0,
                 jointUpperLimit=most,
                 physicsClientId=client,
             )
+        gear = p.createConstraint(
+            self.body,
+            self.jaws[0],
+            self.body,
+            self.jaws[1],
+            p.JOINT_GEAR,
+            [0, 1, 0],
+            [0, 0, 0],
+            [0, 0, 0],
+            physicsClientId=client,
+        )
+        p.changeConstraint(gear, gearRatio=-1.0, maxForce=GEAR_FORCE, erp=0.8, physicsClientId=client)
         self.open()
 
     def close(self) -> None:
@@ -65,6 +80,10 @@ class SimClamp:
         """How far, m, each jaw has gone in from where it is open."""
         first, second = p.getJointStates(self.body, self.jaws, physicsClientId=self._client)
         return float(first[0]), float(second[0])
+
+    def presses(self, body: int) -> bool:
+        """Whether both jaws touch a body."""
+        return all(p.getContactPoints(self.body, body, jaw, -1, physicsClientId=self._client) for jaw in self.jaws)
 
     def _drive(self, speed: float, force: float) -> None:
         """Let each jaw go in with a speed (m/s) and at most a force (N)."""

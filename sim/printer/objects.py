@@ -19,7 +19,8 @@ from regrasp.sim.robot.arm import SimArm
 class PrinterObjects(TaskObjects):
     """The door, the part on its plate, and the clamp.
 
-    An arm may touch the door's handle and the part's gripping section, and nothing else of them.
+    An arm may touch the door's handle and the part's gripping section, the pads that hold it the whole part, and
+    nothing else of them.
     """
 
     def __init__(self, cell: PrinterCell) -> None:
@@ -31,6 +32,20 @@ class PrinterObjects(TaskObjects):
         self.part = SimPart(engine, known, hidden)
         self.clamp = SimClamp(engine.client, known, hidden)
         self.door = SimDoor(engine.client, known.door, hidden)
+
+    def part_in_tray(self, slow: float = 0.01, height: float = 0.10) -> bool:
+        """Whether the part's middle is in the tray, up to `height` m over its floor, and no faster than `slow` m/s."""
+        tray = next(box for box in self.cell.known.boxes if box.name == "tray")
+        place = self.part.pose(self.part.part).translation
+        off = place - tray.center
+        inside = bool(np.all(np.abs(off[:2]) < 0.5 * np.array(tray.size[:2]))) and 0.0 < off[2] < height
+        return inside and self.part.speed() < slow
+
+    def plate_in_clamp(self, off: float = 0.01) -> bool:
+        """Whether the plate lies in the closed clamp, to `off` m of its middle."""
+        place = self.part.pose(self.part.plate).translation
+        near = float(np.linalg.norm(place - self.cell.known.printer.clamp.center)) < off
+        return near and self.clamp.presses(self.part.plate)
 
     def effects(self) -> TaskEffects:
         """See `TaskObjects`."""
@@ -72,3 +87,7 @@ class PrinterObjects(TaskObjects):
             (self.part.plate, -1): "plate",
             **{(self.clamp.body, jaw): "clamp" for jaw in self.clamp.jaws},
         }
+
+    def grips(self) -> Mapping[tuple[int, int], tuple[int, int]]:
+        """See `TaskObjects`: the whole part, by its section."""
+        return {(self.part.part, -1): (self.part.part, self.part.section_link)}

@@ -92,6 +92,10 @@ class SimPart:
         off = np.subtract(section.center, part.center) + np.array([0.5 * section.size[0], 0.0, 0.0])
         return self.pose(self.part) * RigidTransform.from_components(off, _INTO)
 
+    def speed(self) -> float:
+        """The part's speed, m/s."""
+        return float(np.linalg.norm(p.getBaseVelocity(self.part, physicsClientId=self._engine.client)[0]))
+
     def held_by(self, arm: SimArm) -> bool:
         """Whether both pads of an arm's gripper touch the section."""
         pads = [arm.links[name] for name in pad_links(arm.robot.gripper)]

@@ -14,6 +14,19 @@ class Expect(expect.Expect):
     door_open: Annotated[
         NotNegative | None, Field(description="Metres at least that the door stands open then.", examples=[0.41])
     ] = None
+    door_closed: Annotated[
+        bool | None, Field(description="Whether the door is closed then, to 1 cm.", examples=[True])
+    ] = None
+    part_in_tray: Annotated[
+        bool | None,
+        Field(
+            description="Whether the part lies in the tray then, or floats in it at less than 1 cm/s.", examples=[True]
+        ),
+    ] = None
+    plate_in_clamp: Annotated[
+        bool | None,
+        Field(description="Whether the clamp holds the plate then, to 1 cm of its middle.", examples=[True]),
+    ] = None
     part_held: Annotated[
         bool | None,
         Field(description="Whether both pads touch the part's gripping section then.", examples=[True]),

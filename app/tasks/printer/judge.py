@@ -7,6 +7,8 @@ from regrasp.app.task import judge
 from regrasp.app.task.expectation import Expectation
 from regrasp.app.tasks.printer.expectations import Expect
 
+CLOSED = 0.01  # m that a closed door may stand open; choice
+
 
 class PrinterJudge(judge.Judge[Expect]):
     """Judges the door's true opening, and whether the part is held."""
@@ -19,6 +21,18 @@ class PrinterJudge(judge.Judge[Expect]):
         if self.expect.part_held is not None:
             held = self._held()
             yield Expectation("part_held", held == self.expect.part_held, held, self.expect.part_held)
+        for name, there in self._places().items():
+            if (wanted := getattr(self.expect, name)) is not None:
+                yield Expectation(name, there == wanted, there, wanted)
+
+    def _places(self) -> dict[str, bool]:
+        """Whether door, part and plate are where the whole job brings them."""
+        objects = self.world.objects
+        return {
+            "door_closed": objects.door.opening < CLOSED,
+            "part_in_tray": objects.part_in_tray(),
+            "plate_in_clamp": objects.plate_in_clamp(),
+        }
 
     def _held(self) -> bool:
         objects = self.world.objects
@@ -26,4 +40,8 @@ class PrinterJudge(judge.Judge[Expect]):
 
     def measured(self) -> dict[str, Any]:
         """See `Judge`."""
-        return {"door_open": round(self.world.objects.door.opening, 4), "part_held": self._held()}
+        return {
+            "door_open": round(self.world.objects.door.opening, 4),
+            "part_held": self._held(),
+            **self._places(),
+        }

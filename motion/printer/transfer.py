@@ -1,0 +1,168 @@
+"""Motions with the printed part in the hand: out of the printer, into the clamp, off its plate, and to the tray."""
+
+from collections.abc import Callable, Collection, Generator, Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import RigidTransform, Rotation
+
+from regrasp.interfaces.arguments import finite, positive, vector
+from regrasp.interfaces.arrays import FloatArray
+from regrasp.interfaces.cause import CauseCode
+from regrasp.interfaces.devices import Arm, Clock, Gripper
+from regrasp.interfaces.printer.cause import PrinterCause
+from regrasp.interfaces.printer.cell import PrinterKnown
+from regrasp.interfaces.quote import nearest, quoted
+from regrasp.interfaces.request import Request
+from regrasp.motion.failure import GraspEmptyError, PlanningError
+from regrasp.motion.grasping.gap_test import GripWatch
+from regrasp.motion.planning.straight import straight_lines
+from regrasp.motion.printer.held_box import HeldBox
+from regrasp.motion.printer.service import PrinterMotion, PrinterMotionParameters
+from regrasp.motion.request import MotionRequest
+from regrasp.motion.robots.tool_force import tool_wrench
+
+
+@dataclass(frozen=True)
+class TransferParameters(PrinterMotionParameters):
+    """Those of the door and of the grasp, and how the part is carried and twisted off."""
+
+    first_force: float = 8.0  # N a finger, until the hand has given way: 25 mm off its axis the bond bears 24; choice
+    twist_force: float = 40.0  # N a finger: pads 22 mm deep turn with 0.9 N m at most, and the bond bears 0.6; choice
+    twist_steps: int = 4  # straight lines that stand for the arc: of 40 degrees 25 mm out it is 0.1 mm off
+    bond_left: float = 0.25  # N m about the bond's axis that say that it holds still; choice: it bears 0.6, drives err
+
+
+class TransferMotion(PrinterMotion):
+    """Carries the part, with or without its plate. What the hand holds counts as a part of the arm."""
+
+    parameters: TransferParameters
+
+    def __init__(
+        self,
+        known: PrinterKnown,
+        arms: Mapping[str, Arm],
+        grippers: Mapping[str, Gripper],
+        clock: Clock,
+        seed: int,
+        parameters: TransferParameters = TransferParameters(),
+        on_anomaly: Callable[[str], None] = lambda sentence: None,
+    ) -> None:
+        super().__init__(known, arms, grippers, clock, seed, parameters, on_anomaly)
+
+    def held_goal(self, arm: str, name: str, place: FloatArray) -> RigidTransform:
+        """world_from_tool with which the held thing of this name has its middle at a place (3,) m, not turned.
+
+        Raises:
+            ValueError: the hand is not believed to hold such a thing.
+        """
+        tool = self.tool(arm)
+        off = vector("the place", place) - self._held_thing(arm, name).placed(tool).center
+        return RigidTransform.from_translation(off) * tool
+
+    def draw_out(self, arm: str, distance: float) -> Request[None]:
+        """Draw the part that the hand holds straight back, with its plate, by `distance` m.
+
+        Part and plate then count as held. Fails with GRASP_EMPTY when the hand loses them, and as `shift` does.
+        """
+        way = self.tool(arm).rotation.apply([-positive("the distance", distance), 0.0, 0.0])
+        spared = self.things(["plate_bed"])
+
+        def steps() -> Iterator[None]:
+            self.believe_held(arm, ("plate", "part", "section"))
+            yield from self._holding(arm, self._shift(arm, way, without=spared, contact=self._guard.drawing))
+
+        return self._together(arm, steps())
+
+    def carry(
+        self, arm: str, goal: RigidTransform, onward: Collection[RigidTransform] = (), may_touch: Collection[str] = ()
+    ) -> Request[None]:
+        """Bring the tool with what it holds to a pose, from which it must go on straight to `onward` (goal_from_tool).
+
+        Fails with GRASP_EMPTY when the hand loses what it holds, and as `move_tool` does.
+        """
+        spared = self.things(may_touch)
+        request = self.move_tool(arm, goal, onward=list(onward), may_touch=spared)
+        return self._together(arm, self._holding(arm, request))
+
+    def move_held(self, arm: str, way: FloatArray, may_touch: Collection[str]) -> Request[None]:
+        """Bring what the hand holds straight on by (3,) m; it may touch the things of these names, and its plate.
+
+        Fails with GRASP_EMPTY when the hand loses what it holds, and as `shift` does.
+        """
+        spared = self.things([*may_touch, *(box.name for box in self._boxes if box.name == "plate")])
+        request = self._shift(arm, vector("the way", way), without=spared, contact=self._guard.drawing)
+        return self._together(arm, self._holding(arm, request))
+
+    def holds(self, arm: str, thickness: float) -> bool:
+        """Whether the pads stand as far apart as a thing of `thickness` m asks for that they hold."""
+        gap, slack = self.grippers[arm].reading().gap, self.parameters.execution.jaw.grip.gap.tolerance
+        return thickness - slack < gap < 2.0 * thickness
+
+    def grip_part(self, arm: str) -> Request[float]:
+        """Close the jaw on the section between the pads, and give way to it; the part then counts as held.
+
+        Gently first: the finger that comes first presses on a part that is bonded to a clamped plate. The answer is the
+        gap (m) between the pads. It fails as `close` does.
+        """
+        values, thickness = self.parameters, self.known.printer.part.section.size[1]
+
+        def steps() -> Generator[None, None, float]:
+            yield from self.execution.close_jaw(arm, thickness, force=values.first_force)
+            yield from self._give_way(arm)
+            yield from self.execution.press_jaw(arm, values.twist_force)
+            self.believe_held(arm, ("part", "section"))
+            return self.grippers[arm].reading().gap
+
+        return self._together(arm, steps())
+
+    def twist(self, arm: str, angle: float) -> Request[None]:
+        """Turn the held part by an angle (rad) about the upright axis through its middle, and back.
+
+        Its plate is clamped: the bond between the two bears a twist, and breaks. Fails with BOND_HOLDS when it has not.
+        """
+        finite("the angle", np.array([angle]))
+
+        def steps() -> Iterator[None]:
+            tool = self.tool(arm)
+            middle = RigidTransform.from_translation(self._held_thing(arm, "part").placed(tool).center)
+            angles = np.linspace(0.0, angle, self.parameters.twist_steps + 1)
+            turns = [RigidTransform.from_rotation(Rotation.from_rotvec([0.0, 0.0, a])) for a in angles]
+            arc = [(middle * turn * middle.inv() * tool).as_matrix() for turn in turns]
+            yield from self._along(arm, arc)
+            moment = self._moment_about(arm, middle.translation)
+            yield from self._along(arm, arc[::-1])
+            if abs(moment) > self.parameters.bond_left:
+                why = f"turned by {np.rad2deg(angle):.0f} degrees, the part still turns back with {abs(moment):.2f} N m"
+                raise PlanningError(PrinterCause.BOND_HOLDS, why)
+
+        return self._together(arm, steps())
+
+    def _along(self, arm: str, poses: list[FloatArray]) -> Iterator[None]:
+        path = straight_lines(self.kinematics[arm], self.joints(arm), poses)
+        if path is None:
+            raise PlanningError(CauseCode.OUT_OF_REACH, "the arm cannot turn the part so far")
+        model, speed = self.model(arm), self.parameters.approach_speed
+        yield from self._done(self.execution.request(arm, self._follow(arm, path, speed, model, self._guard.pressing)))
+
+    def _moment_about(self, arm: str, point: FloatArray) -> float:
+        """The moment (N m) about the upright axis through a point (3,) m on the hand of an arm at rest."""
+        joints, efforts = self._outside_efforts(arm)
+        return float(tool_wrench(self.kinematics[arm], joints, efforts, point)[5])
+
+    def _held_thing(self, arm: str, name: str) -> HeldBox:
+        held = {thing.box.name: thing for thing in self._held.get(arm, [])}
+        if name not in held:
+            raise ValueError(f"the hand holds no {quoted(name)}; {nearest(name, held) if held else 'it holds nothing'}")
+        return held[name]
+
+    def _holding(self, arm: str, request: MotionRequest) -> Iterator[None]:
+        """Do a request with what the hand holds. Raises GraspEmptyError when the hand loses it."""
+        watch = GripWatch(
+            self.grippers[arm], self.known.printer.part.section.size[1], self.parameters.execution.jaw.grip.gap
+        )
+        while not request.poll():
+            if (evidence := watch.evidence()).detected:
+                request.cancel()
+                raise GraspEmptyError(f"the hand lost the part: {evidence.sentence}")
+            yield
