@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 STAMP := .venv/.installed
 
-.PHONY: setup run test lint bench fuzz readme guard
+.PHONY: setup run test test-all lint bench fuzz readme guard
 .DEFAULT_GOAL := run
 
 setup: $(STAMP) ; @:
@@ -21,6 +21,9 @@ run: setup
 
 test: setup
 	$(BIN)/pytest -n 2 --dist worksteal $(TESTS)
+
+test-all: setup
+	$(BIN)/pytest -n 2 --dist worksteal -m "slow or not slow" $(TESTS)
 
 lint: setup
 	$(BIN)/ruff check .

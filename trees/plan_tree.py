@@ -6,8 +6,7 @@ from pathlib import Path
 
 from regrasp.behaviors.network.planner import Step
 from regrasp.trees.graph import Node
-
-TAG = "DoTask"
+from regrasp.trees.task_networks import TAG
 
 
 def plan_graph(step: Step, parent: str = "", name: str = "") -> Node:
@@ -16,7 +15,7 @@ def plan_graph(step: Step, parent: str = "", name: str = "") -> Node:
     if step.method is None:
         return Node(path, step.name, "action", "action")
     children = [plan_graph(child, path, one) for child, one in zip(step.steps, _distinct(step.steps), strict=True)]
-    return Node(path, step.name, step.method, "sequence", memory=True, children=tuple(children))
+    return Node(path, f"{step.name}: {step.method}", "Sequence", "sequence", memory=True, children=tuple(children))
 
 
 def plan_tree(tree: Path, step: Step, note: str) -> str:

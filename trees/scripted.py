@@ -27,6 +27,7 @@ from regrasp.trees.element import TreeSyntaxError, read_elements
 from regrasp.trees.leaf_sets import installed_leaves
 from regrasp.trees.load import load_tree
 from regrasp.trees.paths import find_path, in_tree_order, node_paths
+from regrasp.trees.task_networks import networks_named_in
 from regrasp.trees.tick_table import TickTable
 from regrasp.trees.vocabulary import ANY_STATUS, BUILT_IN
 
@@ -181,7 +182,9 @@ class ScriptedTree:
         self.tree = py_trees.trees.BehaviourTree(load_tree(path, stand_ins(leaves), inputs))
         self.ticks = 0
         silent = SimpleNamespace(info=_nothing, warning=_nothing)
-        services = SimpleNamespace(clock=self, log=silent)  # for our decorators
+        networks = networks_named_in(path)
+        # for our decorators and composites
+        services = SimpleNamespace(clock=self, log=silent, networks=networks, seen=lambda state: {})
         self.tree.setup(services=services)
         self._table = TickTable(self.tree.root)
         self.tree.add_visitor(self._table)

@@ -9,7 +9,6 @@ import py_trees
 from regrasp.app.run.attempts import Attempts
 from regrasp.app.run.fault_injection import break_services
 from regrasp.app.scenario.load import Scenario
-from regrasp.app.scenario.network_file import networks_of
 from regrasp.app.scenario.sampling import scene_setup
 from regrasp.app.scenario.scene_draw import drawn
 from regrasp.app.task.judge import Judge
@@ -22,6 +21,7 @@ from regrasp.perception.service import Perception
 from regrasp.sim.render.renderer import RendererName
 from regrasp.sim.world import World
 from regrasp.trees import load_tree, read_graph
+from regrasp.trees.task_networks import networks_named_in
 
 ServicesT = TypeVar("ServicesT", bound=Services)
 
@@ -88,7 +88,7 @@ def assemble(scenario: Scenario, world: World[Any], seed: int, log: Any) -> Epis
     py_trees.blackboard.Blackboard.clear()
     services = task.services()(world, seed, log)
     break_services(services, world.faults, world.now)
-    services.networks = networks_of(scenario.tree)
+    services.networks = networks_named_in(scenario.tree)
     leaves = registry.leaves_of(task.name)
     tree = py_trees.trees.BehaviourTree(load_tree(scenario.tree, leaves, scenario.inputs))
     graph = read_graph(scenario.tree, leaves, scenario.inputs)

@@ -7,14 +7,13 @@ from typing import TYPE_CHECKING
 from regrasp.app.files.findings import Finding, Findings, catch_findings, shown
 from regrasp.app.files.resources import read_text, resolve
 from regrasp.interfaces.quote import nearest, quoted
-from regrasp.trees.element import Element, read_elements
+from regrasp.trees.element import Element
+from regrasp.trees.task_networks import network_nodes
 
 if TYPE_CHECKING:
     from regrasp.app.files.yaml_lines import Path as KeyPath
     from regrasp.app.files.yaml_lines import Place
     from regrasp.interfaces.task_network import TaskNetwork
-
-_TAG = "DoTask"
 
 
 def load_network(path: Path, where: "Place | None" = None) -> "TaskNetwork":
@@ -31,14 +30,6 @@ def load_network(path: Path, where: "Place | None" = None) -> "TaskNetwork":
     if found:
         raise Findings(found)
     return network
-
-
-def networks_of(tree: Path) -> "dict[str, TaskNetwork]":
-    """The networks that a tree names, by these names. Raises `Findings`."""
-    return {
-        element.attributes["network"]: load_network(_path(tree, element), (shown(tree), element.line))
-        for element in _nodes(tree)
-    }
 
 
 def check_networks(tree: Path) -> None:
@@ -59,7 +50,7 @@ def _named(tree: Path, element: Element) -> "TaskNetwork":
 
 def _nodes(tree: Path) -> list[Element]:
     """The nodes of a tree that plan in a network. The name of each is a literal: its children depend on it."""
-    found = [element for element in read_elements(tree).walk() if element.tag == _TAG]
+    found = network_nodes(tree)
     for element in found:
         if "{" in element.attributes.get("network", ""):
             message = f"{element.label}: network is a key; write the network's name, which decides what children it has"

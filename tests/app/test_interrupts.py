@@ -80,7 +80,9 @@ def result() -> dict[str, Any]:
     return read
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize(
+    "number", [signal.SIGINT, *(pytest.param(n, marks=pytest.mark.slow) for n in (signal.SIGTERM, signal.SIGHUP))]
+)
 def test_six_signals_at_once_leave_a_whole_record(start: Started, number: int) -> None:
     process = start("Goes")
     until(goes_on, process)
@@ -125,7 +127,7 @@ def test_a_run_that_is_killed_in_a_first_tick_names_the_leaf(start: Started) -> 
     assert "hang: its tick at 0.00 s has not ended" in explanation(read_record(Path("run")), 80)
 
 
-@pytest.mark.parametrize("leaf", ["Hangs", "HangsDeaf"])
+@pytest.mark.parametrize("leaf", [pytest.param("Hangs", marks=pytest.mark.slow), "HangsDeaf"])
 def test_a_run_that_hangs_is_stopped_at_the_wall_limit(start: Started, leaf: str) -> None:
     process = start(leaf, "--wall-limit", "15")
     out, told = process.communicate(timeout=PATIENCE)

@@ -2,7 +2,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import RigidTransform, Rotation
 
@@ -17,6 +17,7 @@ from regrasp.motion.scene.collision import CollisionModel
 LENGTH, RADIUS = 0.09, 0.01
 
 
+@settings(max_examples=25, deadline=None)  # each looks at a thousand grasps
 @given(st.tuples(*(st.floats(-1, 1) for _ in range(4))).filter(lambda q: sum(x * x for x in q) > 0.1))
 def test_jaws_close_across_the_connector(quaternion: tuple[float, ...]) -> None:
     connector = RigidTransform.from_components([0.3, 0.1, 0.2], Rotation.from_quat(quaternion))
