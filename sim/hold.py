@@ -112,6 +112,10 @@ class Catch:
             self._hold.release()
             self._hold = None
 
+    def stick(self, force: float) -> None:
+        """Let go at this force (N) from now on."""
+        self._limit = force
+
     def step(self) -> None:
         """Check the force; call after every physics step."""
         if self._hold is None:

@@ -120,7 +120,8 @@ class _Planned:
         """The plan in the format asked for."""
         root, actions = self._plan.root, self._plan.actions
         if self._form == "text":
-            doing = f"{len(actions)} actions: {', '.join(actions)}" if actions else "nothing is left to do"
+            count = f"{len(actions)} action{'s' if len(actions) > 1 else ''}"
+            doing = f"{count}: {', '.join(actions)}" if actions else "nothing is left to do"
             return "\n".join([*root.lines(), doing, ""]).encode()
         if self._form == "json":
             answer: dict[str, Any] = {"state": self._state, "actions": [*actions], "network": _as_json(root)}

@@ -60,6 +60,28 @@ class LookAtHandle(PrinterLeaf):
         self.say("saw the handle", position=place.round(4).tolist(), off=off.round(4).tolist())
 
 
+class FindDoor(LookAtHandle):
+    """Looks for the handle where the door is believed to stand, then where it stands closed, and wide open.
+
+    The door is taken to stand where the handle is seen; the leaf fails if it is seen nowhere.
+    """
+
+    def steps(self) -> LeafSteps:
+        """See the class."""
+        motion, travel = self.services.motion, self.services.known.printer.door.travel
+        for opening in (motion.door_opening, 0.0, travel):
+            motion.believe_door(opening)
+            try:
+                yield from super().steps()
+            except LeafFailed as error:
+                failed = error
+                if error.code != PrinterCause.HANDLE_NOT_FOUND:
+                    raise
+            else:
+                return
+        raise failed
+
+
 class ReachHandle(PrinterLeaf):
     """Brings the open gripper `standoff` m before the handle, then straight round it.
 

@@ -80,12 +80,24 @@ class ApproachPart(PrinterLeaf):
 
 
 class TakePart(PrinterLeaf):
-    """Goes `deeper` m straight on and closes the gripper on the section; fails if it closes on nothing."""
+    """Goes `deeper` m straight on and closes the gripper on the section; fails if it closes on nothing.
+
+    Where `free` says so the part is free, alone or with its plate: it then counts as a part of the arm.
+    """
 
     INPUT_PORTS: ClassVar[dict[str, Any]] = {
-        "deeper": LeafPort(data_type=float, above=0.0, description="m from the goal to the grasp")
+        "deeper": LeafPort(data_type=float, above=0.0, description="m from the goal to the grasp"),
+        "free": LeafPort(
+            data_type=str,
+            required=False,
+            default_value="no",
+            names="free",
+            description="no: it is still on its plate in the printer; part: it is; both: it is, and on its plate",
+        ),
     }
 
     def steps(self) -> LeafSteps:
         """See the class."""
         yield self.with_hand(self.services.motion.take_part(self.hand, self.get_input("deeper")))
+        held = {"part": ("part", "section"), "both": ("plate", "part", "section")}.get(self.get_input("free"), ())
+        self.services.motion.believe_held(self.hand, held)

@@ -33,6 +33,8 @@ class PrinterServices(Services):
         opening = self.motion.door_opening
         near_end = 0.05 * door.travel
         out = {"door": "closed" if opening < near_end else "open" if opening > door.travel - near_end else "ajar"}
+        if state.get("door") == "unknown":
+            out = {}
         if state.get("hand") == "full" and not self.motion.holds(self.known.printer.hand, section.size[1]):
             lost = {name: "lost" for name in ("plate", "part") if state.get(name) == "hand"}
             out |= {"hand": "empty", **lost}

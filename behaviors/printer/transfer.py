@@ -3,6 +3,8 @@
 import math
 from typing import Any, ClassVar
 
+from py_trees.common import Status
+
 from regrasp.behaviors.leaf import LeafFailed, LeafPort, LeafSteps
 from regrasp.behaviors.printer.leaf import PrinterLeaf
 from regrasp.interfaces.printer.actions import ClampGoal, GripperGoal, RailGoal
@@ -118,6 +120,17 @@ class TwistPart(PrinterLeaf):
     def steps(self) -> LeafSteps:
         """See the class."""
         yield self.with_hand(self.services.motion.twist(self.hand, math.radians(self.get_input("angle_deg"))))
+
+
+class ForgetHeld(PrinterLeaf):
+    """Takes what the gripper has lost to be where it lost it."""
+
+    RETURNS = frozenset({Status.SUCCESS})
+
+    def steps(self) -> LeafSteps:
+        """See the class."""
+        self.services.motion.believe_lost(self.hand)
+        yield from ()
 
 
 class ReleasePart(PrinterLeaf):

@@ -64,4 +64,37 @@ class PartTaken(Fault):
     type: Literal["part_taken"] = Field(description="This fault.", examples=["part_taken"])
 
 
-FAULTS: tuple[type[Fault], ...] = (DoorJams, HandleMoves, PartFloats, PartKnocked, PartTaken)
+class BondBreaks(Fault):
+    """The bond between the printed part and its plate breaks; neither is pushed."""
+
+    type: Literal["bond_breaks"] = Field(description="This fault.", examples=["bond_breaks"])
+
+
+class PlateSticks(Fault):
+    """The catch holds the plate harder than it should."""
+
+    type: Literal["plate_sticks"] = Field(description="This fault.", examples=["plate_sticks"])
+    force: Annotated[float, Field(gt=0, le=2000)] = Field(
+        default=15.0, description="Newtons along x at which it lets go then.", examples=[15.0]
+    )
+
+
+class DoorCloses(Fault):
+    """Somebody closes the door."""
+
+    type: Literal["door_closes"] = Field(description="This fault.", examples=["door_closes"])
+    force: Annotated[float, Field(gt=0, le=200)] = Field(
+        default=20.0, description="Newtons at most with which it is pushed.", examples=[20.0]
+    )
+
+
+FAULTS: tuple[type[Fault], ...] = (
+    BondBreaks,
+    DoorCloses,
+    DoorJams,
+    HandleMoves,
+    PartFloats,
+    PartKnocked,
+    PartTaken,
+    PlateSticks,
+)

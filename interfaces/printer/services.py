@@ -99,6 +99,18 @@ class PrinterMotionService(MotionService, Protocol):
         """Bring what the hand holds straight on by (3,) m; it may touch the things of these names, and its plate."""
         ...
 
+    def believe_held(self, arm: str, names: "Collection[str]") -> None:
+        """The hand holds the things of these names as they lie now: they go with it, and count as a part of the arm."""
+        ...
+
+    def believe_lost(self, arm: str) -> None:
+        """The hand has lost what it held: each thing is taken to be where the hand lost it, from now on."""
+        ...
+
+    def believe_door(self, opening: float) -> None:
+        """Keep clear of the door as it stands `opening` m open, from now on."""
+        ...
+
     def holds(self, arm: str, thickness: float) -> bool:
         """Whether the pads stand as far apart as a thing of `thickness` m asks for that they hold."""
         ...

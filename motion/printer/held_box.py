@@ -14,7 +14,7 @@ class HeldBox:
     """
 
     def __init__(self, box: Box, tool_from_box: RigidTransform, spacing: float) -> None:
-        self.box, self._tool_from_box = box, tool_from_box
+        self.box, self.tool_from_box = box, tool_from_box
         size = np.array(box.size)
         counts = np.ceil(size / spacing).astype(int)
         cell = size / counts
@@ -25,7 +25,7 @@ class HeldBox:
 
     def placed(self, world_from_tool: RigidTransform) -> Box:
         """The box with its edges along the world's axes that encloses it where the hand is."""
-        pose = world_from_tool * self._tool_from_box
+        pose = world_from_tool * self.tool_from_box
         size = np.abs(pose.rotation.as_matrix()) @ np.array(self.box.size)
         center, edges = pose.translation.tolist(), size.tolist()
         return self.box.model_copy(update={"center": tuple(center), "size": tuple(edges)})

@@ -69,8 +69,14 @@ class TransferMotion(PrinterMotion):
         spared = self.things(["plate_bed"])
 
         def steps() -> Iterator[None]:
+            stood, section = [*self._fixed], self._section
             self.believe_held(arm, ("plate", "part", "section"))
-            yield from self._holding(arm, self._shift(arm, way, without=spared, contact=self._guard.drawing))
+            try:
+                yield from self._holding(arm, self._shift(arm, way, without=spared, contact=self._guard.drawing))
+            except GraspEmptyError:  # the plate was stuck, so all is still in the printer
+                self._held[arm], self._fixed, self._section = [], stood, section
+                self.believe_door(self.door_opening)
+                raise
 
         return self._together(arm, steps())
 
@@ -99,6 +105,14 @@ class TransferMotion(PrinterMotion):
         gap, slack = self.grippers[arm].reading().gap, self.parameters.execution.jaw.grip.gap.tolerance
         return thickness - slack < gap < 2.0 * thickness
 
+    def believe_lost(self, arm: str) -> None:
+        """The hand has lost what it held: each thing is taken to be where the hand lost it, from now on."""
+        held = {thing.box.name: thing for thing in self._held.get(arm, [])}
+        if "section" in held:
+            section = self.tool(arm) * held["section"].tool_from_box
+            self._section = RigidTransform.from_components(section.translation, self.tool(arm).rotation)
+        self.believe_placed(arm, held)
+
     def grip_part(self, arm: str) -> Request[float]:
         """Close the jaw on the section between the pads, and give way to it; the part then counts as held.
 
@@ -108,6 +122,7 @@ class TransferMotion(PrinterMotion):
         values, thickness = self.parameters, self.known.printer.part.section.size[1]
 
         def steps() -> Generator[None, None, float]:
+            self.believe_lost(arm)
             yield from self.execution.close_jaw(arm, thickness, force=values.first_force)
             yield from self._give_way(arm)
             yield from self.execution.press_jaw(arm, values.twist_force)

@@ -77,6 +77,12 @@ class SimDoor:
             self.body, _DOOR, p.VELOCITY_CONTROL, targetVelocity=0.0, force=friction, physicsClientId=self._client
         )
 
+    def push(self, speed: float, force: float) -> None:
+        """Push it along y with this speed (m/s) and at most this force (N) from now on, until `rub` is called."""
+        p.setJointMotorControl2(
+            self.body, _DOOR, p.VELOCITY_CONTROL, targetVelocity=speed, force=force, physicsClientId=self._client
+        )
+
     def shift_handle(self, by: float) -> None:
         """Hold the handle `by` m along the door from where it was mounted, from now on."""
         p.setJointMotorControl2(

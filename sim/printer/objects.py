@@ -5,7 +5,16 @@ from collections.abc import Mapping
 import numpy as np
 
 from regrasp.interfaces.printer.cell import PrinterCell
-from regrasp.interfaces.printer.fault import DoorJams, HandleMoves, PartFloats, PartKnocked, PartTaken
+from regrasp.interfaces.printer.fault import (
+    BondBreaks,
+    DoorCloses,
+    DoorJams,
+    HandleMoves,
+    PartFloats,
+    PartKnocked,
+    PartTaken,
+    PlateSticks,
+)
 from regrasp.sim.engine import Engine
 from regrasp.sim.faults.effects import Effect, TaskEffects
 from regrasp.sim.faults.faults import TriggerState
@@ -69,7 +78,27 @@ class PrinterObjects(TaskObjects):
         def taken(*_: object) -> Effect:
             return Effect(self.part.take_away)
 
-        return {DoorJams: jams, HandleMoves: moves, PartKnocked: knocked, PartFloats: floats, PartTaken: taken}
+        def breaks(*_: object) -> Effect:
+            return Effect(lambda: self.part.float_off(None))
+
+        def sticks(fault: PlateSticks, *_: object) -> Effect:
+            return Effect(lambda: self.part.catch.stick(fault.force))
+
+        def closes(fault: DoorCloses, *_: object) -> Effect:
+            speed, usual = 0.3, self.cell.hidden.printer.door_friction
+            seconds = self.cell.known.printer.door.travel / speed + 0.5
+            return Effect(lambda: self.door.push(-speed, fault.force), lambda: self.door.rub(usual), seconds=seconds)
+
+        return {
+            BondBreaks: breaks,
+            DoorCloses: closes,
+            DoorJams: jams,
+            HandleMoves: moves,
+            PartFloats: floats,
+            PartKnocked: knocked,
+            PartTaken: taken,
+            PlateSticks: sticks,
+        }
 
     def after_step(self) -> None:
         """See `TaskObjects`: the catch or the bond may let go."""
