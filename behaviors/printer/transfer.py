@@ -13,6 +13,9 @@ from regrasp.interfaces.printer.cause import PrinterCause
 _CLAMP = ("clamp_bed", "clamp_left", "clamp_right")
 _TRAY = ("tray", "tray_back", "tray_front", "tray_left", "tray_right", "desk")
 
+SOFT = 3.0  # N a finger with which it presses before it opens; choice
+STEPS = (0.001, 0.003, 0.006)  # m wider than the section that it opens at first; choice
+
 
 class DrawOutPart(PrinterLeaf):
     """Draws the part that the gripper holds out of the printer, with its plate, straight by `distance` m."""
@@ -134,7 +137,10 @@ class ForgetHeld(PrinterLeaf):
 
 
 class ReleasePart(PrinterLeaf):
-    """Opens the gripper to `gap` m: the part stays where it is."""
+    """Opens the gripper to `gap` m: the part stays where it is.
+
+    It presses softly first and opens in small steps: pads that spring off a part that floats push it away.
+    """
 
     INPUT_PORTS: ClassVar[dict[str, Any]] = {
         "gap": LeafPort(data_type=float, above=0.0, description="m between the pads")
@@ -142,5 +148,9 @@ class ReleasePart(PrinterLeaf):
 
     def steps(self) -> LeafSteps:
         """See the class."""
-        yield self.services.gripper.send(GripperGoal(self.get_input("gap")))
+        gap, thickness = self.get_input("gap"), self.services.known.printer.part.section.size[1]
+        yield self.services.gripper.send(GripperGoal(force=SOFT))
+        for wider in STEPS:
+            yield self.services.gripper.send(GripperGoal(min(thickness + wider, gap)))
+        yield self.services.gripper.send(GripperGoal(gap))
         self.services.motion.believe_placed(self.hand, ["plate", "part", "section"])
