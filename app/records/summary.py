@@ -87,9 +87,13 @@ def measured_lines(result: "Result") -> Iterator[str]:
 
 
 def event_words(event: str, values: Mapping[str, Any]) -> str:
-    """An event's name, and its values as name=value."""
-    told = ", ".join(f"{name}={_short(value)}" for name, value in values.items())
+    """An event's name, and its values as name=value, but for mappings and lists of words, which are for programs."""
+    told = ", ".join(f"{name}={_short(value)}" for name, value in values.items() if not _structured(value))
     return f"{event}: {told}" if told else event
+
+
+def _structured(value: object) -> bool:
+    return isinstance(value, dict) or (isinstance(value, list) and any(isinstance(item, str) for item in value))
 
 
 def _short(value: object) -> str:

@@ -55,22 +55,47 @@ def timeline(
     by_node: dict[str, list[Event]] = {}
     for event in events:
         by_node.setdefault(event.node, []).append(event)
+    inner = _inner_events(attempts, events)
     for _, same in groupby(_rounds(attempts, history), key=_Round.signature):
         first, *more = same
         shown, again = headings.reopened(first)
         for attempt in first.attempts:
             above, open_now = 0, headings.of(attempt)
             for depth, heading in enumerate(open_now):
+                yield from _due(inner, "/".join(heading), attempt.started, open_now, width)
                 if shown[: len(heading)] != heading:
                     note = f"  again, round {first.number}" if heading == again else ""
                     yield f"{'':{TIME_COLUMNS}}{'  ' * depth}{'/'.join(heading[above:])}{note}"
                 above = len(heading)
             shown = open_now[-1] if open_now else ()
+            yield from _due(inner, attempt.path, attempt.started, open_now, width)
             own = by_node.get(attempt.path, [])
             yield from _lines(attempt, above, len(open_now), own, width, parameters.max_events)
         if more:
             begin, end = more[0].attempts[0].started, max(a.ended for a in more[-1].attempts)
             yield f"{begin:8.2f} {end:8.2f}  and the same again, {len(more)} more time{'s' * (len(more) > 1)}"
+            inner = [event for event in inner if event.t > end]
+    for event in inner:
+        yield from _event_lines(event, 0, width)
+
+
+def _inner_events(attempts: Sequence[Attempt], events: Sequence[Event]) -> list[Event]:
+    """The events of nodes that have children, such as a plan that was made."""
+    leaves = {attempt.path for attempt in attempts}
+    above = {path[:end] for path in leaves for end, character in enumerate(path) if character == "/"}
+    return [event for event in events if event.node in above and event.event not in SHOWN_ELSEWHERE]
+
+
+def _due(inner: list[Event], path: str, until: float, headings: Sequence[PathParts], width: int) -> Iterator[str]:
+    """Take out of `inner`, and tell, the events up to that second of nodes above `path`."""
+    while inner and inner[0].t <= until and path.startswith(f"{inner[0].node}/"):
+        event = inner.pop(0)
+        depth = sum(event.node.startswith("/".join(heading)) for heading in headings)
+        yield from _event_lines(event, depth, width)
+
+
+def _event_lines(event: Event, depth: int, width: int) -> list[str]:
+    return wrapped(f"{event.t:.2f} s {event_text(event)}", width, " " * (TIME_COLUMNS + 2 * depth))
 
 
 def _rounds(attempts: Sequence[Attempt], history: NodeHistory) -> Iterator[_Round]:

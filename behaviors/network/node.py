@@ -10,7 +10,7 @@ from py_trees.ports import PortsMixin
 
 from regrasp.behaviors.keys import CAUSES
 from regrasp.behaviors.leaf import LeafPort, WithServices
-from regrasp.behaviors.network.planner import NoPlanError, plan
+from regrasp.behaviors.network.planner import plan
 from regrasp.interfaces.cause import Cause, CauseCode
 
 
@@ -85,11 +85,12 @@ class DoTask(WithServices, PortsMixin, Composite):
             return self._give_up(CauseCode.TOO_MANY_TRIES, f"planned {self._plans} times; {self._why}")
         try:
             made = plan(self.network, self.state, self.get_input("task") or None)
-        except NoPlanError as error:
+        except ValueError as error:  # no plan, or the robot sees what cannot be
             return self._give_up(CauseCode.NO_PLAN, str(error))
         self._plans += 1
         self._todo = [*made.actions]
-        self.say("planned", because=self._why, state=dict(self.state), network=[*made.root.lines()])
+        actions = " ".join(self._todo) or "none"
+        self.say("planned", because=self._why, actions=actions, state=dict(self.state), network=[*made.root.lines()])
         self._why = ""
         return None
 

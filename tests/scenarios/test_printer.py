@@ -6,8 +6,10 @@ from typing import Any
 
 import pytest
 import yaml
+from typer.testing import CliRunner
 
 import regrasp
+from regrasp.app.cli.commands import app
 from regrasp.app.files.findings import Findings
 from regrasp.app.files.resources import shipped
 from regrasp.app.scenario.load import load_scenario
@@ -49,6 +51,16 @@ def test_the_part_is_taken_by_each_approach(approach: str, tmp_path: Path) -> No
     result = regrasp.run(scenario, seed=4, out=tmp_path / "run")
     assert result.succeeded, [str(e) for e in result.expectations]
     assert result.measured["part_held"] is True
+
+
+@pytest.mark.parametrize("gravity", ["zero", pytest.param("earth", marks=pytest.mark.slow)])
+def test_the_whole_job_is_done_as_it_was_planned(gravity: str, tmp_path: Path) -> None:
+    scenario = load_scenario("printer_part", [f"gravity={gravity}", "cell=habitat_open"])
+    result = regrasp.run(scenario, seed=4, out=tmp_path / "run")
+    assert result.succeeded, [str(e) for e in result.expectations]
+    told = CliRunner().invoke(app, ["explain", str(tmp_path / "run")]).stdout
+    plan = "take_part draw_out put_into_clamp grip_part twist_off put_into_tray close_door"
+    assert f"planned: because=the task begins, actions={plan}" in " ".join(told.split())
 
 
 def test_an_approach_that_there_is_not_is_found_by_the_check(tmp_path: Path) -> None:

@@ -212,3 +212,19 @@ def test_an_open_clamp_leaves_the_plate_alone(cell: PrinterCell, engine: Engine)
         at = p.getLinkState(clamp.body, jaw, physicsClientId=engine.client)[0]
         face = side * (at[1] - spec.center[1]) + 0.5 * spec.jaw_size[1]
         assert -face - 0.5 * plate.size[1] == pytest.approx(spec.stroke, abs=1e-6)
+
+
+def test_the_clamp_brings_a_plate_to_its_middle_and_holds_it_there(
+    cell: PrinterCell, engine: Engine, part: SimPart
+) -> None:
+    part.catch.release()
+    part.bond.release()
+    clamp, middle = SimClamp(engine.client, cell.known.printer, cell.hidden.printer), cell.known.printer.clamp.center
+    beside = [middle[0], middle[1] + 0.006, middle[2]]
+    p.resetBasePositionAndOrientation(part.plate, beside, [0, 0, 0, 1], physicsClientId=engine.client)
+    p.resetBasePositionAndOrientation(part.part, [0, 0, 3], [0, 0, 0, 1], physicsClientId=engine.client)
+    clamp.close()
+    for _ in range(10 * engine.step_rate):
+        engine.step()
+    assert part.pose(part.plate).translation == pytest.approx(middle, abs=5e-4)
+    assert clamp.presses(part.plate)
