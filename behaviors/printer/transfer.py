@@ -37,8 +37,13 @@ class _Over(PrinterLeaf):
         "beside": LeafPort(data_type=float, description="m along y from the place to the arm's base"),
     }
 
-    def over(self, thing: str, place: tuple[float, float, float], may_touch: tuple[str, ...]) -> LeafSteps:
-        """Bring the middle of the thing in the hand `above` a place (3,) m, from where it can go straight down."""
+    def over(
+        self, thing: str, place: tuple[float, float, float], may_touch: tuple[str, ...], back: float = 0.0
+    ) -> LeafSteps:
+        """Bring the middle of the thing in the hand `above` a place (3,) m.
+
+        From there it can go straight down, and the hand then `back` m straight back.
+        """
         import numpy as np  # late: a tree's check needs no numpy
         from scipy.spatial.transform import RigidTransform
 
@@ -47,7 +52,8 @@ class _Over(PrinterLeaf):
         yield self.services.rail.send(RailGoal(place[1] + self.get_input("beside") - base[1]))
         goal = motion.held_goal(self.hand, thing, np.add(place, [0.0, 0.0, above]))
         down = RigidTransform.from_translation([0.0, 0.0, -above])
-        yield self.with_arm(motion.carry(self.hand, goal, [down], may_touch))
+        away = down * RigidTransform.from_translation([-back, 0.0, 0.0])
+        yield self.with_arm(motion.carry(self.hand, goal, [down, away], may_touch))
 
 
 class PlateOverClamp(_Over):
@@ -59,14 +65,23 @@ class PlateOverClamp(_Over):
 
 
 class PartOverTray(_Over):
-    """Carries the part over the tray, with the arm's base `beside` it, to where it can go straight down."""
+    """Carries the part over the tray, with the arm's base `beside` it.
+
+    From there it can go straight down, and the hand then `back` m straight back.
+    """
+
+    INPUT_PORTS: ClassVar[dict[str, Any]] = _Over.INPUT_PORTS | {
+        "back": LeafPort(data_type=float, above=0.0, description="m that the hand will draw back")
+    }
 
     def steps(self) -> LeafSteps:
         """See the class."""
         printer = self.services.known.printer
         tray = next(box for box in self.services.known.boxes if box.name == "tray")
         top = tray.center[2] + 0.5 * tray.size[2]
-        yield from self.over("part", (tray.center[0], tray.center[1], top + 0.5 * printer.part.size[2]), _TRAY)
+        yield from self.over(
+            "part", (tray.center[0], tray.center[1], top + 0.5 * printer.part.size[2]), _TRAY, self.get_input("back")
+        )
 
 
 class MoveHeld(PrinterLeaf):

@@ -46,6 +46,8 @@ class PrinterMotionParameters(MotionParameters):
     most_give: float = 0.001  # m at most at once; choice: the arm is off by 2 mm
     gives: int = 10  # times at most
     give_time: float = 0.1  # s until the efforts are read again
+    first_force: float = 8.0  # N a finger at first: the finger that comes first pushes a part whose bond bears a twist
+    # of 0.6 N m, 25 mm off its axis; choice
     part_force: float = 20.0  # N a finger: the pads hold 24 N by friction, and its catch lets go of the plate at 6 N
     servo: ServoParameters = field(default_factory=ServoParameters)
     sphere_spacing: float = 0.016  # m between the spheres that stand for what the hand holds; choice
@@ -269,8 +271,8 @@ class PrinterMotion(Motion):
     def take_part(self, arm: str, deeper: float) -> Request[float]:
         """Go straight on by `deeper` m, close the jaw on the part's section, and let the hand give way to it.
 
-        Gently, and the hand gives way as at the door: part and plate give way to little. The answer is the gap (m)
-        between the pads. It fails as `shift` and `close` do.
+        Gently at first, and the hand gives way as at the door: part and plate give way to little. The answer is the gap
+        (m) between the pads. It fails as `shift` and `close` do.
         """
         positive("the way", deeper)
         thickness = self.known.printer.part.section.size[1]
@@ -278,11 +280,16 @@ class PrinterMotion(Motion):
         def steps() -> Generator[None, None, float]:
             way = self.tool(arm).rotation.apply([deeper, 0.0, 0.0])
             yield from self._done(self.shift(arm, way, without=self.things(PART_AND_BED)))
-            yield from self.execution.close_jaw(arm, thickness, force=self.parameters.part_force)
-            yield from self._give_way(arm)
+            yield from self._grip(arm, thickness, self.parameters.part_force)
             return self.grippers[arm].reading().gap
 
         return self._together(arm, steps())
+
+    def _grip(self, arm: str, thickness: float, force: float) -> Iterator[None]:
+        """Close on the part gently, give way to it, then press with `force` N a finger."""
+        yield from self.execution.close_jaw(arm, thickness, force=self.parameters.first_force)
+        yield from self._give_way(arm)
+        yield from self.execution.press_jaw(arm, force)
 
     def tool_at(self, frame: RgbdFrame) -> RigidTransform:
         """world_from_tool at the exposure of a frame of the camera on an arm, by the encoders."""
@@ -306,7 +313,7 @@ class PrinterMotion(Motion):
                 try:
                     yield from self._done(self._shift(arm, back, without=without, contact=self._guard.drawing))
                 except PlanningError as error:
-                    if error.code not in NO_WAY or isinstance(error, TouchError):
+                    if error.code not in (*NO_WAY, CauseCode.OUT_OF_REACH) or isinstance(error, TouchError):
                         raise
                     why = str(error)
                 else:

@@ -27,7 +27,6 @@ from regrasp.motion.robots.tool_force import tool_wrench
 class TransferParameters(PrinterMotionParameters):
     """Those of the door and of the grasp, and how the part is carried and twisted off."""
 
-    first_force: float = 8.0  # N a finger, until the hand has given way: 25 mm off its axis the bond bears 24; choice
     twist_force: float = 40.0  # N a finger: pads 22 mm deep turn with 0.9 N m at most, and the bond bears 0.6; choice
     twist_steps: int = 4  # straight lines that stand for the arc: of 40 degrees 25 mm out it is 0.1 mm off
     bond_left: float = 0.25  # N m about the bond's axis that say that it holds still; choice: it bears 0.6, drives err
@@ -123,9 +122,7 @@ class TransferMotion(PrinterMotion):
 
         def steps() -> Generator[None, None, float]:
             self.believe_lost(arm)
-            yield from self.execution.close_jaw(arm, thickness, force=values.first_force)
-            yield from self._give_way(arm)
-            yield from self.execution.press_jaw(arm, values.twist_force)
+            yield from self._grip(arm, thickness, values.twist_force)
             self.believe_held(arm, ("part", "section"))
             return self.grippers[arm].reading().gap
 
