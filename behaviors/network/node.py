@@ -24,7 +24,7 @@ class DoTask(WithServices, PortsMixin, Composite):
 
     INPUT_PORTS: ClassVar[dict[str, Any]] = {
         "network": LeafPort(data_type=str, description="the network: a shipped one's name, or a path to a .yaml file"),
-        "task": LeafPort(data_type=str, required=False, default_value="", description="default: the network's goal"),
+        "task": LeafPort(data_type=str, required=False, default_value="", description="the task, by default the goal"),
         "replans": LeafPort(data_type=int, required=False, default_value=8, least=0, description="new plans at most"),
     }
     OUTPUT_PORTS: ClassVar[dict[str, Any]] = {}

@@ -69,7 +69,8 @@ class TransferMotion(PrinterMotion):
 
         def steps() -> Iterator[None]:
             stood, section = [*self._fixed], self._section
-            self.believe_held(arm, ("plate", "part", "section"))
+            if not self._held.get(arm):  # else it goes on where it was stopped
+                self.believe_held(arm, ("plate", "part", "section"))
             try:
                 yield from self._holding(arm, self._shift(arm, way, without=spared, contact=self._guard.drawing))
             except GraspEmptyError:  # the plate was stuck, so all is still in the printer
