@@ -7,14 +7,11 @@ from py_trees.common import Status
 
 from regrasp.behaviors.leaf import LeafFailed, LeafPort, LeafSteps
 from regrasp.behaviors.printer.leaf import PrinterLeaf
-from regrasp.interfaces.printer.actions import ClampGoal, GripperGoal, RailGoal
+from regrasp.interfaces.printer.actions import ClampGoal, RailGoal
 from regrasp.interfaces.printer.cause import PrinterCause
 
 _CLAMP = ("clamp_bed", "clamp_left", "clamp_right")
 _TRAY = ("tray", "tray_back", "tray_front", "tray_left", "tray_right", "desk")
-
-SOFT = 3.0  # N a finger with which it presses before it opens; choice
-STEPS = (0.001, 0.003, 0.006)  # m wider than the section that it opens at first; choice
 
 
 class DrawOutPart(PrinterLeaf):
@@ -152,10 +149,7 @@ class ForgetHeld(PrinterLeaf):
 
 
 class ReleasePart(PrinterLeaf):
-    """Opens the gripper to `gap` m: the part stays where it is.
-
-    It presses softly first and opens in small steps: pads that spring off a part that floats push it away.
-    """
+    """Opens the gripper to `gap` m, softly: the part stays where it is."""
 
     INPUT_PORTS: ClassVar[dict[str, Any]] = {
         "gap": LeafPort(data_type=float, above=0.0, description="m between the pads")
@@ -163,9 +157,4 @@ class ReleasePart(PrinterLeaf):
 
     def steps(self) -> LeafSteps:
         """See the class."""
-        gap, thickness = self.get_input("gap"), self.services.known.printer.part.section.size[1]
-        yield self.services.gripper.send(GripperGoal(force=SOFT))
-        for wider in STEPS:
-            yield self.services.gripper.send(GripperGoal(min(thickness + wider, gap)))
-        yield self.services.gripper.send(GripperGoal(gap))
-        self.services.motion.believe_placed(self.hand, ["plate", "part", "section"])
+        yield self.with_hand(self.services.motion.release_part(self.hand, self.get_input("gap")))

@@ -119,6 +119,10 @@ class PrinterMotionService(MotionService, Protocol):
         """Close the jaw on the section between the pads; the part then counts as held. The answer is the gap (m)."""
         ...
 
+    def release_part(self, arm: str, gap: float) -> Request[None]:
+        """Open the jaw softly to `gap` m; what the hand held then counts as lying where it is."""
+        ...
+
     def twist(self, arm: str, angle: float) -> Request[None]:
         """Turn the held part by an angle (rad) about the upright axis through its middle, and back."""
         ...

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from regrasp.interfaces.arguments import finite, positive, vector
+from regrasp.interfaces.arguments import finite, not_negative, positive, vector
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.devices import Arm, Clock, Gripper
@@ -28,6 +28,9 @@ class TransferParameters(PrinterMotionParameters):
     """Those of the door and of the grasp, and how the part is carried and twisted off."""
 
     twist_force: float = 40.0  # N a finger: pads 22 mm deep turn with 0.9 N m at most, and the bond bears 0.6; choice
+    no_gravity: float = 0.5  # m/s2 below which what is let go floats
+    soft_force: float = 3.0  # N a finger before the hand lets go of what floats; choice
+    opening_steps: tuple[float, ...] = (0.001, 0.003, 0.006)  # m wider than the section that it opens at first; choice
     twist_steps: int = 4  # straight lines that stand for the arc: of 40 degrees 25 mm out it is 0.1 mm off
     bond_left: float = 0.25  # N m about the bond's axis that say that it holds still; choice: it bears 0.6, drives err
 
@@ -126,6 +129,25 @@ class TransferMotion(PrinterMotion):
             yield from self._grip(arm, thickness, values.twist_force)
             self.believe_held(arm, ("part", "section"))
             return self.grippers[arm].reading().gap
+
+        return self._together(arm, steps())
+
+    def release_part(self, arm: str, gap: float) -> Request[None]:
+        """Open the jaw to `gap` m; what it held then counts as lying where it is.
+
+        Where there is no gravity it presses softly before that, and opens in small steps: pads that spring off a part
+        that floats push it away. Where there is some, a part that is held softly would slip.
+        """
+        values, thickness = self.parameters, self.known.printer.part.section.size[1]
+        not_negative("the gap", gap)
+
+        def steps() -> Iterator[None]:
+            if float(np.linalg.norm(self.arms[arm].gravity())) < values.no_gravity:
+                yield from self.execution.press_jaw(arm, values.soft_force)
+                for wider in values.opening_steps:
+                    yield from self.execution.set_jaw(arm, min(thickness + wider, gap))
+            yield from self.execution.set_jaw(arm, gap)
+            self.believe_lost(arm)
 
         return self._together(arm, steps())
 
