@@ -118,6 +118,7 @@ def test_a_second_ctrl_c_ends_a_leaf_that_hangs_in_its_first_tick_and_names_it(s
     assert [link["why"] for link in read["chain"]] == ["was still running"]
 
 
+@pytest.mark.slow
 def test_a_run_that_is_killed_in_a_first_tick_names_the_leaf(start: Started) -> None:
     process = start("Hangs")
     until(at_work, process)
@@ -141,6 +142,7 @@ def test_a_run_that_hangs_is_stopped_at_the_wall_limit(start: Started, leaf: str
         assert read["cause"]["node"] == "hang"
 
 
+@pytest.mark.slow
 def test_nohup_is_respected(start: Started) -> None:
     before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
     process = start("Goes")
@@ -151,7 +153,9 @@ def test_nohup_is_respected(start: Started) -> None:
     assert process.poll() is None
 
 
-@pytest.mark.parametrize("options", [("--wall-limit", "100"), ("--all", "--jobs", "1")])
+@pytest.mark.parametrize(
+    "options", [("--wall-limit", "100"), pytest.param(("--all", "--jobs", "1"), marks=pytest.mark.slow)]
+)
 def test_a_run_whose_parent_is_killed_ends_with_its_record(start: Started, options: tuple[str, ...]) -> None:
     process = start("Goes", *options)
     folder = Path("run") if "--all" not in options else Path("run/default")

@@ -93,7 +93,9 @@ def check_ticks(folder: Path, states: set[str]) -> None:
     ("scenario", "gravity", "states", "expected"),
     [
         ("no_obstacle", "zero", STATES, EXPECTED),
-        ("short_obstacle", "earth", STATES | {"spiral_search"}, EXPECTED | {"hidden"}),
+        pytest.param(
+            *("short_obstacle", "earth", STATES | {"spiral_search"}, EXPECTED | {"hidden"}), marks=pytest.mark.slow
+        ),
     ],
 )
 def test_a_demonstration_comes_out(

@@ -79,6 +79,7 @@ def cluster() -> Iterator[Cluster]:
             process.wait()
 
 
+@pytest.mark.slow
 def test_the_workers_of_a_scheduler_one_of_which_is_killed(
     tmp_path: Path, fresh: dict[str, Any], cluster: Cluster
 ) -> None:

@@ -46,7 +46,7 @@ def changed(path: Path, old: str, new: str) -> Path:
 
 def test_without_a_network_it_lists_the_shipped_ones() -> None:
     result = invoke()
-    assert (result.exit_code, result.stdout) == (0, "print_and_place\n")
+    assert (result.exit_code, result.stdout) == (0, "print_and_place\nstow_loose_ends\n")
 
 
 def test_a_shipped_network_from_another_state() -> None:

@@ -18,6 +18,7 @@ def test_an_arm_feels_an_unseen_block_presses_little_and_goes_round_it(gravity: 
     assert trial.halt_seconds < 0.3
 
 
+@pytest.mark.slow
 def test_the_same_trial_again_is_the_same() -> None:
     assert contact_trial("zero", 700) == contact_trial("zero", 700)
 
@@ -35,6 +36,7 @@ def test_figures_count_forces_and_name_the_greatest() -> None:
     assert figures["peak_force"]["max"] == 31.0
 
 
+@pytest.mark.slow
 def test_the_command_prints_a_table_and_writes_the_figures(tmp_path: Path) -> None:
     done = CliRunner().invoke(app, ["study", "contact", "--seeds", "704:705", "--jobs", "1", "--out", str(tmp_path)])
     assert done.exit_code == 0, done.output

@@ -155,6 +155,7 @@ def test_bad_input_is_one_line(arguments: list[str], told: str) -> None:
     assert len(result.stderr.splitlines()) == 1
 
 
+@pytest.mark.slow
 def test_a_folder_with_other_things_is_refused_and_left_alone(tmp_path: Path) -> None:
     (tmp_path / "pose.json").write_text("{}")
     result = CliRunner().invoke(app, ["study", "pose", "--out", str(tmp_path)])
