@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from py_trees.common import Status
+from py_trees.composites import Composite
 
 from regrasp.interfaces.quote import quoted
 from regrasp.trees.element import Element, key_of, read_elements
@@ -14,7 +15,7 @@ from regrasp.trees.run_stats import NodeStats
 from regrasp.trees.vocabulary import BUILT_IN
 from regrasp.trees.wiring import MAX_NODES, MAX_TREE_DEPTH
 
-NodeKind = Literal["sequence", "fallback", "parallel", "decorator", "action", "condition", "subtree"]
+NodeKind = Literal["sequence", "fallback", "parallel", "control", "decorator", "action", "condition", "subtree"]
 _COMPOSITES: dict[str, NodeKind] = {
     "Sequence": "sequence",
     "Fallback": "fallback",
@@ -233,6 +234,8 @@ def _name(kind: Any) -> str:
 
 
 def _leaf_kind(leaf: Any, element: Element) -> NodeKind:
+    if isinstance(leaf, type) and issubclass(leaf, Composite):
+        return "control"  # a composite that is not built in, as BehaviorTree.CPP calls it
     if element.children:
         return "decorator"
     at_once = getattr(leaf, "RETURNS", None) == {Status.SUCCESS, Status.FAILURE}  # an answer, with no work to wait for

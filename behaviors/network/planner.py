@@ -86,6 +86,7 @@ class _Decomposition:
         self._refused: dict[str, str] = {}  # why an action could not be done, by its name
 
     def plan(self, state: dict[str, str], task: str) -> Plan:
+        """See `plan` of the module."""
         gtpyhop = _gtpyhop()
         with contextlib.redirect_stdout(io.StringIO()):
             domain = gtpyhop.Domain("network")

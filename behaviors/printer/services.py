@@ -26,15 +26,15 @@ class PrinterServices(Services):
     clamp: "ClampDevice"
     arm_and_rail: "Turn"
     jaw: "Turn"
+    door_slack: float = 0.02  # m from its ends within which the door counts as closed or open; choice
 
     def seen(self, state: "State") -> dict[str, str]:
         """See `Services`: where the door stands, and whether the hand still holds what it took."""
         door, section = self.known.printer.door, self.known.printer.part.section
-        opening = self.motion.door_opening
-        near_end = 0.05 * door.travel
-        out = {"door": "closed" if opening < near_end else "open" if opening > door.travel - near_end else "ajar"}
-        if state.get("door") == "unknown":
-            out = {}
+        opening, out = self.motion.door_opening, {}
+        if state.get("door") != "unknown":
+            is_open = opening > door.travel - self.door_slack
+            out["door"] = "closed" if opening < self.door_slack else "open" if is_open else "ajar"
         if state.get("hand") == "full" and not self.motion.holds(self.known.printer.hand, section.size[1]):
             lost = {name: "lost" for name in ("plate", "part") if state.get(name) == "hand"}
             out |= {"hand": "empty", **lost}

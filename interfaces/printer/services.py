@@ -127,10 +127,6 @@ class PrinterMotionService(MotionService, Protocol):
         """Turn the held part by an angle (rad) about the upright axis through its middle, and back."""
         ...
 
-    def believe_placed(self, arm: str, names: "Collection[str]") -> None:
-        """What the hand held of these things stays where it is now."""
-        ...
-
     def draw_back(self, arm: str, distance: float) -> Request[None]:
         """Draw the hand straight back by `distance` m."""
         ...

@@ -33,7 +33,7 @@ TO_THE_PRINTER = Rotation.from_matrix([[-1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0,
 
 @dataclass(frozen=True)
 class PrinterMotionParameters(MotionParameters):
-    """Those of every task, and of the door."""
+    """Those of every task, of the door, and of the part."""
 
     straight_margin: float = 0.004  # the arm is off by 2 mm and its rail by 1 mm; what it takes has things close by
     slide_speed: float = 0.2  # share of the rail's speed with the door in hand; choice
@@ -49,6 +49,12 @@ class PrinterMotionParameters(MotionParameters):
     first_force: float = 8.0  # N a finger at first: the finger that comes first pushes a part whose bond bears a twist
     # of 0.6 N m, 25 mm off its axis; choice
     part_force: float = 20.0  # N a finger: the pads hold 24 N by friction, and its catch lets go of the plate at 6 N
+    twist_force: float = 40.0  # N a finger: pads 22 mm deep turn with 0.9 N m at most, and the bond bears 0.6; choice
+    no_gravity: float = 0.5  # m/s2 below which what is let go floats
+    soft_force: float = 3.0  # N a finger before the hand lets go of what floats; choice
+    opening_steps: tuple[float, ...] = (0.001, 0.003, 0.006)  # m wider than the section that it opens at first; choice
+    twist_steps: int = 4  # straight lines that stand for the arc: of 40 degrees 25 mm out it is 0.1 mm off
+    bond_left: float = 0.25  # N m about the bond's axis that say that it holds still; choice: it bears 0.6, drives err
     servo: ServoParameters = field(default_factory=ServoParameters)
     sphere_spacing: float = 0.016  # m between the spheres that stand for what the hand holds; choice
 

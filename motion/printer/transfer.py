@@ -1,7 +1,6 @@
 """Motions with the printed part in the hand: out of the printer, into the clamp, off its plate, and to the tray."""
 
-from collections.abc import Callable, Collection, Generator, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Generator, Iterator
 
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
@@ -9,48 +8,20 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from regrasp.interfaces.arguments import finite, not_negative, positive, vector
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cause import CauseCode
-from regrasp.interfaces.devices import Arm, Clock, Gripper
 from regrasp.interfaces.printer.cause import PrinterCause
-from regrasp.interfaces.printer.cell import PrinterKnown
 from regrasp.interfaces.quote import nearest, quoted
 from regrasp.interfaces.request import Request
 from regrasp.motion.failure import GraspEmptyError, PlanningError
 from regrasp.motion.grasping.gap_test import GripWatch
 from regrasp.motion.planning.straight import straight_lines
 from regrasp.motion.printer.held_box import HeldBox
-from regrasp.motion.printer.service import PrinterMotion, PrinterMotionParameters
+from regrasp.motion.printer.service import PrinterMotion
 from regrasp.motion.request import MotionRequest
 from regrasp.motion.robots.tool_force import tool_wrench
 
 
-@dataclass(frozen=True)
-class TransferParameters(PrinterMotionParameters):
-    """Those of the door and of the grasp, and how the part is carried and twisted off."""
-
-    twist_force: float = 40.0  # N a finger: pads 22 mm deep turn with 0.9 N m at most, and the bond bears 0.6; choice
-    no_gravity: float = 0.5  # m/s2 below which what is let go floats
-    soft_force: float = 3.0  # N a finger before the hand lets go of what floats; choice
-    opening_steps: tuple[float, ...] = (0.001, 0.003, 0.006)  # m wider than the section that it opens at first; choice
-    twist_steps: int = 4  # straight lines that stand for the arc: of 40 degrees 25 mm out it is 0.1 mm off
-    bond_left: float = 0.25  # N m about the bond's axis that say that it holds still; choice: it bears 0.6, drives err
-
-
 class TransferMotion(PrinterMotion):
     """Carries the part, with or without its plate. What the hand holds counts as a part of the arm."""
-
-    parameters: TransferParameters
-
-    def __init__(
-        self,
-        known: PrinterKnown,
-        arms: Mapping[str, Arm],
-        grippers: Mapping[str, Gripper],
-        clock: Clock,
-        seed: int,
-        parameters: TransferParameters = TransferParameters(),
-        on_anomaly: Callable[[str], None] = lambda sentence: None,
-    ) -> None:
-        super().__init__(known, arms, grippers, clock, seed, parameters, on_anomaly)
 
     def held_goal(self, arm: str, name: str, place: FloatArray) -> RigidTransform:
         """world_from_tool with which the held thing of this name has its middle at a place (3,) m, not turned.

@@ -6,8 +6,6 @@ from regrasp.interfaces.cell import Box
 from regrasp.interfaces.printer.cell import HiddenPrinter, KnownPrinter
 from regrasp.sim.bodies import box_shapes
 
-GEAR_FORCE = 2000.0  # N that the gear bears; choice: far more than the jaws press with
-
 
 class SimClamp:
     """Two jaws on slides along y, which a gear lets go in by the same way (a self-centring vise); they begin open.
@@ -17,7 +15,8 @@ class SimClamp:
 
     jaws = (0, 1)  # the first closes towards +y, the second towards -y
 
-    def __init__(self, client: int, known: KnownPrinter, hidden: HiddenPrinter) -> None:
+    def __init__(self, client: int, known: KnownPrinter, hidden: HiddenPrinter, gear_force: float = 2000.0) -> None:
+        """The gear bears `gear_force` N: choice, far more than the jaws press with."""
         self._client, self._hidden = client, hidden
         clamp, plate = known.clamp, known.plate
         size = clamp.jaw_size
@@ -65,7 +64,7 @@ class SimClamp:
             [0, 0, 0],
             physicsClientId=client,
         )
-        p.changeConstraint(gear, gearRatio=-1.0, maxForce=GEAR_FORCE, erp=0.8, physicsClientId=client)
+        p.changeConstraint(gear, gearRatio=-1.0, maxForce=gear_force, erp=0.8, physicsClientId=client)
         self.open()
 
     def close(self) -> None:

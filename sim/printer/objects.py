@@ -42,6 +42,10 @@ class PrinterObjects(TaskObjects):
         self.clamp = SimClamp(engine.client, known, hidden)
         self.door = SimDoor(engine.client, known.door, hidden)
 
+    def door_closed(self, slack: float = 0.01) -> bool:
+        """Whether the door is closed, to `slack` m."""
+        return self.door.opening < slack
+
     def part_in_tray(self, slow: float = 0.01, height: float = 0.10) -> bool:
         """Whether the part's middle is in the tray, up to `height` m over its floor, and no faster than `slow` m/s."""
         tray = next(box for box in self.cell.known.boxes if box.name == "tray")

@@ -12,6 +12,7 @@ from random_nodes import nodes
 from test_golden import features, features_with_run
 
 from regrasp import trees
+from regrasp.app.files.resources import shipped
 from regrasp.trees import Node, read_graph
 from regrasp.trees.export import FORMAT_OF_SUFFIX, FORMATS, export_tree
 
@@ -109,3 +110,14 @@ def test_json_and_ascii_tell_every_node(node: Node) -> None:
 
 def test_every_format_has_an_ending() -> None:
     assert set(FORMAT_OF_SUFFIX.values()) == set(FORMATS)
+
+
+def test_a_composite_that_is_not_built_in_is_a_control_node() -> None:
+    """Groot2 refuses a decorator with several children."""
+    graph = read_graph(shipped("tree")["printer_part"])
+    (node,) = (node for node in graph.walk() if node.type == "DoTask")
+    assert node.kind == "control"
+    model = ET.fromstring(export_tree(graph, "groot")).find("TreeNodesModel")
+    assert model is not None
+    assert [entry.get("ID") for entry in model.findall("Control")] == ["DoTask"]
+    assert b"control" in export_tree(graph, "svg")

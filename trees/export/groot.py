@@ -76,11 +76,13 @@ def _value(port: NodePort, is_main: bool) -> str:
 
 
 def _model(root: Node) -> ET.Element:
-    """The TreeNodesModel: leaves, decorators that Groot2 does not know, and the keys of subtrees."""
+    """The TreeNodesModel: leaves, composites and decorators that Groot2 does not know, and the keys of subtrees."""
     entries: dict[tuple[str, str], Node] = {}
     for node in root.walk():
         word = node.subtree or _tag_and_attributes(node, False)[0]
-        if node.kind in ("action", "condition", "subtree") or (node.kind == "decorator" and word not in _BUILT_IN):
+        if node.kind in ("action", "condition", "control", "subtree") or (
+            node.kind == "decorator" and word not in _BUILT_IN
+        ):
             kind = "SubTree" if node.kind == "subtree" else node.kind.capitalize()
             entries.setdefault((kind, word), node)
     model = ET.Element("TreeNodesModel")

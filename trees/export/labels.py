@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from regrasp.trees.graph import Node, NodeKind
 
-SYMBOLS: dict[NodeKind, str] = {"sequence": "→", "fallback": "?", "parallel": "⇉", "decorator": "δ"}
+SYMBOLS: dict[NodeKind, str] = {"sequence": "→", "fallback": "?", "parallel": "⇉", "control": "≡", "decorator": "δ"}
 
 
 def heading(node: Node) -> str:
@@ -37,7 +37,7 @@ def tooltip(node: Node) -> str:
 
 def _says_type(node: Node) -> bool:
     own = node.name.replace("_", "").replace("-", "").lower()
-    return node.kind in ("decorator", "action", "condition") and own != node.type.lower()
+    return node.kind in ("control", "decorator", "action", "condition") and own != node.type.lower()
 
 
 def identifiers(root: Node) -> dict[str, str]:

@@ -20,7 +20,8 @@ class Expect(expect.Expect):
     part_in_tray: Annotated[
         bool | None,
         Field(
-            description="Whether the part lies in the tray then, or floats in it at less than 1 cm/s.", examples=[True]
+            description="Whether the part lies in the tray then, or floats over it, up to 10 cm high and below 1 cm/s.",
+            examples=[True],
         ),
     ] = None
     plate_in_clamp: Annotated[

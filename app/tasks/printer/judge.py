@@ -7,8 +7,6 @@ from regrasp.app.task import judge
 from regrasp.app.task.expectation import Expectation
 from regrasp.app.tasks.printer.expectations import Expect
 
-CLOSED = 0.01  # m that a closed door may stand open; choice
-
 
 class PrinterJudge(judge.Judge[Expect]):
     """Judges the door's true opening, and whether the part is held."""
@@ -29,7 +27,7 @@ class PrinterJudge(judge.Judge[Expect]):
         """Whether door, part and plate are where the whole job brings them."""
         objects = self.world.objects
         return {
-            "door_closed": objects.door.opening < CLOSED,
+            "door_closed": objects.door_closed(),
             "part_in_tray": objects.part_in_tray(),
             "plate_in_clamp": objects.plate_in_clamp(),
         }
