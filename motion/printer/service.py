@@ -54,7 +54,8 @@ class PrinterMotionParameters(MotionParameters):
     soft_force: float = 3.0  # N a finger before the hand lets go of what floats; choice
     opening_steps: tuple[float, ...] = (0.001, 0.003, 0.006)  # m wider than the section that it opens at first; choice
     twist_steps: int = 4  # straight lines that stand for the arc: of 40 degrees 25 mm out it is 0.1 mm off
-    bond_left: float = 0.25  # N m about the bond's axis that say that it holds still; choice: it bears 0.6, drives err
+    # N m about the bond's axis that are enough: it bears 0.6, and from 1.1 on the pads wedged on the section (seed 3)
+    twist_limit: float = 0.9
     servo: ServoParameters = field(default_factory=ServoParameters)
     sphere_spacing: float = 0.016  # m between the spheres that stand for what the hand holds; choice
 

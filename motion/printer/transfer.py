@@ -125,34 +125,43 @@ class TransferMotion(PrinterMotion):
     def twist(self, arm: str, angle: float) -> Request[None]:
         """Turn the held part by an angle (rad) about the upright axis through its middle, and back.
 
-        Its plate is clamped: the bond between the two bears a twist, and breaks. Fails with BOND_HOLDS when it has not.
+        Its plate is clamped: the bond between the two bears the twist, and breaks. Fails with BOND_HOLDS where the part
+        turns back with more than `twist_limit`: the pads would wedge on its section, and slide off it.
         """
         finite("the angle", np.array([angle]))
 
         def steps() -> Iterator[None]:
-            tool = self.tool(arm)
+            tool, limit = self.tool(arm), self.parameters.twist_limit
             middle = RigidTransform.from_translation(self._held_thing(arm, "part").placed(tool).center)
             angles = np.linspace(0.0, angle, self.parameters.twist_steps + 1)
             turns = [RigidTransform.from_rotation(Rotation.from_rotvec([0.0, 0.0, a])) for a in angles]
             arc = [(middle * turn * middle.inv() * tool).as_matrix() for turn in turns]
-            yield from self._along(arm, arc)
-            moment = self._moment_about(arm, middle.translation)
-            yield from self._along(arm, arc[::-1])
-            if abs(moment) > self.parameters.bond_left:
-                why = f"turned by {np.rad2deg(angle):.0f} degrees, the part still turns back with {abs(moment):.2f} N m"
+            moment = 0.0
+            for _ in self._turned(arm, arc):
+                moment = self._moment_about(arm, middle.translation)
+                if abs(moment) > limit:
+                    self.execution.halt(arm)
+                    break
+                yield
+            while self.arms[arm].is_moving():
+                yield
+            yield from self._turned(arm, arc[:1] if abs(moment) > limit else arc[::-1])
+            if abs(moment) > limit:
+                why = f"the part turns back with {abs(moment):.1f} N m, limit {limit:g} N m"
                 raise PlanningError(PrinterCause.BOND_HOLDS, why)
 
         return self._together(arm, steps())
 
-    def _along(self, arm: str, poses: list[FloatArray]) -> Iterator[None]:
+    def _turned(self, arm: str, poses: list[FloatArray]) -> Iterator[None]:
+        """Steps along straight lines through poses (4, 4) of the tool, which turns the part."""
         path = straight_lines(self.kinematics[arm], self.joints(arm), poses)
         if path is None:
             raise PlanningError(CauseCode.OUT_OF_REACH, "the arm cannot turn the part so far")
-        model, speed = self.model(arm), self.parameters.approach_speed
-        yield from self._done(self.execution.request(arm, self._follow(arm, path, speed, model, self._guard.pressing)))
+        speed = self.parameters.approach_speed
+        yield from self._follow(arm, path, speed, self.model(arm), self._guard.pressing)
 
     def _moment_about(self, arm: str, point: FloatArray) -> float:
-        """The moment (N m) about the upright axis through a point (3,) m on the hand of an arm at rest."""
+        """The moment (N m) about the upright axis through a point (3,) m on the hand of an arm that hardly moves."""
         joints, efforts = self._outside_efforts(arm)
         return float(tool_wrench(self.kinematics[arm], joints, efforts, point)[5])
 

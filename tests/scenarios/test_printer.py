@@ -63,6 +63,15 @@ def test_the_whole_job_is_done_as_it_was_planned(gravity: str, tmp_path: Path) -
     assert f"planned: because=the task begins, actions={plan}" in " ".join(told.split())
 
 
+def test_a_part_that_does_not_come_off_its_plate_is_left_there(tmp_path: Path) -> None:
+    strong = [f"cell.hidden.printer.bond.{way}=500" for way in ("twist", "shear", "tilt", "normal")]
+    scenario = load_scenario("printer_part", ["gravity=zero", "cell=habitat_open", "inputs.replans=1", *strong])
+    result = regrasp.run(scenario, seed=3, out=tmp_path / "run")
+    assert (result.outcome, result.cause.code) == ("failure", "bond_holds")
+    assert result.measured["plate_in_clamp"] is True
+    assert next(e for e in result.expectations if e.name == "unintended_force").met
+
+
 def test_an_approach_that_there_is_not_is_found_by_the_check(tmp_path: Path) -> None:
     tree = shipped("tree")["printer_grasp"].read_text(encoding="utf-8").replace('method="{approach}"', 'method="two"')
     (tmp_path / "mine.xml").write_text(tree)
