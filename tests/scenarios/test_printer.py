@@ -67,6 +67,7 @@ def test_a_part_that_does_not_come_off_its_plate_is_left_there(tmp_path: Path) -
     strong = [f"cell.hidden.printer.bond.{way}=500" for way in ("twist", "shear", "tilt", "normal")]
     scenario = load_scenario("printer_part", ["gravity=zero", "cell=habitat_open", "inputs.replans=1", *strong])
     result = regrasp.run(scenario, seed=3, out=tmp_path / "run")
+    assert result.cause is not None
     assert (result.outcome, result.cause.code) == ("failure", "bond_holds")
     assert result.measured["plate_in_clamp"] is True
     assert next(e for e in result.expectations if e.name == "unintended_force").met
