@@ -1,7 +1,7 @@
 """Leaves of the printer task."""
 
 from regrasp.behaviors.leaf import WithServices
-from regrasp.behaviors.printer import door, part, primitives, transfer
+from regrasp.behaviors.printer import desk, door, part, primitives, transfer
 
 _LEAVES: tuple[type[WithServices], ...] = (
     primitives.AnalyzeImage,
@@ -19,6 +19,7 @@ _LEAVES: tuple[type[WithServices], ...] = (
     door.FindDoor,
     door.GripHandle,
     door.LookAtHandle,
+    desk.LookAtPlace,
     door.RailToHandle,
     door.ReachHandle,
     door.SlideDoor,

@@ -23,6 +23,7 @@ Goal = TypeVar("Goal", contravariant=True)
 
 Approach = Literal["one_step", "two_step", "three_step", "servo"]  # ways to the part; the first three the source's
 Free = Literal["no", "part", "both"]  # whether a part to be taken is off its plate, or its plate off the printer
+Place = Literal["clamp", "tray"]  # on the desk, where something is put
 Target = Literal["obj", "targ"]  # what to look for: the red part, and its blue gripping section
 # The source's classes: also the left and the right finger, as the picture shows them.
 PartClass = Literal["obj", "targ", "lgrip", "rgrip"]
@@ -253,6 +254,18 @@ class Sighting:
     stamp: float  # s, of the picture
     box: tuple[float, float, float, float]
     confidence: float | None = None
+
+
+@dataclass(frozen=True)
+class PlaceView:
+    """What a picture shows of a place that something shall take up: points of the surface on it, and of what is above.
+
+    `height` (m) is how far the highest things there rise over the place's floor.
+    """
+
+    points: int
+    above: int
+    height: float
 
 
 class GripperDevice(Device[GripperGoal, GripperState, GripperState], Protocol):

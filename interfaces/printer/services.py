@@ -11,8 +11,9 @@ if TYPE_CHECKING:
 
     from scipy.spatial.transform import RigidTransform
 
+    from regrasp.interfaces.cell import Box
     from regrasp.interfaces.frame import RgbdFrame
-    from regrasp.interfaces.printer.actions import Sighting
+    from regrasp.interfaces.printer.actions import PlaceView, Sighting
     from regrasp.interfaces.printer.target import TargetTracker
 
 
@@ -39,6 +40,11 @@ class PrinterPerceptionService(PerceptionService, Protocol):
 
     def see_handle(self, camera: str, since: float) -> FloatArray | None:
         """The middle (3,) m, world, of the handle's front; None while no frame from `since` (s) on shows enough."""
+        ...
+
+
+    def see_place(self, camera: str, since: float, place: "Box") -> "PlaceView | None":
+        """What stands on a place, the box that something shall take up; None while no frame from `since` (s) on."""
         ...
 
 
@@ -78,11 +84,15 @@ class PrinterMotionService(MotionService, Protocol):
         ...
 
     def held_goal(self, arm: str, name: str, place: FloatArray) -> "RigidTransform":
-        """world_from_tool with which the held thing of this name has its middle at a place (3,) m, not turned."""
+        """world_from_tool with which the held thing of this name has its middle at a place (3,) m, turned as taken."""
         ...
 
     def draw_out(self, arm: str, distance: float) -> Request[None]:
         """Draw the part that the hand holds straight back, with its plate, by `distance` m."""
+        ...
+
+    def look_goal(self, arm: str, place: FloatArray, distance: float, pitch: float) -> "RigidTransform":
+        """world_from_tool whose camera looks at a place (3,) m from `distance` m before it, `pitch` rad downwards."""
         ...
 
     def carry(

@@ -8,6 +8,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from regrasp.interfaces.arguments import finite, not_negative, positive, vector
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cause import CauseCode
+from regrasp.interfaces.cell import WristMount
 from regrasp.interfaces.printer.cause import PrinterCause
 from regrasp.interfaces.quote import nearest, quoted
 from regrasp.interfaces.request import Request
@@ -15,7 +16,7 @@ from regrasp.motion.failure import GraspEmptyError, PlanningError
 from regrasp.motion.grasping.gap_test import GripWatch
 from regrasp.motion.planning.straight import straight_lines
 from regrasp.motion.printer.held_box import HeldBox
-from regrasp.motion.printer.service import PrinterMotion
+from regrasp.motion.printer.service import TO_THE_PRINTER, PrinterMotion
 from regrasp.motion.request import MotionRequest
 from regrasp.motion.robots.tool_force import tool_wrench
 
@@ -24,14 +25,28 @@ class TransferMotion(PrinterMotion):
     """Carries the part, with or without its plate. What the hand holds counts as a part of the arm."""
 
     def held_goal(self, arm: str, name: str, place: FloatArray) -> RigidTransform:
-        """world_from_tool with which the held thing of this name has its middle at a place (3,) m, not turned.
+        """world_from_tool with which the held thing of this name has its middle at a place (3,) m.
+
+        It is turned there as it was when the hand took it.
 
         Raises:
             ValueError: the hand is not believed to hold such a thing.
         """
-        tool = self.tool(arm)
-        off = vector("the place", place) - self._held_thing(arm, name).placed(tool).center
-        return RigidTransform.from_translation(off) * tool
+        there = RigidTransform.from_translation(vector("the place", place))
+        return there * self._held_thing(arm, name).tool_from_box.inv()
+
+    def look_goal(self, arm: str, place: FloatArray, distance: float, pitch: float) -> RigidTransform:
+        """world_from_tool whose camera looks at a place (3,) m from `distance` m before it.
+
+        The hand points to the printer's side, and `pitch` rad downwards.
+        """
+        kin, mount = self.kinematics[arm], self.known.camera(self.known.printer.camera).mount
+        assert isinstance(mount, WristMount)
+        joints = self.joints(arm)
+        tool_from_camera = kin.tool(joints).inv() * kin.mount(joints) * mount.mount_from_camera
+        turn = TO_THE_PRINTER * Rotation.from_rotvec([0.0, positive("the pitch", pitch), 0.0])
+        before = tool_from_camera.apply([0.0, 0.0, positive("the distance", distance)])
+        return RigidTransform.from_components(vector("the place", place) - turn.apply(before), turn)
 
     def draw_out(self, arm: str, distance: float) -> Request[None]:
         """Draw the part that the hand holds straight back, with its plate, by `distance` m.

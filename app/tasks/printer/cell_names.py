@@ -2,11 +2,11 @@
 
 from typing import get_args
 
-from regrasp.interfaces.printer.actions import Approach, Free, Target
+from regrasp.interfaces.printer.actions import Approach, Free, Place, Target
 from regrasp.interfaces.printer.cell import PrinterCell
 
 
 def cell_names(cell: PrinterCell | None) -> dict[str, dict[str, str]]:
-    """See `Task.cell_names`: in any cell the image analyzer's targets, the approaches, and what a part is free of."""
-    kinds = {"target": Target, "approach": Approach, "free": Free}
+    """See `Task.cell_names`: in any cell the image analyzer's targets, the approaches, what a part is free of, and the places."""
+    kinds = {"target": Target, "approach": Approach, "free": Free, "place": Place}
     return {kind: dict.fromkeys(get_args(names), "") for kind, names in kinds.items()}
