@@ -7,7 +7,7 @@ from regrasp.interfaces.request import Request
 from regrasp.interfaces.services import MotionService, PerceptionService
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection
+    from collections.abc import Callable, Collection, Sequence
 
     from scipy.spatial.transform import RigidTransform
 
@@ -41,7 +41,6 @@ class PrinterPerceptionService(PerceptionService, Protocol):
     def see_handle(self, camera: str, since: float) -> FloatArray | None:
         """The middle (3,) m, world, of the handle's front; None while no frame from `since` (s) on shows enough."""
         ...
-
 
     def see_place(self, camera: str, since: float, place: "Box") -> "PlaceView | None":
         """What stands on a place, the box that something shall take up; None while no frame from `since` (s) on."""
@@ -91,7 +90,7 @@ class PrinterMotionService(MotionService, Protocol):
         """Draw the part that the hand holds straight back, with its plate, by `distance` m."""
         ...
 
-    def look_goal(self, arm: str, place: FloatArray, distance: float, pitch: float) -> "RigidTransform":
+    def look_goal(self, arm: str, place: "Sequence[float]", distance: float, pitch: float) -> "RigidTransform":
         """world_from_tool whose camera looks at a place (3,) m from `distance` m before it, `pitch` rad downwards."""
         ...
 

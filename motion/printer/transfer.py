@@ -1,6 +1,6 @@
 """Motions with the printed part in the hand: out of the printer, into the clamp, off its plate, and to the tray."""
 
-from collections.abc import Collection, Generator, Iterator
+from collections.abc import Collection, Generator, Iterator, Sequence
 
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
@@ -35,7 +35,7 @@ class TransferMotion(PrinterMotion):
         there = RigidTransform.from_translation(vector("the place", place))
         return there * self._held_thing(arm, name).tool_from_box.inv()
 
-    def look_goal(self, arm: str, place: FloatArray, distance: float, pitch: float) -> RigidTransform:
+    def look_goal(self, arm: str, place: Sequence[float], distance: float, pitch: float) -> RigidTransform:
         """world_from_tool whose camera looks at a place (3,) m from `distance` m before it.
 
         The hand points to the printer's side, and `pitch` rad downwards.

@@ -50,7 +50,7 @@ def test_a_row_says_what_its_scenario_says(name: str) -> None:
 SLOW = {
     *("bond_breaks", "camera_dark", "camera_loses_depth", "jaw_stuck", "jaw_weakens", "joint_lags", "light_changes"),
     *("part_slips", "plate_sticks", "plate_sticks_for_good", "planning_finds_nothing", "printer_dark"),
-    *("connector_knocked", "obstacle_moves_in", "rail_stalls_for_good", "service_raises"),
+    *("connector_knocked", "desk_occupied", "obstacle_moves_in", "rail_stalls_for_good", "service_raises"),
 }
 
 

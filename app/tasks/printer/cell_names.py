@@ -7,6 +7,6 @@ from regrasp.interfaces.printer.cell import PrinterCell
 
 
 def cell_names(cell: PrinterCell | None) -> dict[str, dict[str, str]]:
-    """See `Task.cell_names`: in any cell the image analyzer's targets, the approaches, what a part is free of, and the places."""
+    """See `Task.cell_names`: in any cell the image analyzer's targets, the approaches, and what leaves' ports name."""
     kinds = {"target": Target, "approach": Approach, "free": Free, "place": Place}
     return {kind: dict.fromkeys(get_args(names), "") for kind, names in kinds.items()}
