@@ -25,7 +25,7 @@ class ScriptedTrialParameters:
     acts: int = 6  # of a leaf, before it succeeds at once; choice
     ticks: tuple[int, ...] = (1, 2, 3, 8)  # that an act may take; choice
     failing_share: float = 0.25  # of the acts; choice: with more, most trials would end where the tree begins
-    max_stops: int = 15  # per trial; choice: each runs the tree anew
+    max_stops: int = 8  # per trial; choice: each runs the tree anew
 
 
 _DEFAULTS = ScriptedTrialParameters()

@@ -94,6 +94,7 @@ def test_six_signals_at_once_leave_a_whole_record(start: Started, number: int) -
     assert (result()["outcome"], result()["cause"]["node"]) == ("interrupted", "hang")
 
 
+@pytest.mark.slow
 def test_a_run_ends_even_if_a_library_swallows_the_interrupt(start: Started) -> None:
     process = start("Swallows")
     until(goes_on, process)

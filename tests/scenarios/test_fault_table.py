@@ -49,7 +49,16 @@ def test_a_row_says_what_its_scenario_says(name: str) -> None:
 # Whole runs that are alike to another row's: a jaw that loses the end, a camera that is blind, a way that is not found.
 SLOW = {
     *("bond_breaks", "camera_dark", "camera_loses_depth", "jaw_stuck", "jaw_weakens", "joint_lags", "light_changes"),
-    *("part_slips", "plate_sticks", "plate_sticks_for_good", "planning_finds_nothing", "printer_dark"),
+    *(
+        "cable_snags",
+        "camera_freezes",
+        "camera_dark_for_good",
+        "part_slips",
+        "plate_sticks",
+        "plate_sticks_for_good",
+        "planning_finds_nothing",
+        "printer_dark",
+    ),
     *("connector_knocked", "desk_occupied", "obstacle_moves_in", "rail_stalls_for_good", "service_raises"),
 }
 

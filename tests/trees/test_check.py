@@ -7,7 +7,7 @@ from typing import ClassVar
 import py_trees
 import pytest
 import random_trees
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from py_trees.common import Status
 from py_trees.ports import BehaviourWithPorts, NoDataAvailable, PortInformation
@@ -294,6 +294,7 @@ WORDS = st.sampled_from(GOOD.replace('"', ' " ').replace("<", " < ").replace(">"
 TEXTS = st.tuples(st.just(GOOD), st.just(LEAVES)) | st.tuples(random_trees.trees(), st.just(random_trees.LEAVES))
 
 
+@settings(max_examples=50)
 @given(tree=TEXTS, at=st.floats(0, 1), length=st.sampled_from([0, 0, 1, 5, 30]), insert=st.lists(WORDS, max_size=3))
 def test_whatever_passes_the_check_loads_and_ticks(
     tmp_path_factory: pytest.TempPathFactory,

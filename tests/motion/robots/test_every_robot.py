@@ -268,7 +268,9 @@ def _chain_at(chain: Chain, q: FloatArray) -> tuple[FloatArray, Rotation, FloatA
 
 
 @EVERY_KIN
-@pytest.mark.parametrize("count", [12, 100, 300])  # the closed form shares 100 poses between threads
+@pytest.mark.parametrize(
+    "count", [12, 100, pytest.param(300, marks=pytest.mark.slow)]
+)  # the closed form shares 100 poses between threads
 def test_many_poses_have_the_answers_of_each(kin: ArmKinematics, count: int) -> None:
     if not kin.closed_form:
         count //= 12  # each takes a quarter of a second, and they share nothing

@@ -46,6 +46,7 @@ def maker(name: str, known: CableKnown) -> Technique:
     return Blind() if name == "blind" else make_technique("rgbd", known)
 
 
+@pytest.mark.slow
 def test_a_study_of_one_scene(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     setup = Setup(study_cell(overrides=SMALL), ["rgbd", "blind"], maker=maker)
     code = run_pose([setup], range(1, 2), 1, tmp_path, configurations=["2"], both=True)
