@@ -28,6 +28,10 @@ if TYPE_CHECKING:  # at run time `__getattr__` brings these when they are asked 
     from regrasp.perception.pose.estimate import Estimate as Estimate
     from regrasp.perception.pose.estimate import NoEstimate as NoEstimate
 
+# NumPy and SciPy read this when they are imported. Our matrices are small: threads that share one out spin for longer
+# than it takes, and runs side by side share the cores anyway.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 _TYPES = {
     "Cell": "regrasp.interfaces.cell",
     "Estimate": "regrasp.perception.pose.estimate",

@@ -13,6 +13,7 @@ _LEAVES: tuple[type[WithServices], ...] = (
     primitives.PressGripper,
     door.ArmBack,
     part.ApproachPart,
+    part.CatchPart,
     part.HandBeforePart,
     part.RailToPart,
     part.TakePart,

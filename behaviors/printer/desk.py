@@ -15,8 +15,8 @@ from regrasp.interfaces.printer.cause import PrinterCause
 class LookAtPlace(PrinterLeaf):
     """Looks down at the clamp or the tray, past what the hand holds; fails if something stands there.
 
-    The camera looks from `distance` m before the place, `pitch_deg` downwards, with the arm's base `beside` it. Things
-    lower than 15 mm are not noticed.
+    The camera looks from `distance` m before the place, `pitch_deg` downwards or, where the hand has no room there,
+    about so much, with the arm's base `beside` it. Things lower than 15 mm are not noticed.
     """
 
     least_points = 300  # that must show the place; choice: a free one has 1000
@@ -41,8 +41,7 @@ class LookAtPlace(PrinterLeaf):
         floor = (*place.center[:2], place.center[2] - 0.5 * place.size[2])
         yield self.services.rail.send(RailGoal(floor[1] + self.get_input("beside") - base[1]))
         pitch = math.radians(self.get_input("pitch_deg"))
-        goal = motion.look_goal(self.hand, floor, self.get_input("distance"), pitch)
-        yield self.with_arm(motion.carry(self.hand, goal))
+        yield self.with_arm(motion.look_at(self.hand, floor, self.get_input("distance"), pitch))
         seen = yield from self._look(place, name)
         self.say("saw the place", place=name, points=seen.points, above=seen.above, height=round(seen.height, 4))
         if seen.above >= self.least_above:

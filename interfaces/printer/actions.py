@@ -22,7 +22,7 @@ Result = TypeVar("Result")
 Goal = TypeVar("Goal", contravariant=True)
 
 Approach = Literal["one_step", "two_step", "three_step", "servo"]  # ways to the part; the first three the source's
-Free = Literal["no", "part", "both"]  # whether a part to be taken is off its plate, or its plate off the printer
+Free = Literal["part", "both"]  # what has come loose: the part from its plate, or both from the printer
 Place = Literal["clamp", "tray"]  # on the desk, where something is put
 Target = Literal["obj", "targ"]  # what to look for: the red part, and its blue gripping section
 # The source's classes: also the left and the right finger, as the picture shows them.

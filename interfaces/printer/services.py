@@ -55,6 +55,11 @@ class PrinterMotionService(MotionService, Protocol):
         """How far, m, the door is believed to stand open."""
         ...
 
+    @property
+    def part_speed(self) -> float:
+        """How fast, m/s, the last approach by sight saw the part move at its end."""
+        ...
+
     def handle(self, opening: float, before: float = 0.0) -> "RigidTransform":
         """world_from_tool of a hand that takes the handle of a door that stands `opening` m open.
 
@@ -82,6 +87,10 @@ class PrinterMotionService(MotionService, Protocol):
         """Go straight on, close on the part's section and give way to it; the answer is the gap (m) of the pads."""
         ...
 
+    def catch_part(self, arm: str, target: "TargetTracker", inside: float, moved: "Collection[str]") -> Request[float]:
+        """Follow a part that floats with the things `moved`, and close on its section `inside` m behind its front."""
+        ...
+
     def held_goal(self, arm: str, name: str, place: FloatArray) -> "RigidTransform":
         """world_from_tool with which the held thing of this name has its middle at a place (3,) m, turned as taken."""
         ...
@@ -90,8 +99,8 @@ class PrinterMotionService(MotionService, Protocol):
         """Draw the part that the hand holds straight back, with its plate, by `distance` m."""
         ...
 
-    def look_goal(self, arm: str, place: "Sequence[float]", distance: float, pitch: float) -> "RigidTransform":
-        """world_from_tool whose camera looks at a place (3,) m from `distance` m before it, `pitch` rad downwards."""
+    def look_at(self, arm: str, place: "Sequence[float]", distance: float, pitch: float) -> Request[None]:
+        """Bring the camera `distance` m before a place (3,) m, about `pitch` rad down, with what the hand holds."""
         ...
 
     def carry(

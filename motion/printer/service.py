@@ -27,6 +27,7 @@ from regrasp.motion.robots.tool_force import tool_force
 from regrasp.motion.scene.collision import CollisionModel
 from regrasp.motion.service import Motion, MotionParameters
 
+_CLOSED = object()  # the end of the steps that close a jaw
 # world_from_tool of a hand that points along -x, with its fingers to the left and right of what it takes
 TO_THE_PRINTER = Rotation.from_matrix([[-1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0]])
 
@@ -57,6 +58,7 @@ class PrinterMotionParameters(MotionParameters):
     # N m about the bond's axis that are enough: it bears 0.6, and from 1.1 on the pads wedged on the section (seed 3)
     twist_limit: float = 0.9
     servo: ServoParameters = field(default_factory=ServoParameters)
+    look_turns: tuple[float, ...] = (0.0, 0.2, -0.2, 0.4)  # rad further down, the first that is free; choice
     sphere_spacing: float = 0.016  # m between the spheres that stand for what the hand holds; choice
 
 
@@ -81,6 +83,7 @@ class PrinterMotion(Motion):
         self._held: dict[str, list[HeldBox]] = {}  # by arm
         section = known.printer.part.section
         self._section = RigidTransform.from_components(section.center, TO_THE_PRINTER)  # where it is believed to be
+        self.part_speed = 0.0  # m/s, as the servo saw it last
         self._half_section = 0.5 * section.size[0]
         self._off, self._slid = np.zeros(3), False  # m from where the handle should be on the door; was it pulled?
         self.believe_door(known.printer.door.opening)
@@ -112,14 +115,11 @@ class PrinterMotion(Motion):
             self.believe_door(self.door_opening)
         return off
 
-    def believe_part(self, section: FloatArray, alone: bool = False) -> None:
-        """Take the part's gripping section to be at a place (3,) m, from now on.
-
-        Part, plate and the bed under the plate are taken to be as far off, since they lie on each other; of a part
-        that stands elsewhere on its plate, or floats, it `alone`.
-        """
-        off = finite("the section's place", section) - self.things(["section"])[0].center
-        for box in self.things(["part", "section"] if alone else PART_AND_BED):
+    def believe_part(self, section: RigidTransform, moved: Collection[str] = ("part", "section")) -> None:
+        """Take the part's gripping section to be at a pose, from now on, and the things `moved` as far off as it."""
+        self._section = section
+        off = section.translation - self.things(["section"])[0].center
+        for box in self.things(moved):
             moved = tuple((np.array(box.center) + off).tolist())
             self._fixed[self._fixed.index(box)] = box.model_copy(update={"center": moved})
         self.believe_door(self.door_opening)
@@ -254,15 +254,45 @@ class PrinterMotion(Motion):
             model = self.model(arm, without=self.things(PART_AND_BED))
             kin = self.kinematics[arm]
             servo = Servo(kin, start, target, before, self._clock, model, self.parameters.servo)
+            self.part_speed = 0.0
             yield from self.execution.stream(
                 arm, servo.trajectories(lambda: kin.tool_matrix(self.joints(arm))), self._guard.free
             )
+            self.part_speed = servo.target_speed
             if servo.goal is not None:
-                goal = RigidTransform.from_matrix(servo.goal)
-                self._section = goal * RigidTransform.from_translation([before + self._half_section, 0.0, 0.0])
-                self.believe_part(self._section.translation, alone=True)
+                self.believe_part(self._section_before(RigidTransform.from_matrix(servo.goal), before))
 
         return self.execution.request(arm, steps())
+
+    def _section_before(self, tool: RigidTransform, before: float) -> RigidTransform:
+        """The section's pose where the tool stands `before` m before its front, and is turned as it."""
+        return tool * RigidTransform.from_translation([before + self._half_section, 0.0, 0.0])
+
+    def catch_part(self, arm: str, target: TargetTracker, inside: float, moved: Collection[str]) -> Request[float]:
+        """Follow a part that floats, and close the jaw on its section with the pads `inside` m behind its front.
+
+        The things `moved`, such as part and section, are then taken to be as far from where they were as the section.
+
+        Arm and jaw move at once: the hand goes with the part until the pads hold it. The answer is the gap (m) between
+        the pads. It fails as `servo` and `close` do.
+        """
+        positive("the way behind the front", inside)
+        thickness, values, kin = self.known.printer.part.section.size[1], self.parameters, self.kinematics[arm]
+
+        def steps() -> Generator[None, None, float]:
+            start, model = self.execution.standing(arm), self.model(arm, without=self.things(PART_AND_BED))
+            servo = Servo(kin, start, target, -inside, self._clock, model, values.servo)
+            closing = self.execution.close_jaw(arm, thickness, force=values.first_force)
+            ways = servo.trajectories(
+                lambda: kin.tool_matrix(self.joints(arm)), lambda: next(closing, _CLOSED) is _CLOSED
+            )
+            yield from self.execution.stream(arm, ways, self._guard.free)
+            yield from self._give_way(arm)
+            yield from self.execution.press_jaw(arm, values.part_force)
+            self.believe_part(self._section_before(self.tool(arm), -inside), moved)
+            return self.grippers[arm].reading().gap
+
+        return self._together(arm, steps())
 
     def part_goal(self, before: float) -> RigidTransform:
         """world_from_tool `before` m before the front of the part's section, where that is believed to be."""

@@ -12,7 +12,7 @@ from regrasp.interfaces.cell import WristMount
 from regrasp.interfaces.printer.cause import PrinterCause
 from regrasp.interfaces.quote import nearest, quoted
 from regrasp.interfaces.request import Request
-from regrasp.motion.failure import GraspEmptyError, PlanningError
+from regrasp.motion.failure import NO_WAY, GraspEmptyError, PlanningError, TouchError
 from regrasp.motion.grasping.gap_test import GripWatch
 from regrasp.motion.planning.straight import straight_lines
 from regrasp.motion.printer.held_box import HeldBox
@@ -35,18 +35,37 @@ class TransferMotion(PrinterMotion):
         there = RigidTransform.from_translation(vector("the place", place))
         return there * self._held_thing(arm, name).tool_from_box.inv()
 
-    def look_goal(self, arm: str, place: Sequence[float], distance: float, pitch: float) -> RigidTransform:
-        """world_from_tool whose camera looks at a place (3,) m from `distance` m before it.
+    def look_at(self, arm: str, place: Sequence[float], distance: float, pitch: float) -> Request[None]:
+        """Bring the camera `distance` m before a place (3,) m; the hand points to the printer's side, and down.
 
-        The hand points to the printer's side, and `pitch` rad downwards.
+        By `pitch` rad, or where no such pose is free, by the next of `look_turns` more. Fails as `carry` does.
         """
+        vector("the place", place)
+
+        def steps() -> Iterator[None]:
+            for more in self.parameters.look_turns:
+                goal = self._look_goal(arm, np.array(place), distance, pitch + more)
+                try:
+                    yield from self._done(self.carry(arm, goal))
+                except PlanningError as error:
+                    if error.code not in (*NO_WAY, CauseCode.OUT_OF_REACH) or isinstance(error, TouchError):
+                        raise
+                    failed = error
+                else:
+                    return
+            raise failed
+
+        return self._together(arm, steps())
+
+    def _look_goal(self, arm: str, place: FloatArray, distance: float, pitch: float) -> RigidTransform:
+        """world_from_tool whose camera looks at a place (3,) m from `distance` m before it, `pitch` rad downwards."""
         kin, mount = self.kinematics[arm], self.known.camera(self.known.printer.camera).mount
         assert isinstance(mount, WristMount)
         joints = self.joints(arm)
         tool_from_camera = kin.tool(joints).inv() * kin.mount(joints) * mount.mount_from_camera
         turn = TO_THE_PRINTER * Rotation.from_rotvec([0.0, positive("the pitch", pitch), 0.0])
         before = tool_from_camera.apply([0.0, 0.0, positive("the distance", distance)])
-        return RigidTransform.from_components(vector("the place", place) - turn.apply(before), turn)
+        return RigidTransform.from_components(place - turn.apply(before), turn)
 
     def draw_out(self, arm: str, distance: float) -> Request[None]:
         """Draw the part that the hand holds straight back, with its plate, by `distance` m.

@@ -98,3 +98,25 @@ def test_a_servo_that_is_cancelled_stops_the_arm() -> None:
         at = hand.tool().translation
         hand.world.advance(0.5)
         assert hand.tool().translation == pytest.approx(at, abs=1e-3)
+
+
+@pytest.mark.parametrize("speed", [0.02, 0.06])
+def test_a_part_that_floats_is_caught_on_the_way(speed: float) -> None:
+    """The hand goes along as the jaw closes; then both stand."""
+    with HandPlaced(cell(), 3) as hand:
+        way = [RigidTransform.from_translation([x, 0.0, 0.0]) for x in (0.12, 0.027)]
+        hand.place(way[0] * hand.goal, (hand.goal, hand.goal * way[1]))
+        hand.world.advance(0.5)
+        part = hand.world.objects.part
+        part.float_off(speed * np.array([0.8, -0.5, 0.3]))
+        services = hand.services
+        tracker = services.perception.part_tracker(
+            services.motion.tool_at, lambda: services.gripper.state().gap, hand.world.now()
+        )
+        finish(hand, services.motion.catch_part(hand.name, tracker, 0.007, ("part", "section")))
+        hand.world.advance(1.0)
+        inside = hand.tool().translation - part.front().translation
+        assert part.front().rotation.inv().apply(inside) == pytest.approx([0.007, 0.0, 0.0], abs=0.005)
+        assert services.motion.holds(hand.name, services.known.printer.part.section.size[1])
+        assert part.speed() < 0.002
+        assert max(hand.world.contact_peaks.values(), default=0.0) < 5.0

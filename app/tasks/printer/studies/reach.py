@@ -188,7 +188,7 @@ class _Job:
         goal = self._goal()  # the hand stays level, as at the handle
         goal = RigidTransform.from_components(self._off(goal.translation, self._parameters.distance), goal.rotation)
         seen = goal.translation - self._goal().translation + self._printer.part.section.center
-        self.motion.believe_part(seen)
+        self.motion.believe_part(RigidTransform.from_components(seen, goal.rotation), PART_AND_BED)
         yield "before the printer", iter([self._rail_to(goal, self._parameters.beside_section)])
         for name, offset in STARTS.items():
             yield f"start {name}", iter([self._go(RigidTransform.from_translation(offset) * goal)])
