@@ -1,0 +1,129 @@
+"""Where in a camera's picture lies what the robot believed to see: estimates of poses, and positions told by events."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from regrasp.app.files.findings import Findings
+from regrasp.app.records.reader import Event, RunRecord
+from regrasp.app.records.signals import Signals
+from regrasp.app.report.curves import CHI2_95, positions
+from regrasp.app.scenario.cell_file import load_cell
+from regrasp.app.task import find
+from regrasp.interfaces.arrays import FloatArray
+from regrasp.interfaces.cell import CameraSpec, Cell, FixedMount
+from regrasp.motion.robots.kinematics import ArmKinematics
+
+NEWEST = 0.5  # s: an event this near to a picture told of what is in it
+STALE = 2.0  # s: an older estimate is not drawn
+MAX_RADIUS = 0.3  # of a picture's width; a larger region says no more
+
+
+@dataclass(frozen=True)
+class Sighting:
+    """A point in a picture, as fractions of its width and height, with the 95 % region's radius of the width."""
+
+    x: float
+    y: float
+    radius: float
+    name: str
+
+
+class Sightings:
+    """What the robot knew, drawn into its cameras' pictures by the poses that it knows of them."""
+
+    def __init__(self, record: RunRecord, signals: Signals | None) -> None:
+        self._signals, self._cell = signals, _cell(record)
+        self._arms: dict[str, ArmKinematics] = {}
+        self._events = [event for event in record.events if _position(event) is not None]
+
+    def at(self, t: float, camera: str) -> Iterator[Sighting]:
+        """The points in the picture of that camera at second `t`."""
+        spec = next((one for one in self._cell.known.cameras if one.name == camera), None) if self._cell else None
+        camera_from_world = None if spec is None else self._camera_from_world(spec, t)
+        if spec is None or camera_from_world is None:
+            return
+        for name, point, spread in self._points(t):
+            if (seen := _projected(spec, camera_from_world, point, spread)) is not None:
+                yield Sighting(*seen, name)
+
+    def _points(self, t: float) -> Iterator[tuple[str, FloatArray, float]]:
+        """Name, position (3,) in m, and radius in m of the 95 % region (0: not known)."""
+        yield from self._estimates(t)
+        for event in self._events:
+            if abs(event.t - t) <= NEWEST:
+                point = _position(event)
+                assert point is not None
+                yield event.event, point, 0.0
+
+    def _estimates(self, t: float) -> Iterator[tuple[str, FloatArray, float]]:
+        signals = self._signals
+        row = None if signals is None else _row(signals, t)
+        if signals is None or row is None:
+            return
+        for name in signals:
+            seen_at = signals.get(f"{name}.seen_at")
+            if seen_at is None or not 0.0 <= t - float(seen_at[row]) <= STALE:
+                continue
+            covariance = signals.get(f"{name}.covariance")
+            spread = 0.0 if covariance is None else float(np.sqrt(CHI2_95 * max(float(covariance[row][[0, 6, 11]].max()), 0)))
+            yield f"{name}, seen at {seen_at[row]:.2f} s", positions(signals[name][row : row + 1])[0], spread
+
+    def _camera_from_world(self, spec: CameraSpec, t: float) -> FloatArray | None:
+        """The pose (4, 4) by which the robot places a picture that it got at second `t`; None if it is not known."""
+        if isinstance(spec.mount, FixedMount):
+            return np.asarray(spec.mount.world_from_camera.inv().as_matrix())
+        assert self._cell is not None
+        arm, signals = spec.mount.arm, self._signals
+        exposed = t - self._cell.known.latencies.image
+        row = None if signals is None or f"{arm}.joints" not in signals else _row(signals, exposed)
+        if signals is None or row is None:
+            return None
+        mount = self._kinematics(arm).mount(np.atleast_1d(signals[f"{arm}.joints"][row]).astype(float))
+        return np.asarray((mount * spec.mount.mount_from_camera).inv().as_matrix())
+
+    def _kinematics(self, arm: str) -> ArmKinematics:
+        assert self._cell is not None
+        if arm not in self._arms:
+            spec = self._cell.known.arm(arm)
+            self._arms[arm] = ArmKinematics(spec.robot, spec.world_from_base)
+        return self._arms[arm]
+
+
+def _row(signals: Signals, t: float) -> int | None:
+    """The row of the last tick up to second `t`."""
+    row = int(np.searchsorted(signals["t"], t + 1e-3, side="right")) - 1
+    return row if row >= 0 else None
+
+
+def _projected(
+    spec: CameraSpec, camera_from_world: FloatArray, point: FloatArray, spread: float
+) -> tuple[float, float, float] | None:
+    """Where a point lies in the picture, and how large a radius in m around it is, as fractions of its size."""
+    x, y, z = camera_from_world[:3, :3] @ point + camera_from_world[:3, 3]
+    if z < 0.02:
+        return None
+    lens = spec.intrinsics
+    across, down = (lens.fx * x / z + lens.cx) / lens.width, (lens.fy * y / z + lens.cy) / lens.height
+    if not (0.0 <= across <= 1.0 and 0.0 <= down <= 1.0):
+        return None
+    radius = lens.fx * spread / z / lens.width
+    return round(float(across), 4), round(float(down), 4), round(float(min(radius, MAX_RADIUS)), 4)
+
+
+def _position(event: Event) -> FloatArray | None:
+    """The place in the world that an event tells; None if it tells none."""
+    value = event.values.get("position")
+    if not isinstance(value, list) or len(value) != 3 or not all(isinstance(one, (int, float)) for one in value):
+        return None
+    return np.array(value, float)
+
+
+def _cell(record: RunRecord) -> Cell | None:
+    """The cell of the record, of its task; None if it cannot be read."""
+    task = record.result.task if record.result else str(record.begin.get("task", ""))
+    try:
+        return load_cell(record.folder / "cell.yaml", task=find.task_named(task), laid_out=False)
+    except Findings:
+        return None
