@@ -108,16 +108,22 @@ def _draw_panel(axes: "Axes", panel: Panel) -> None:
         _draw_curve(axes, curve, SERIES[number % len(SERIES)], _DASHES[number % len(_DASHES)])
     axes.set_ylim(bottom=0.0)
     axes.yaxis.set_major_locator(_few_steps())
-    if len(panel.curves) > 1 or any(curve.region is not None for curve in panel.curves):
-        axes.legend(
-            loc="lower right", bbox_to_anchor=(1.0, 1.02), ncols=4, frameon=False, fontsize=10, labelcolor=MUTED,
-            borderaxespad=0.0, handlelength=2.2, columnspacing=1.4,
-        )  # fmt: skip
+    axes.legend(
+        loc="lower right",
+        bbox_to_anchor=(1.0, 1.02),
+        ncols=4,
+        frameon=False,
+        fontsize=10,
+        labelcolor=MUTED,
+        borderaxespad=0.0,
+        handlelength=2.2,
+        columnspacing=1.4,
+    )
 
 
 def _draw_curve(axes: "Axes", curve: Curve, colour: str, dash: Any) -> None:
     if curve.region is not None:
-        axes.fill_between(curve.t, 0.0, curve.region, color=colour, alpha=0.18, lw=0, label="95 % region")
+        axes.vlines(curve.t, 0.0, curve.region, color=colour, alpha=0.25, lw=3, label="95 % region")
     if curve.dots:
         axes.plot(curve.t, curve.values, ls="none", marker="o", ms=3, color=colour, mec=colour, label=curve.name)
     else:

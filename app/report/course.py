@@ -95,8 +95,19 @@ def phase_lane(attempts: Sequence[Attempt], phases: Mapping[str, str]) -> Lane:
 
 def marks(record: RunRecord) -> list[Mark]:
     """Every event, and what truly happened by the task's judge, in the order of time."""
-    told = [Mark(event.t, kind_of(event), event.node, event_text(event)) for event in record.events]
+    told = [Mark(event.t, kind_of(event), event.node, _words(event)) for event in record.events]
     return sorted([*told, *_truths(record)], key=lambda mark: mark.t)
+
+
+def _words(event: Event) -> str:
+    """An event for a reader: what the rest of the page tells is left out."""
+    values = event.values
+    if event.event == "failed" and "message" in values:
+        passed = f" (passed on from {values['of']})" if values.get("of") else ""
+        return f"failed: {values.get('code')}: {values['message']}{passed}"
+    if event.event == "planned":
+        return f"planned, because {values.get('because')}: {values.get('actions')}"
+    return "begin" if event.event == "begin" else event_text(event)
 
 
 def kind_of(event: Event) -> str:
@@ -150,6 +161,24 @@ def failures(record: RunRecord, attempts: Sequence[Attempt]) -> list[Failure]:
         held = above[with_it] if with_it < len(above) else ""
         found.append(Failure(attempt, passed, held, then))
     return found
+
+
+@dataclass(frozen=True)
+class Repeated:
+    """Attempts of a leaf that failed for the same cause: how many, the first one, and when the last one ended."""
+
+    count: int
+    first: Attempt
+    last: float
+
+
+def repeated(failed: Sequence[Failure]) -> list[Repeated]:
+    """The failures by leaf and cause, in the order of the first of each; what a node only passed on is left out."""
+    groups: dict[tuple[str, str], list[Attempt]] = {}
+    for attempt in (one.attempt for one in failed):
+        if attempt.cause and attempt.cause.node in ("", attempt.path):
+            groups.setdefault((attempt.path, attempt.cause.code), []).append(attempt)
+    return [Repeated(sum(one.times for one in same), same[0], same[-1].ended) for same in groups.values()]
 
 
 def _above(path: str) -> Iterator[str]:

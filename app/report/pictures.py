@@ -6,6 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from markupsafe import Markup
+
 from regrasp.app.records.reader import RunRecord
 from regrasp.app.report.sightings import Sighting, Sightings
 
@@ -33,7 +35,7 @@ class KeyFrame:
     event: str
     width: int
     height: int
-    data: str
+    data: Markup  # base64
     sightings: tuple[Sighting, ...] = ()
 
 
@@ -42,7 +44,7 @@ class Pictures:
     """Key frames in the order of time, the film's data ('' for none), and remarks on what is left out."""
 
     frames: tuple[KeyFrame, ...]
-    film: str
+    film: Markup
     remarks: tuple[str, ...]
 
 
@@ -97,17 +99,17 @@ def _key_frame(t: float, camera: str, event: str, path: Path, limits: PictureLim
         small = cv2.resize(image, (max(1, int(width * scale)), max(1, int(height * scale))), interpolation=cv2.INTER_AREA)
         data = cv2.imencode(".jpg", small, [cv2.IMWRITE_JPEG_QUALITY, limits.quality])[1].tobytes()
         height, width = small.shape[:2]
-    return KeyFrame(t, camera, event, width, height, base64.b64encode(data).decode())
+    return KeyFrame(t, camera, event, width, height, Markup(base64.b64encode(data).decode()))
 
 
-def _film(path: Path, most: int) -> tuple[str, tuple[str, ...]]:
+def _film(path: Path, most: int) -> tuple[Markup, tuple[str, ...]]:
     """The film's data, and a remark if it is too large or cannot be read."""
     if not path.is_file():
-        return "", ()
+        return Markup(), ()
     size = path.stat().st_size
     if size > most:
-        return "", (f"the film, {path.name} in the record, has {size / 1e6:.1f} MB and is not in this page",)
+        return Markup(), (f"the film, {path.name} in the record, has {size / 1e6:.1f} MB and is not in this page",)
     try:
-        return base64.b64encode(path.read_bytes()).decode(), ()
+        return Markup(base64.b64encode(path.read_bytes()).decode()), ()
     except OSError as error:
-        return "", (f"{path.name} cannot be read: {error.strerror}",)
+        return Markup(), (f"{path.name} cannot be read: {error.strerror}",)

@@ -52,7 +52,18 @@ function showTree(t) {
   const leaves = running.filter((path) => !running.some((other) => other.startsWith(path + "/")));
   const failed = nodes.filter((node) => node.state === "f").map((node) => data.paths[node.number]);
   const told = find("states");
+  if (!playing) reveal(running.length ? leaves : failed);
   if (told) told.textContent = `Running: ${leaves.join(", ") || "nothing"}. Failed: ${failed.join(", ") || "nothing"}.`;
+}
+
+// Bring the first of these nodes into the tree's window.
+function reveal(paths) {
+  const box = document.querySelector(".tree");
+  const node = nodes.find((one) => data.paths[one.number] === paths[0]);
+  if (!node) return;
+  const place = node.group.getBoundingClientRect(), frame = box.getBoundingClientRect();
+  if (place.top < frame.top || place.bottom > frame.bottom) box.scrollTop += place.top - frame.top - frame.height / 2;
+  if (place.left < frame.left || place.right > frame.right) box.scrollLeft += place.left - frame.left - frame.width / 2;
 }
 
 const cameras = all(".camera[data-camera]").map((figure) => ({

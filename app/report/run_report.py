@@ -53,7 +53,7 @@ def run_page(folder: Path, limits: PictureLimits = PictureLimits()) -> tuple[byt
     elif not curves and not of_signals:
         missing.append("the signals end before there is anything to draw")
     end = max([record.end, record.result.sim_seconds if record.result else 0.0, *(one.ended for one in tried)])
-    marks = course.marks(record)
+    marks, failed = course.marks(record), course.failures(record, tried)
     return (
         page(
             "run.html",
@@ -74,7 +74,8 @@ def run_page(folder: Path, limits: PictureLimits = PictureLimits()) -> tuple[byt
             film=shown.film,
             chart=curve_chart(curves, end) if curves else "",
             panels=curves,
-            failures=course.failures(record, tried),
+            failures=failed,
+            repeated=course.repeated(failed),
             plans=[*plans(record.events)],
             log=marks[: course.MAX_LOG],
             left_out=max(0, len(marks) - course.MAX_LOG),

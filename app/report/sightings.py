@@ -2,6 +2,8 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,7 +15,9 @@ from regrasp.app.scenario.cell_file import load_cell
 from regrasp.app.task import find
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cell import CameraSpec, Cell, FixedMount
-from regrasp.motion.robots.kinematics import ArmKinematics
+
+if TYPE_CHECKING:
+    from regrasp.motion.robots.kinematics import ArmKinematics
 
 NEWEST = 0.5  # s: an event this near to a picture told of what is in it
 STALE = 2.0  # s: an older estimate is not drawn
@@ -34,17 +38,20 @@ class Sightings:
     """What the robot knew, drawn into its cameras' pictures by the poses that it knows of them."""
 
     def __init__(self, record: RunRecord, signals: Signals | None) -> None:
-        self._signals, self._cell = signals, _cell(record)
-        self._arms: dict[str, ArmKinematics] = {}
+        self._record, self._signals = record, signals
+        self._arms: dict[str, "ArmKinematics"] = {}
         self._events = [event for event in record.events if _position(event) is not None]
 
     def at(self, t: float, camera: str) -> Iterator[Sighting]:
         """The points in the picture of that camera at second `t`."""
-        spec = next((one for one in self._cell.known.cameras if one.name == camera), None) if self._cell else None
-        camera_from_world = None if spec is None else self._camera_from_world(spec, t)
+        points = [*self._points(t)]
+        if not points or self._cell is None:
+            return
+        spec = next((one for one in self._cell.known.cameras if one.name == camera), None)
+        camera_from_world = None if spec is None else self._camera_from_world(self._cell, spec, t)
         if spec is None or camera_from_world is None:
             return
-        for name, point, spread in self._points(t):
+        for name, point, spread in points:
             if (seen := _projected(spec, camera_from_world, point, spread)) is not None:
                 yield Sighting(*seen, name)
 
@@ -70,23 +77,33 @@ class Sightings:
             spread = 0.0 if covariance is None else float(np.sqrt(CHI2_95 * max(float(covariance[row][[0, 6, 11]].max()), 0)))
             yield f"{name}, seen at {seen_at[row]:.2f} s", positions(signals[name][row : row + 1])[0], spread
 
-    def _camera_from_world(self, spec: CameraSpec, t: float) -> FloatArray | None:
+    @cached_property
+    def _cell(self) -> Cell | None:
+        """The cell of the record, of its task; None if it cannot be read."""
+        record = self._record
+        task = record.result.task if record.result else str(record.begin.get("task", ""))
+        try:
+            return load_cell(record.folder / "cell.yaml", task=find.task_named(task), laid_out=False)
+        except Findings:
+            return None
+
+    def _camera_from_world(self, cell: Cell, spec: CameraSpec, t: float) -> FloatArray | None:
         """The pose (4, 4) by which the robot places a picture that it got at second `t`; None if it is not known."""
         if isinstance(spec.mount, FixedMount):
             return np.asarray(spec.mount.world_from_camera.inv().as_matrix())
-        assert self._cell is not None
         arm, signals = spec.mount.arm, self._signals
-        exposed = t - self._cell.known.latencies.image
+        exposed = t - cell.known.latencies.image
         row = None if signals is None or f"{arm}.joints" not in signals else _row(signals, exposed)
         if signals is None or row is None:
             return None
-        mount = self._kinematics(arm).mount(np.atleast_1d(signals[f"{arm}.joints"][row]).astype(float))
+        mount = self._kinematics(cell, arm).mount(np.atleast_1d(signals[f"{arm}.joints"][row]).astype(float))
         return np.asarray((mount * spec.mount.mount_from_camera).inv().as_matrix())
 
-    def _kinematics(self, arm: str) -> ArmKinematics:
-        assert self._cell is not None
+    def _kinematics(self, cell: Cell, arm: str) -> "ArmKinematics":
+        from regrasp.motion.robots.kinematics import ArmKinematics  # late: it brings compiled code
+
         if arm not in self._arms:
-            spec = self._cell.known.arm(arm)
+            spec = cell.known.arm(arm)
             self._arms[arm] = ArmKinematics(spec.robot, spec.world_from_base)
         return self._arms[arm]
 
@@ -119,11 +136,3 @@ def _position(event: Event) -> FloatArray | None:
         return None
     return np.array(value, float)
 
-
-def _cell(record: RunRecord) -> Cell | None:
-    """The cell of the record, of its task; None if it cannot be read."""
-    task = record.result.task if record.result else str(record.begin.get("task", ""))
-    try:
-        return load_cell(record.folder / "cell.yaml", task=find.task_named(task), laid_out=False)
-    except Findings:
-        return None

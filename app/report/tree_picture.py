@@ -1,5 +1,6 @@
 """The tree of a run as a picture whose nodes a script can find, and each node's changes."""
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -14,6 +15,7 @@ from regrasp.app.scenario.references import tree_text
 from regrasp.trees import Node, TreeSyntaxError, read_graph
 from regrasp.trees.export.svg import to_svg
 
+PAGE_WIDTH, LEAST_SCALE = 1060.0, 0.72  # px, and how much smaller than drawn a picture may become
 MAX_DRAWN = 400  # nodes; choice: a larger picture shows nothing
 LETTERS = {"RUNNING": "r", "SUCCESS": "s", "FAILURE": "f", "INVALID": "i"}
 
@@ -39,7 +41,16 @@ def tree_picture(record: RunRecord) -> TreePicture:
         return TreePicture(Markup(), (), _phases(node), (*remarks, remark))
     paths = tuple(one.path for one in nodes)
     svg = to_svg(node, TREE, {path: str(number) for number, path in enumerate(paths)})
-    return TreePicture(Markup(svg), paths, _phases(node), remarks)  # the export escapes what stems from the file
+    return TreePicture(Markup(_fitted(svg)), paths, _phases(node), remarks)  # the export escapes texts of the file
+
+
+def _fitted(svg: str) -> str:
+    """The picture as wide as the page, but not so small that its letters cannot be read."""
+    size = re.search(r' width="([\d.]+)" height="([\d.]+)"', svg)
+    assert size is not None
+    width, height = float(size[1]), float(size[2])
+    scale = min(1.0, max(LEAST_SCALE, PAGE_WIDTH / width))
+    return svg.replace(size[0], f' width="{width * scale:.0f}" height="{height * scale:.0f}"', 1)
 
 
 def _graph(record: RunRecord) -> tuple[Node | None, tuple[str, ...]]:
