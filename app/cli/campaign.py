@@ -341,22 +341,9 @@ def rerun(
 
 @contextmanager
 def _opened(name: str) -> "Iterator[tuple[Store, Version]]":
-    """The store in a folder, and the version that the name means: DIR@2, or the last one that did any run."""
+    """As `regrasp.app.campaigns.opened.opened`, which is imported late."""
     with late_imports():
-        from regrasp.app.campaigns.episodes import KIND
-        from regrasp.app.campaigns.store import Store
+        from regrasp.app.campaigns.opened import opened
 
-    text, at, number = name.rpartition("@")
-    if not at or not number.isdecimal() or Path(name).is_dir():
-        text, number = name, ""
-    with Store.read(Path(text)) as store:
-        if store.kind != KIND:
-            raise Findings([Finding(text, 0, f"holds {store.kind}; name the folder of a campaign of scenarios")])
-        with_runs = [version for version in store.versions() if version.runs]
-        if not with_runs:
-            raise Findings([Finding(text, 0, "holds no run yet; wait for the first")])
-        chosen = [version for version in with_runs if str(version.id) == number] if number else with_runs[-1:]
-        if not chosen:
-            known = ", ".join(f"@{version.id}" for version in with_runs)
-            raise Findings([Finding(name, 0, f"no version {number} with runs; there is {known}")])
-        yield store, chosen[0]
+    with opened(name) as found:
+        yield found

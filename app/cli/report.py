@@ -1,19 +1,15 @@
 """`regrasp report`: a run or a campaign as one page to look at."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from regrasp.app.files.findings import Finding, Findings, shown
-from regrasp.app.files.whole_file import write_named
 from regrasp.app.interrupts import late_imports
 from regrasp.app.records import folders
 
-if TYPE_CHECKING:
-    from regrasp.app.report.written import Written
-
-FILE = "report.html"
+_OWN = (*folders.FILES, "campaign.db", "campaign.lock", "video.mp4", "at_work.json")  # no page may take their place
 
 
 def add_to(app: typer.Typer) -> None:
@@ -26,11 +22,14 @@ def report(
         str, typer.Argument(metavar="DIR", help="A run's folder, or a campaign's; DIR@2 is its second version.")
     ],
     out: Annotated[
-        Path | None, typer.Option("-o", "--out", metavar="FILE", help=f"The page; default {FILE} in DIR.")
+        Path | None, typer.Option("-o", "--out", metavar="FILE", help="The page; default report.html in DIR.")
     ] = None,
     against: Annotated[
         str | None, typer.Option(metavar="DIR", help="For a campaign: another one, to compare it with.")
     ] = None,
+    runs: Annotated[
+        bool, typer.Option("--runs", help="For a campaign: write the reports of its failed runs, too, and link them.")
+    ] = False,
     force: Annotated[bool, typer.Option("--force", help="Write over a page that exists.")] = False,
 ) -> None:
     """Write a page that shows a run or a campaign.
@@ -44,37 +43,43 @@ def report(
     \b
     Examples:
       regrasp report runs/short_obstacle-0-1
-      regrasp report results/tall_obstacle -o tall.html
+      regrasp report results/tall_obstacle -o tall.html --runs
       regrasp report results/after --against results/before
 
     Exit code: 0, or 2 for bad input, also where a page was written of a
     damaged record.
     """
     with late_imports():
-        from regrasp.app.report.written import report_of
-    if out is not None:
-        _check(out, force)
-    made = report_of(folder, against)
-    page = out or made.folder / FILE
-    if out is None:
-        _check(page, force)
-    write_named(page, made.content)
-    _tell(made, page)
+        from regrasp.app.campaigns.opened import folder_named
+        from regrasp.app.report import written
 
-
-def _check(page: Path, force: bool) -> None:
-    """Raises `Findings` if the page cannot be written, or stands for something else."""
-    found = folders.file_findings(page)
-    if not found and page.exists():
-        if page.name in folders.FILES and (page.parent / "events.jsonl").exists():
-            found = [Finding(shown(page), 0, "belongs to a run's record; name another file")]
-        elif not force and page.is_file():
-            found = [Finding(shown(page), 0, "exists already; name another file with -o, or write --force")]
+    place, _ = folder_named(folder)
+    page = out or place / written.FILE
+    campaign = written.is_campaign(place)
+    found = [] if campaign else _for_campaigns(against=against, runs=runs)
+    found += [*_taken(page, force)] if out is not None or place.is_dir() else []
     if found:
         raise Findings(found)
+    damage = written.write_kept_reports(folder) if runs else []
+    if campaign:
+        made = written.write_campaign_report(folder, place, page, against)
+    else:
+        made = written.write_run_report(Path(folder), page)
+    typer.echo(str(made))
+    if damage or made.found:
+        raise Findings([*damage, *made.found])
 
 
-def _tell(made: "Written", page: Path) -> None:
-    typer.echo(f"{made.about}: {shown(page)}, {len(made.content) / 1e6:.1f} MB")
-    if made.found:
-        raise Findings([*made.found])
+def _for_campaigns(**options: object) -> list[Finding]:
+    return [Finding(f"--{name}", 0, "is for campaigns; leave it out") for name, given in options.items() if given]
+
+
+def _taken(page: Path, force: bool) -> list[Finding]:
+    """Why the page cannot be written; [] if it can."""
+    if found := folders.file_findings(page):
+        return found
+    if page.name in _OWN:
+        return [Finding(shown(page), 0, "is the name of a record's own file; name another, such as report.html")]
+    if page.is_file() and not force:
+        return [Finding(shown(page), 0, "exists already; name another file with -o, or write --force")]
+    return []
