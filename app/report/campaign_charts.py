@@ -25,10 +25,10 @@ def case_chart(cases: Sequence[CaseFigures]) -> Markup:
     shown = [case for case in cases if case in chosen]
     height = len(shown) * ROW + MARGIN
     with drawn(WIDTH, height) as figure:
-        axes = figure.add_axes((0.3, (MARGIN - 6) / height, 0.62, len(shown) * ROW / height))
+        axes = figure.add_axes((0.34, (MARGIN - 6) / height, 0.58, len(shown) * ROW / height))
         for number, case in enumerate(shown):
             _interval(axes, number, case.succeeded, case.runs, case.interval)
-        axes.set_yticks(range(len(shown)), [cut(case.case, 42) for case in shown])
+        axes.set_yticks(range(len(shown)), _names(shown))
         axes.set_ylim(len(shown) - 0.5, -0.5)
         axes.set_xlim(0, 100)
         axes.set_xlabel("runs as expected (%), with the 95 % interval")
@@ -36,6 +36,13 @@ def case_chart(cases: Sequence[CaseFigures]) -> Markup:
         axes.tick_params(axis="y", length=0)
         words = "; ".join(f"{case.case}: {case.succeeded} of {case.runs}" for case in shown[:12])
         return as_svg(figure, f"Share of runs as expected, by case. {words}")
+
+
+def _names(cases: Sequence[CaseFigures]) -> list[str]:
+    """The cases' names, without the scenario's where all have the same."""
+    scenarios = {case.case.partition(" ")[0] for case in cases}
+    told = [case.case.partition(" ")[2] if len(scenarios) == 1 else case.case for case in cases]
+    return [cut(name, 50) for name in told]
 
 
 def _interval(axes: "object", y: float, succeeded: int, runs: int, interval: tuple[float, float]) -> None:

@@ -32,7 +32,7 @@ class CampaignLimits:
 
     rows: int = 2000  # in the table of runs
     told: int = 40  # records of failed runs that are told in full
-    of_group: int = 10  # of these, of runs that failed alike
+    of_group: int = 5  # of these, of runs that failed alike
     slowest: int = 8
 
 
