@@ -75,6 +75,9 @@ def run_campaign(
     pictures: Annotated[
         bool, typer.Option("--pictures", help="Keep the cameras' frames at events in the records, as JPEG.")
     ] = False,
+    report: Annotated[
+        bool, typer.Option("--report", help="Write a page that shows the campaign into its folder: report.html.")
+    ] = False,
     require: Annotated[
         float | None,
         typer.Option(
@@ -150,6 +153,10 @@ def run_campaign(
         low = print_cases(store, version, {job.key for job in asked})
     if interrupted:
         raise typer.Exit(EXIT_INTERRUPTED)
+    if report:
+        from regrasp.app.report.written import write_campaign_report
+
+        typer.echo(f"report: {write_campaign_report(f'{folder}@{version}', folder)}")
     if require is not None and low < require:
         typer.echo(f"the interval begins at {100 * low:.1f} %, below the required {100 * require:.1f} %", err=True)
         raise typer.Exit(EXIT_UNMET)

@@ -1,6 +1,7 @@
 """The charts of a campaign: shares with intervals, and distributions."""
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from markupsafe import Markup
@@ -12,6 +13,9 @@ from regrasp.app.report.figures_of_runs import Figure
 from regrasp.app.report.knobs import Knob
 from regrasp.app.run.batch import Row
 from regrasp.interfaces.quote import cut
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 ROW, MARGIN = 22.0, 46.0  # px: a case's height, and the axis below
 MAX_CASES, COLUMNS = 40, 3
@@ -30,7 +34,7 @@ def case_chart(cases: Sequence[CaseFigures]) -> Markup:
             _interval(axes, number, case.succeeded, case.runs, case.interval)
         axes.set_yticks(range(len(shown)), _names(shown))
         axes.set_ylim(len(shown) - 0.5, -0.5)
-        axes.set_xlim(0, 100)
+        axes.set_xlim(0, 101)
         axes.set_xlabel("runs as expected (%), with the 95 % interval")
         axes.grid(visible=False, axis="y")
         axes.tick_params(axis="y", length=0)
@@ -45,37 +49,41 @@ def _names(cases: Sequence[CaseFigures]) -> list[str]:
     return [cut(name, 50) for name in told]
 
 
-def _interval(axes: "object", y: float, succeeded: int, runs: int, interval: tuple[float, float]) -> None:
+def _interval(axes: "Axes", y: float, succeeded: int, runs: int, interval: tuple[float, float]) -> None:
     low, high = (100 * end for end in interval)
-    axes.plot([low, high], [y, y], color=BLUE, lw=5, alpha=0.35, solid_capstyle="butt")  # type: ignore[attr-defined]
-    axes.plot([100 * succeeded / max(runs, 1)], [y], marker="o", ms=6.5, color=BLUE, mec=BLUE)  # type: ignore[attr-defined]
-    axes.text(101.5, y, f"{succeeded}/{runs}", va="center", fontsize=10, color=MUTED)  # type: ignore[attr-defined]
+    axes.plot([low, high], [y, y], color=BLUE, lw=4, alpha=0.45, solid_capstyle="butt")
+    axes.plot([100 * succeeded / max(runs, 1)], [y], marker="o", ms=5, color=BLUE, mec=BLUE)
+    axes.text(102.5, y, f"{succeeded}/{runs}", va="center", fontsize=10, color=MUTED)
 
 
 def distribution_chart(found: Sequence[Figure], rows: Sequence[Row]) -> Markup:
     """A histogram of each figure; runs that were not as expected stand on the others."""
+    from matplotlib.ticker import MaxNLocator  # late, as all of matplotlib
+
     lines = -(-len(found) // COLUMNS)
     height = lines * CELL
     with drawn(WIDTH, height) as figure:
         for number, one in enumerate(found):
             axes = figure.add_axes(_cell(number, height))
             parts = [[v for place, v in one.values.items() if rows[place].succeeded is met] for met in (True, False)]
-            edges = np.histogram_bin_edges([*one.values.values()], min(BINS, max(5, len(one.values) // 3)))
+            edges = np.histogram_bin_edges([*one.values.values()], min(BINS, max(5, len(one.values) // 3))).tolist()
             axes.hist(parts, edges, stacked=True, color=[BLUE, RED], label=["as expected", "not as expected"])
             _hatch(axes)
             axes.set_xlabel(cut(one.name, 44))
             if number % COLUMNS == 0:
                 axes.set_ylabel("runs")
             if number == 0 and any(parts[1]):
-                axes.legend(frameon=False, fontsize=9, labelcolor=MUTED, loc="lower left", bbox_to_anchor=(0, 1), ncols=2)
-            axes.yaxis.get_major_locator().set_params(integer=True, nbins=4)
-            axes.xaxis.get_major_locator().set_params(nbins=5)
+                axes.legend(
+                    frameon=False, fontsize=9, labelcolor=MUTED, loc="lower left", bbox_to_anchor=(0, 1), ncols=2
+                )
+            axes.yaxis.set_major_locator(MaxNLocator(4, integer=True))
+            axes.xaxis.set_major_locator(MaxNLocator(5))
         return as_svg(figure, f"Distributions over the runs: {', '.join(one.name for one in found)}")
 
 
-def _hatch(axes: "object") -> None:
+def _hatch(axes: "Axes") -> None:
     """The failed part with a dark edge, so that colour is not all that tells the two apart."""
-    for patch in axes.containers[1].patches:  # type: ignore[attr-defined]
+    for patch in axes.patches[len(axes.patches) // 2 :]:
         patch.set_edgecolor("#172033")
         patch.set_linewidth(0.8 if patch.get_height() else 0.0)
 
@@ -89,8 +97,8 @@ def knob_chart(knobs: Sequence[Knob]) -> Markup:
             axes = figure.add_axes(_cell(number, height))
             for place, one in enumerate(knob.settings):
                 low, high = (100 * end for end in one.interval)
-                axes.plot([place, place], [low, high], color=BLUE, lw=5, alpha=0.35, solid_capstyle="butt")
-                axes.plot([place], [100 * one.succeeded / one.runs], marker="o", ms=6, color=BLUE, mec=BLUE)
+                axes.plot([place, place], [low, high], color=BLUE, lw=4, alpha=0.45, solid_capstyle="butt")
+                axes.plot([place], [100 * one.succeeded / one.runs], marker="o", ms=4.5, color=BLUE, mec=BLUE)
             labels = [cut(one.value, 23) for one in knob.settings]
             long = sum(map(len, labels)) > 30
             axes.set_xticks(range(len(labels)), labels, rotation=25 if long else 0, ha="right" if long else "center")

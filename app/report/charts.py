@@ -19,7 +19,7 @@ WIDTH, LEFT, RIGHT = 1000, 170, 980  # px: of a chart, and where its time axis b
 PANEL_HEIGHT, HEAD, FOOT = 84, 34, 34  # px: of the curves, above and below them
 _DPI = 72.0  # a px of the page is a point of matplotlib
 _DASHES = ("-", (0, (5, 1.5)), (0, (1.5, 1.5)), (0, (6, 1.5, 1.5, 1.5)))  # so that colour is not all that tells curves
-_STYLE = {
+_STYLE: Any = {
     "svg.fonttype": "none",
     "svg.hashsalt": "regrasp",
     "font.family": "sans-serif",

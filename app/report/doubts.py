@@ -19,7 +19,7 @@ def doubts(together: CaseFigures, cases: Sequence[CaseFigures], knobs: Sequence[
         f"For an interval half as wide about {4 * n} runs are needed."
     )
     if k == n:
-        yield f"No run failed, and yet a failure in {math.floor(1 / (1 - low))} runs would not be excluded by {n} runs."
+        yield f"No run failed; and yet {n} such runs fit a robot that fails one time in {math.floor(1 / (1 - low))}."
     share = detectable_share(n)
     told = f"{_percent(share)} of the scenes got better and none worse" if share < 1 else "anything"
     yield (

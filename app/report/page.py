@@ -28,8 +28,8 @@ def page(template: str, script: str, **values: Any) -> bytes:
         f"default-src 'none'; script-src '{_digest(code)}'; style-src '{_digest(style)}'; "
         "img-src data:; media-src data:; base-uri 'none'; form-action 'none'"
     )
-    made = _environment().get_template(template).render(
-        policy=policy, style=Markup(style), script=Markup(code), **values
+    made = (
+        _environment().get_template(template).render(policy=policy, style=Markup(style), script=Markup(code), **values)
     )
     return made.encode("utf-8", "replace")
 

@@ -96,7 +96,9 @@ def _key_frame(t: float, camera: str, event: str, path: Path, limits: PictureLim
     height, width = image.shape[:2]
     if limits is not None:
         scale = min(1.0, limits.width / width)
-        small = cv2.resize(image, (max(1, int(width * scale)), max(1, int(height * scale))), interpolation=cv2.INTER_AREA)
+        small = cv2.resize(
+            image, (max(1, int(width * scale)), max(1, int(height * scale))), interpolation=cv2.INTER_AREA
+        )
         data = cv2.imencode(".jpg", small, [cv2.IMWRITE_JPEG_QUALITY, limits.quality])[1].tobytes()
         height, width = small.shape[:2]
     return KeyFrame(t, camera, event, width, height, Markup(base64.b64encode(data).decode()))

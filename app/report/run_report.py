@@ -16,7 +16,7 @@ from regrasp.app.report.asked import asked
 from regrasp.app.report.charts import curve_chart
 from regrasp.app.report.curves import Panel, panels, readable
 from regrasp.app.report.page import page, plain_texts
-from regrasp.app.report.pictures import PictureLimits, pictures
+from regrasp.app.report.pictures import pictures
 from regrasp.app.report.plans import plans
 from regrasp.app.report.sightings import Sightings
 from regrasp.app.report.time_line import time_line
@@ -33,7 +33,7 @@ class Verdict:
     rest: str
 
 
-def run_page(folder: Path, limits: PictureLimits = PictureLimits()) -> tuple[bytes, list[Finding]]:
+def run_page(folder: Path) -> tuple[bytes, list[Finding]]:
     """The page of a run's folder, and what is wrong in the folder: that is left out, and said in the page.
 
     Raises `Findings` for a folder without a run, or with one that is newer than this program.
@@ -43,7 +43,7 @@ def run_page(folder: Path, limits: PictureLimits = PictureLimits()) -> tuple[byt
     found += of_signals
     tried = attempts(record)
     tree = tree_picture(record)
-    shown = pictures(record, Sightings(record, signals), limits)
+    shown = pictures(record, Sightings(record, signals))
     curves = panels(signals) if signals else []
     what = asked(record)
     told = [f"{Path(one.source).name}{f', line {one.line}' if one.line else ''}: {one.message}" for one in found]

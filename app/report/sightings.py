@@ -39,7 +39,7 @@ class Sightings:
 
     def __init__(self, record: RunRecord, signals: Signals | None) -> None:
         self._record, self._signals = record, signals
-        self._arms: dict[str, "ArmKinematics"] = {}
+        self._arms: dict[str, ArmKinematics] = {}
         self._events = [event for event in record.events if _position(event) is not None]
 
     def at(self, t: float, camera: str) -> Iterator[Sighting]:
@@ -74,7 +74,11 @@ class Sightings:
             if seen_at is None or not 0.0 <= t - float(seen_at[row]) <= STALE:
                 continue
             covariance = signals.get(f"{name}.covariance")
-            spread = 0.0 if covariance is None else float(np.sqrt(CHI2_95 * max(float(covariance[row][[0, 6, 11]].max()), 0)))
+            spread = (
+                0.0
+                if covariance is None
+                else float(np.sqrt(CHI2_95 * max(float(covariance[row][[0, 6, 11]].max()), 0)))
+            )
             yield f"{name}, seen at {seen_at[row]:.2f} s", positions(signals[name][row : row + 1])[0], spread
 
     @cached_property
@@ -135,4 +139,3 @@ def _position(event: Event) -> FloatArray | None:
     if not isinstance(value, list) or len(value) != 3 or not all(isinstance(one, (int, float)) for one in value):
         return None
     return np.array(value, float)
-
