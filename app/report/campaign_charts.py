@@ -7,12 +7,11 @@ import numpy as np
 from markupsafe import Markup
 
 from regrasp.app.campaigns.figures import CaseFigures
-from regrasp.app.report.charts import WIDTH, as_svg, drawn
+from regrasp.app.report.charts import WIDTH, as_svg, drawn, label_text
 from regrasp.app.report.colours import BLUE, MUTED, RED
 from regrasp.app.report.figures_of_runs import Figure
 from regrasp.app.report.knobs import Knob
 from regrasp.app.run.batch import Row
-from regrasp.interfaces.quote import cut
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -46,7 +45,7 @@ def _names(cases: Sequence[CaseFigures]) -> list[str]:
     """The cases' names, without the scenario's where all have the same."""
     scenarios = {case.case.partition(" ")[0] for case in cases}
     told = [case.case.partition(" ")[2] if len(scenarios) == 1 else case.case for case in cases]
-    return [cut(name, 50) for name in told]
+    return [label_text(name, 50) for name in told]
 
 
 def _interval(axes: "Axes", y: float, succeeded: int, runs: int, interval: tuple[float, float]) -> None:
@@ -69,7 +68,7 @@ def distribution_chart(found: Sequence[Figure], rows: Sequence[Row]) -> Markup:
             edges = np.histogram_bin_edges([*one.values.values()], min(BINS, max(5, len(one.values) // 3))).tolist()
             axes.hist(parts, edges, stacked=True, color=[BLUE, RED], label=["as expected", "not as expected"])
             _hatch(axes)
-            axes.set_xlabel(cut(one.name, 44))
+            axes.set_xlabel(label_text(one.name, 44))
             if number % COLUMNS == 0:
                 axes.set_ylabel("runs")
             if number == 0 and any(parts[1]):
@@ -83,7 +82,10 @@ def distribution_chart(found: Sequence[Figure], rows: Sequence[Row]) -> Markup:
 
 def _hatch(axes: "Axes") -> None:
     """The failed part with a dark edge, so that colour is not all that tells the two apart."""
+    from matplotlib.patches import Rectangle
+
     for patch in axes.patches[len(axes.patches) // 2 :]:
+        assert isinstance(patch, Rectangle)
         patch.set_edgecolor("#172033")
         patch.set_linewidth(0.8 if patch.get_height() else 0.0)
 
@@ -99,13 +101,13 @@ def knob_chart(knobs: Sequence[Knob]) -> Markup:
                 low, high = (100 * end for end in one.interval)
                 axes.plot([place, place], [low, high], color=BLUE, lw=4, alpha=0.45, solid_capstyle="butt")
                 axes.plot([place], [100 * one.succeeded / one.runs], marker="o", ms=4.5, color=BLUE, mec=BLUE)
-            labels = [cut(one.value, 23) for one in knob.settings]
+            labels = [label_text(one.value, 23) for one in knob.settings]
             long = sum(map(len, labels)) > 30
             axes.set_xticks(range(len(labels)), labels, rotation=25 if long else 0, ha="right" if long else "center")
             axes.tick_params(axis="x", labelsize=9)
             axes.set_xlim(-0.6, len(labels) - 0.4)
             axes.set_ylim(0, 103)
-            axes.set_title(cut(knob.name, 44), fontsize=11, fontweight="bold", loc="left")
+            axes.set_title(label_text(knob.name, 44), fontsize=11, fontweight="bold", loc="left")
             axes.grid(visible=False, axis="x")
             if number % COLUMNS == 0:
                 axes.set_ylabel("as expected (%)")

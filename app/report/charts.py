@@ -10,6 +10,7 @@ from markupsafe import Markup, escape
 
 from regrasp.app.report.colours import GRID, INK, MUTED, SERIES
 from regrasp.app.report.curves import Curve, Panel
+from regrasp.interfaces.quote import cut, printable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -69,7 +70,14 @@ def as_svg(figure: "Figure", label: str) -> Markup:
     used = {*re.findall(r'(?:url\(|href=")#([\w-]+)', inner)}
     inner = re.sub(r' id="([^"]*)"', lambda found: found[0] if found[1] in used else "", inner)
     inner = re.sub(r"\s*\n\s*", "\n", inner)
-    return Markup(f'<svg class="chart" viewBox="{size[1]}" role="img" aria-label="{escape(label)}">{inner}')
+    return Markup(
+        f'<svg class="chart" viewBox="{size[1]}" role="img" aria-label="{escape(label_text(label, 600))}">{inner}'
+    )
+
+
+def label_text(text: str, most: int) -> str:
+    """A text that may stem from a file, of at most so many characters."""
+    return cut(printable(text), most)
 
 
 def _attributes(style: str) -> str:
@@ -103,7 +111,9 @@ def curve_chart(panels: Sequence[Panel], end: float) -> Markup:
 
 def _draw_panel(axes: "Axes", panel: Panel) -> None:
     axes.set_ylabel(panel.unit, rotation=0, ha="right", va="center", labelpad=8)
-    axes.text(0.0, 1.1, panel.title, transform=axes.transAxes, fontsize=12, fontweight="bold", va="bottom")
+    axes.text(
+        0.0, 1.1, label_text(panel.title, 80), transform=axes.transAxes, fontsize=12, fontweight="bold", va="bottom"
+    )
     for number, curve in enumerate(panel.curves):
         _draw_curve(axes, curve, SERIES[number % len(SERIES)], _DASHES[number % len(_DASHES)])
     axes.set_ylim(bottom=0.0)
@@ -125,9 +135,18 @@ def _draw_curve(axes: "Axes", curve: Curve, colour: str, dash: Any) -> None:
     if curve.region is not None:
         axes.vlines(curve.t, 0.0, curve.region, color=colour, alpha=0.25, lw=3, label="95 % region")
     if curve.dots:
-        axes.plot(curve.t, curve.values, ls="none", marker="o", ms=3, color=colour, mec=colour, label=curve.name)
+        axes.plot(
+            curve.t,
+            curve.values,
+            ls="none",
+            marker="o",
+            ms=3,
+            color=colour,
+            mec=colour,
+            label=label_text(curve.name, 50),
+        )
     else:
-        axes.plot(curve.t, curve.values, color=colour, lw=1.5, ls=dash, label=curve.name)
+        axes.plot(curve.t, curve.values, color=colour, lw=1.5, ls=dash, label=label_text(curve.name, 50))
 
 
 def _few_steps() -> Any:

@@ -42,6 +42,10 @@ def doubts(together: CaseFigures, cases: Sequence[CaseFigures], knobs: Sequence[
             f"What decides: of {len(knobs)} knobs looked at, one in twenty looks decisive by chance; and knobs that "
             "vary together cannot be told apart."
         )
+    yield (
+        "Scenes: of what a seed draws, only numbers are looked at here, not places or colours; campaigns from before "
+        "that was kept have none."
+    )
     yield "Reality: all of it is simulation, with its own limits; an interval speaks of these scenes and no others."
 
 

@@ -9,6 +9,7 @@ from regrasp.app.files.findings import Finding, Findings
 from regrasp.app.records.history import attempts
 from regrasp.app.records.reader import RunRecord, read_sound_part
 from regrasp.app.records.result import DEFAULT_CASE, Attempt, Result
+from regrasp.app.records.signals import FILE as SIGNALS
 from regrasp.app.records.signals import Signals
 from regrasp.app.records.summary import limit_words, measured_lines, what_ran
 from regrasp.app.report import course
@@ -88,6 +89,9 @@ def run_page(folder: Path) -> tuple[bytes, list[Finding]]:
 
 
 def _signals(record: RunRecord) -> tuple[Signals | None, list[Finding]]:
+    file = record.folder / SIGNALS
+    if file.is_file() and not file.stat().st_size:  # killed before the first tick
+        return None, []
     try:
         return record.signals(), []
     except Findings as error:
