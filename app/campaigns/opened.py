@@ -2,17 +2,10 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 
 from regrasp.app.campaigns.episodes import KIND
-from regrasp.app.campaigns.store import Store, Version
+from regrasp.app.campaigns.store import Store, Version, folder_named
 from regrasp.app.files.findings import Finding, Findings
-
-
-def folder_named(name: str) -> tuple[Path, str]:
-    """The folder, and the version's number or ''."""
-    text, at, number = name.rpartition("@")
-    return (Path(text), number) if at and number.isdecimal() and not Path(name).is_dir() else (Path(name), "")
 
 
 @contextmanager

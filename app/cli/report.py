@@ -50,7 +50,7 @@ def report(
     damaged record.
     """
     with late_imports():
-        from regrasp.app.campaigns.opened import folder_named
+        from regrasp.app.campaigns.store import folder_named
         from regrasp.app.report import written
 
     place, _ = folder_named(folder)

@@ -72,6 +72,8 @@ def _words(values: Mapping[str, Any], without: tuple[str, ...]) -> Iterator[str]
 def _value(value: Any) -> str:
     if isinstance(value, (list, tuple)):
         both_numbers = len(value) == 2 and all(isinstance(one, (int, float)) for one in value)
+        if both_numbers and value[0] == value[1]:
+            return _value(value[0])
         return (" to " if both_numbers else ", ").join(map(_value, value))
     if isinstance(value, dict):
         return ", ".join(_words(value, ()))

@@ -25,6 +25,9 @@ from regrasp.app.report.tree_picture import changes, tree_picture
 from regrasp.app.task.find import words_of
 
 
+LATE = 1.0  # s: signals that end so long before the record are cut off
+
+
 @dataclass(frozen=True)
 class Verdict:
     """How a run came out: `tone` is good, bad or unknown; `head` and `rest` are a few words and a sentence."""
@@ -51,6 +54,8 @@ def run_page(folder: Path) -> tuple[bytes, list[Finding]]:
     missing = [*record.remarks, *told, *what.remarks, *tree.remarks, *shown.remarks]
     if signals is None and not of_signals:
         missing.append("the record has no signals, so there are no curves")
+    elif curves and signals is not None and signals["t"][-1] < record.end - LATE:
+        missing.append(f"the signals end at {signals['t'][-1]:.2f} s, before the record does")
     elif not curves and not of_signals:
         missing.append("the signals end before there is anything to draw")
     end = max([record.end, record.result.sim_seconds if record.result else 0.0, *(one.ended for one in tried)])

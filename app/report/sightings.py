@@ -6,18 +6,18 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from regrasp.app.files.findings import Findings
 from regrasp.app.records.reader import Event, RunRecord
 from regrasp.app.records.signals import Signals
 from regrasp.app.report.curves import CHI2_95, positions
-from regrasp.app.scenario.cell_file import load_cell
 from regrasp.app.task import find
 from regrasp.interfaces.arrays import FloatArray
-from regrasp.interfaces.cell import CameraSpec, Cell, FixedMount
 
 if TYPE_CHECKING:
-    from regrasp.motion.robots.kinematics import ArmKinematics
+    from regrasp.interfaces.cell import CameraSpec, Cell
+    from regrasp.interfaces.robot.chain import Chain
 
 NEWEST = 0.5  # s: an event this near to a picture told of what is in it
 STALE = 2.0  # s: an older estimate is not drawn
@@ -39,7 +39,6 @@ class Sightings:
 
     def __init__(self, record: RunRecord, signals: Signals | None) -> None:
         self._record, self._signals = record, signals
-        self._arms: dict[str, ArmKinematics] = {}
         self._events = [event for event in record.events if _position(event) is not None]
 
     def at(self, t: float, camera: str) -> Iterator[Sighting]:
@@ -82,8 +81,10 @@ class Sightings:
             yield f"{name}, seen at {seen_at[row]:.2f} s", positions(signals[name][row : row + 1])[0], spread
 
     @cached_property
-    def _cell(self) -> Cell | None:
+    def _cell(self) -> "Cell | None":
         """The cell of the record, of its task; None if it cannot be read."""
+        from regrasp.app.scenario.cell_file import load_cell  # late: most runs keep no pictures
+
         record = self._record
         task = record.result.task if record.result else str(record.begin.get("task", ""))
         try:
@@ -91,25 +92,45 @@ class Sightings:
         except Findings:
             return None
 
-    def _camera_from_world(self, cell: Cell, spec: CameraSpec, t: float) -> FloatArray | None:
+    def _camera_from_world(self, cell: "Cell", spec: "CameraSpec", t: float) -> FloatArray | None:
         """The pose (4, 4) by which the robot places a picture that it got at second `t`; None if it is not known."""
+        from regrasp.interfaces.cell import FixedMount
+
         if isinstance(spec.mount, FixedMount):
             return np.asarray(spec.mount.world_from_camera.inv().as_matrix())
         arm, signals = spec.mount.arm, self._signals
         exposed = t - cell.known.latencies.image
-        row = None if signals is None or f"{arm}.joints" not in signals else _row(signals, exposed)
+        known = signals is not None and f"{arm}.tool" in signals and f"{arm}.joints" in signals
+        row = None if signals is None or not known else _row(signals, exposed)
         if signals is None or row is None:
             return None
-        mount = self._kinematics(cell, arm).mount(np.atleast_1d(signals[f"{arm}.joints"][row]).astype(float))
-        return np.asarray((mount * spec.mount.mount_from_camera).inv().as_matrix())
+        robot = cell.known.arm(arm).robot
+        link, link_from_mount = robot.mounted
+        world_from_link = _frame(signals[f"{arm}.tool"][row]) @ np.linalg.inv(robot.chain.last_from_tool)
+        for joint in reversed(range(link, len(robot.chain))):
+            moved = joint_motion(robot.chain, joint, float(np.atleast_1d(signals[f"{arm}.joints"][row])[joint]))
+            world_from_link = world_from_link @ np.linalg.inv(moved)
+        mount_from_camera = spec.mount.mount_from_camera.as_matrix()
+        return np.asarray(np.linalg.inv(world_from_link @ link_from_mount @ mount_from_camera))
 
-    def _kinematics(self, cell: Cell, arm: str) -> "ArmKinematics":
-        from regrasp.motion.robots.kinematics import ArmKinematics  # late: it brings compiled code
 
-        if arm not in self._arms:
-            spec = cell.known.arm(arm)
-            self._arms[arm] = ArmKinematics(spec.robot, spec.world_from_base)
-        return self._arms[arm]
+def joint_motion(chain: "Chain", joint: int, position: float) -> FloatArray:
+    """Pose (4, 4) of the link after a joint in the one before it, at a position in rad or m.
+
+    Not by `ArmKinematics`, whose compiled solvers take a second to import.
+    """
+    moved = np.eye(4)
+    moved[:3, 3] = chain.origins[joint]
+    if chain.slides[joint]:
+        moved[:3, 3] += position * chain.axes[joint]
+    else:
+        moved[:3, :3] = Rotation.from_rotvec(position * chain.axes[joint]).as_matrix()
+    return moved
+
+
+def _frame(numbers: FloatArray) -> FloatArray:
+    """The pose (4, 4) of a signal's twelve numbers."""
+    return np.vstack([np.asarray(numbers, float).reshape(3, 4), (0.0, 0.0, 0.0, 1.0)])
 
 
 def _row(signals: Signals, t: float) -> int | None:
@@ -119,7 +140,7 @@ def _row(signals: Signals, t: float) -> int | None:
 
 
 def _projected(
-    spec: CameraSpec, camera_from_world: FloatArray, point: FloatArray, spread: float
+    spec: "CameraSpec", camera_from_world: FloatArray, point: FloatArray, spread: float
 ) -> tuple[float, float, float] | None:
     """Where a point lies in the picture, and how large a radius in m around it is, as fractions of its size."""
     x, y, z = camera_from_world[:3, :3] @ point + camera_from_world[:3, 3]

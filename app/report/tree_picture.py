@@ -11,7 +11,6 @@ from regrasp.app.files.findings import Findings
 from regrasp.app.files.resources import read_text
 from regrasp.app.records.reader import RunRecord, Tick
 from regrasp.app.report.colours import TREE
-from regrasp.app.scenario.references import tree_text
 from regrasp.trees import Node, TreeSyntaxError, read_graph
 from regrasp.trees.export.svg import to_svg
 
@@ -58,13 +57,21 @@ def _graph(record: RunRecord) -> tuple[Node | None, tuple[str, ...]]:
     inputs = record.begin.get("inputs")
     try:
         read_text(path)  # its findings are ours
-        given = {key: tree_text(value) for key, value in inputs.items()} if isinstance(inputs, dict) else {}
-        return read_graph(path, inputs=given), ()
+        return read_graph(path, inputs=_texts(inputs) if isinstance(inputs, dict) else {}), ()
     except (Findings, TreeSyntaxError, OSError, ValueError) as error:
         why = str(error).splitlines()[0]
         of_ticks = _of_paths(record.ticks)
         instead = "drawn by the nodes in its ticks" if of_ticks else "not drawn"
         return of_ticks, (f"tree.xml cannot be read ({why}); the tree is {instead}",)
+
+
+def _texts(inputs: dict[str, Any]) -> dict[str, str]:
+    """The inputs as a tree file has them."""
+    if not inputs:
+        return {}
+    from regrasp.app.scenario.references import tree_text  # late: it brings all of scenarios
+
+    return {key: tree_text(value) for key, value in inputs.items()}
 
 
 def _of_paths(ticks: Sequence[Tick]) -> Node | None:
