@@ -24,7 +24,6 @@ from regrasp.app.report.time_line import time_line
 from regrasp.app.report.tree_picture import changes, tree_picture
 from regrasp.app.task.find import words_of
 
-
 LATE = 1.0  # s: signals that end so long before the record are cut off
 
 

@@ -28,7 +28,7 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name, hostile in (("run", False), ("hostile", True)):
         (folder / f"{name}.html").write_bytes(run_page(rich_record(folder / name, hostile))[0])
     write_campaign(folder / "campaign", 30, lambda seed: seed % 3 == 0, folder / "run")
-    bad = {"words": HOSTILE, "scenario": HOSTILE, "case": HOSTILE, "outcome": HOSTILE}
+    bad: dict[str, Any] = {"words": HOSTILE, "scenario": HOSTILE, "case": HOSTILE, "outcome": HOSTILE}
     write_campaign(folder / "worse", 6, lambda seed: seed % 2 == 0, **bad)
     for name in ("campaign", "worse"):
         (folder / f"{name}.html").write_bytes(campaign_page(str(folder / name)))
