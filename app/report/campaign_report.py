@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 from regrasp.app.campaigns.episodes import row_in
 from regrasp.app.campaigns.figures import Comparison, by_case, compare, failure_groups
@@ -23,7 +24,7 @@ from regrasp.app.report.run_report import Verdict
 from regrasp.app.run.batch import Row
 
 WIDTH = 110  # characters of an explanation
-REPORT = "report.html"  # of a run, in its record
+FILE = "report.html"  # of a run, in its record
 
 
 @dataclass(frozen=True)
@@ -90,6 +91,7 @@ def _page(
         groups=groups,
         row_in=row_in,
         told=told,
+        links=_links(store, stored, page_folder),
         distributions=distribution_chart(found, rows) if found else "",
         knobs=varied,
         knob_chart=knob_chart(varied) if varied else "",
@@ -128,11 +130,17 @@ def _told(store: Store, chosen: Sequence[StoredRow], page_folder: Path) -> dict[
     return {one.number: _in_full(store, one, page_folder) for one in chosen if one.record and store.folder}
 
 
+def _links(store: Store, stored: Sequence[StoredRow], page_folder: Path) -> dict[int, str]:
+    """The reports that lie in records, by their row's number."""
+    folder = store.folder or Path()
+    found = {one.number: _link(folder / one.record, page_folder) for one in stored if one.record}
+    return {number: link for number, link in found.items() if link}
+
+
 def _in_full(store: Store, stored: StoredRow, page_folder: Path) -> Told:
     assert store.folder is not None
     folder = store.folder / stored.record
-    report = folder / REPORT
-    link = Path(os.path.relpath(report, page_folder)).as_posix() if report.is_file() else ""
+    link = _link(folder, page_folder)
     try:
         record, wrong = read_sound_part(folder)
     except Findings as error:
@@ -140,6 +148,12 @@ def _in_full(store: Store, stored: StoredRow, page_folder: Path) -> Told:
     damage = "".join(f"damaged: {one.message}\n" for one in wrong)
     chain = (record.result.chain if record.result else None) or ()
     return Told(stored.number, chain, damage + explanation(record, WIDTH), link)
+
+
+def _link(record: Path, page_folder: Path) -> str:
+    """Where a record's own report is, seen from the page; '' if there is none."""
+    report = record / FILE
+    return quote(Path(os.path.relpath(report, page_folder)).as_posix()) if report.is_file() else ""
 
 
 def kept_records(name: str) -> list[Path]:
