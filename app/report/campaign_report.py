@@ -19,12 +19,11 @@ from regrasp.app.report.campaign_charts import case_chart, distribution_chart, k
 from regrasp.app.report.doubts import doubts
 from regrasp.app.report.figures_of_runs import figures, strange
 from regrasp.app.report.knobs import knobs
-from regrasp.app.report.page import page
+from regrasp.app.report.page import FILE, page
 from regrasp.app.report.run_report import Verdict
 from regrasp.app.run.batch import Row
 
 WIDTH = 110  # characters of an explanation
-FILE = "report.html"  # of a run, in its record
 
 
 @dataclass(frozen=True)

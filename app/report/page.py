@@ -13,6 +13,7 @@ from regrasp.app.report.colours import stylesheet
 from regrasp.interfaces.quote import cut, printable
 
 HERE = Path(__file__).parent
+FILE = "report.html"  # a report in the folder that it shows
 MAX_TEXT = 2000  # characters of one text; a longer one is cut in its middle
 
 

@@ -21,7 +21,7 @@ from regrasp.app.report.pictures import pictures
 from regrasp.app.report.plans import plans
 from regrasp.app.report.sightings import Sightings
 from regrasp.app.report.time_line import time_line
-from regrasp.app.report.tree_picture import changes, tree_picture
+from regrasp.app.report.tree_picture import TreePicture, changes, tree_picture
 from regrasp.app.task.find import words_of
 
 LATE = 1.0  # s: signals that end so long before the record are cut off
@@ -44,52 +44,68 @@ def run_page(folder: Path) -> tuple[bytes, list[Finding]]:
     record, found = read_sound_part(folder)
     signals, of_signals = _signals(record)
     found += of_signals
-    tried = attempts(record)
-    tree = tree_picture(record)
+    tried, tree, what = attempts(record), tree_picture(record), asked(record)
     shown = pictures(record, Sightings(record, signals))
     curves = panels(signals) if signals else []
-    what = asked(record)
-    told = [f"{Path(one.source).name}{f', line {one.line}' if one.line else ''}: {one.message}" for one in found]
-    missing = [*record.remarks, *told, *what.remarks, *tree.remarks, *shown.remarks]
-    if signals is None and not of_signals:
-        missing.append("the record has no signals, so there are no curves")
-    elif curves and signals is not None and signals["t"][-1] < record.end - LATE:
-        missing.append(f"the signals end at {signals['t'][-1]:.2f} s, before the record does")
-    elif not curves and not of_signals:
-        missing.append("the signals end before there is anything to draw")
     end = max([record.end, record.result.sim_seconds if record.result else 0.0, *(one.ended for one in tried)])
+    told = [f"{Path(one.source).name}{f', line {one.line}' if one.line else ''}: {one.message}" for one in found]
+    no_curves = [] if of_signals else _without_signals(record, signals, curves)
+    missing = [*record.remarks, *told, *what.remarks, *tree.remarks, *shown.remarks, *no_curves]
+    values = {
+        **_glance(record),
+        **_course(record, tried, tree, curves, end),
+        "asked": what,
+        "cameras": _by_camera(shown.frames),
+        "film": shown.film,
+        "missing": list(dict.fromkeys(missing)),
+    }
+    return page("run.html", "run.js", **values), found
+
+
+def _glance(record: RunRecord) -> dict[str, Any]:
+    """What the page tells at its top and at its end."""
+    result = record.result
+    return {
+        "title": _title(record),
+        "verdict": verdict(record),
+        "result": result,
+        "why": _why(record),
+        "expectations": _expectations(result),
+        "measured": [*measured_lines(result)] if result else [],
+        "measured_title": words_of(result.task).measured_title if result else "",
+        "belief": _belief(result),
+        "versions": result.versions if result else {},
+    }
+
+
+def _course(
+    record: RunRecord, tried: Sequence[Attempt], tree: TreePicture, curves: list[Panel], end: float
+) -> dict[str, Any]:
+    """What the page tells between: all that has a time."""
     marks, failed = course.marks(record), course.failures(record, tried)
-    return (
-        page(
-            "run.html",
-            "run.js",
-            title=_title(record),
-            verdict=verdict(record),
-            result=record.result,
-            why=_why(record),
-            expectations=_expectations(record.result),
-            measured=[*measured_lines(record.result)] if record.result else [],
-            measured_title=words_of(record.result.task).measured_title if record.result else "",
-            belief=_belief(record.result),
-            asked=what,
-            end=end,
-            time_line=time_line(course.phase_lane(tried, tree.phases), marks, course.lanes(tried), end),
-            tree=tree.svg,
-            cameras=_by_camera(shown.frames),
-            film=shown.film,
-            chart=curve_chart(curves, end) if curves else "",
-            panels=curves,
-            failures=failed,
-            repeated=course.repeated(failed),
-            plans=[*plans(record.events)],
-            log=marks[: course.MAX_LOG],
-            left_out=max(0, len(marks) - course.MAX_LOG),
-            missing=list(dict.fromkeys(missing)),
-            versions=record.result.versions if record.result else {},
-            data=plain_texts(_data(record, end, tried, tree.paths, curves)),
-        ),
-        found,
-    )
+    return {
+        "end": end,
+        "time_line": time_line(course.phase_lane(tried, tree.phases), marks, course.lanes(tried), end),
+        "tree": tree.svg,
+        "chart": curve_chart(curves, end) if curves else "",
+        "panels": curves,
+        "failures": failed,
+        "repeated": course.repeated(failed),
+        "plans": [*plans(record.events)],
+        "log": marks[: course.MAX_LOG],
+        "left_out": max(0, len(marks) - course.MAX_LOG),
+        "data": plain_texts(_data(record, end, tried, tree.paths, curves)),
+    }
+
+
+def _without_signals(record: RunRecord, signals: Signals | None, curves: Sequence[Panel]) -> list[str]:
+    """Why there are no curves, or none to the end."""
+    if signals is None:
+        return ["the record has no signals, so there are no curves"]
+    if not curves:
+        return ["the signals end before there is anything to draw"]
+    last = float(signals["t"][-1])
+    return [f"the signals end at {last:.2f} s, before the record does"] if last < record.end - LATE else []
 
 
 def _signals(record: RunRecord) -> tuple[Signals | None, list[Finding]]:

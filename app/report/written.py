@@ -6,9 +6,8 @@ from pathlib import Path
 from regrasp.app.campaigns import store
 from regrasp.app.files.findings import Finding, Findings, shown
 from regrasp.app.files.whole_file import write_named
+from regrasp.app.report.page import FILE as FILE
 from regrasp.app.report.run_report import run_page
-
-FILE = "report.html"  # in the folder that it shows
 
 
 @dataclass(frozen=True)
