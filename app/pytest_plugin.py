@@ -2,8 +2,9 @@
 
 Write a scenario suite: put scenario files named `*.scenario.yaml` beside your tests and call pytest. Each case is a
 test, `cells.scenario.yaml::gravity=zero`, that passes when all that the scenario expects comes out; otherwise its
-message is the run's explanation. The file's `markers` are the test's markers, so `-m "not slow"` leaves out what a file
-marks `slow`. Each case runs in a process of its own, hence `-n 2` is fine.
+message is the run's explanation, with the path of a page that shows it (`report.html` in the record). The file's
+`markers` are the test's markers, so `-m "not slow"` leaves out what a file marks `slow`. Each case runs in a process of
+its own, hence `-n 2` is fine.
 
     pytest --scenario-seed 0:5 --scenario-records runs     # every case with five seeds; the records are kept
     pytest --scenario-wall-limit 600                       # a case that takes longer than ten minutes fails
@@ -163,10 +164,17 @@ class ScenarioCase(_Item):
             [done] = ended
         result = result_of(Run(self.scenario, self.scenario.file.seed, folder), done)
         if done.value is None:
-            page = _explained(folder) if (folder / "events.jsonl").exists() else f"record  {folder}"
+            page = self._told(folder) if (folder / "events.jsonl").exists() else f"record  {folder}"
             raise ItemFailed(f"{done.error}\n{page}")
         if not result.succeeded:
-            raise ItemFailed(_explained(folder))
+            raise ItemFailed(self._told(folder))
+
+    def _told(self, folder: Path) -> str:
+        """The explanation of a run that failed, and the page that shows it, which is written here."""
+        if (report := _reported(folder)) is None:
+            return _explained(folder)
+        self.user_properties.append(("report", str(report)))
+        return f"{_explained(folder)}\nreport  {report}"
 
     def _folder(self) -> Path:
         """A new folder for the record."""
@@ -192,6 +200,16 @@ def _explained(folder: Path) -> str:
     from regrasp.app.records.reader import read_record
 
     return f"{explanation(read_record(folder), REPORT_WIDTH)}\nrecord  {folder}"
+
+
+def _reported(folder: Path) -> Path | None:
+    """The page of a run, in its record; None if it cannot be written, which must not hide why the run failed."""
+    from regrasp.app.files.findings import Findings
+    from regrasp.app.report.written import write_run_report
+
+    with suppress(Findings, OSError):
+        return write_run_report(folder).page
+    return None
 
 
 class TreeFile(pytest.File):

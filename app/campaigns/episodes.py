@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal, cast
 
 from regrasp.app.campaigns.campaign import Ended, Job, is_of_this_program
 from regrasp.app.campaigns.digest import digest_of, scenario_digest
+from regrasp.app.campaigns.scene import drawn_numbers
 from regrasp.app.campaigns.store import Store, StoredRow, damaged_row
 from regrasp.app.records.folders import folder_name
 from regrasp.app.records.result import Result, plain
@@ -68,8 +69,10 @@ class Stored:
 
 
 def _source(run: Run) -> dict[str, Any]:
-    """What the command line needs to do a run again."""
-    return {"scenario": str(run.scenario.path.absolute()), "overrides": list(run.scenario.overrides)}
+    """What the command line needs to do a run again, and what the seed drew of its scene."""
+    scene = drawn_numbers(run.scenario, run.folder)
+    source = {"scenario": str(run.scenario.path.absolute()), "overrides": list(run.scenario.overrides)}
+    return {**source, "scene": scene} if scene else source
 
 
 def row_in(stored: StoredRow) -> Row:

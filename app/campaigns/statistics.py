@@ -37,13 +37,15 @@ def detectable_share(pairs: int, level: float = 0.05, power: float = 0.8) -> flo
 
     It has p below `level` with the probability `power`; 1 when so few pairs cannot show anything.
     """
-    from scipy.optimize import brentq
-    from scipy.stats import binom
-
     least = math.ceil(1 - math.log2(level))  # 2 / 2^k < level
     if pairs < least:
         return 1.0
-    return float(brentq(lambda share: binom.sf(least - 1, pairs, share) - power, 0.0, 1.0))
+    low, high = 0.0, 1.0  # shares that are seen too seldom, and often enough; not by scipy, which takes a second
+    while high - low > 1e-9:
+        share = (low + high) / 2
+        seldom = sum(math.comb(pairs, k) * share**k * (1 - share) ** (pairs - k) for k in range(least)) > 1 - power
+        low, high = (share, high) if seldom else (low, share)
+    return high
 
 
 def median_interval(values: Sequence[float], level: float = 0.95) -> tuple[float, float, float]:

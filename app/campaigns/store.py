@@ -250,6 +250,12 @@ class Store:
             raise Findings([Finding(where, 0, f"holds {self.kind}, and these are {kind}; name another folder")])
 
 
+def folder_named(name: str) -> tuple[Path, str]:
+    """A campaign's folder, and the number of its version or '', by what a user types: DIR or DIR@2."""
+    text, at, number = name.rpartition("@")
+    return (Path(text), number) if at and number.isdecimal() and not Path(name).is_dir() else (Path(name), "")
+
+
 def _stored(found: Sequence[Any], folder: Path | None) -> StoredRow:
     number, version, key, title, ended, record, text = found
     try:

@@ -75,6 +75,9 @@ def run_campaign(
     pictures: Annotated[
         bool, typer.Option("--pictures", help="Keep the cameras' frames at events in the records, as JPEG.")
     ] = False,
+    report: Annotated[
+        bool, typer.Option("--report", help="Write a page that shows the campaign into its folder: report.html.")
+    ] = False,
     require: Annotated[
         float | None,
         typer.Option(
@@ -150,6 +153,10 @@ def run_campaign(
         low = print_cases(store, version, {job.key for job in asked})
     if interrupted:
         raise typer.Exit(EXIT_INTERRUPTED)
+    if report:
+        from regrasp.app.report.written import write_campaign_report
+
+        typer.echo(f"report: {write_campaign_report(f'{folder}@{version}', folder)}")
     if require is not None and low < require:
         typer.echo(f"the interval begins at {100 * low:.1f} %, below the required {100 * require:.1f} %", err=True)
         raise typer.Exit(EXIT_UNMET)
@@ -341,22 +348,9 @@ def rerun(
 
 @contextmanager
 def _opened(name: str) -> "Iterator[tuple[Store, Version]]":
-    """The store in a folder, and the version that the name means: DIR@2, or the last one that did any run."""
+    """As `regrasp.app.campaigns.opened.opened`, which is imported late."""
     with late_imports():
-        from regrasp.app.campaigns.episodes import KIND
-        from regrasp.app.campaigns.store import Store
+        from regrasp.app.campaigns.opened import opened
 
-    text, at, number = name.rpartition("@")
-    if not at or not number.isdecimal() or Path(name).is_dir():
-        text, number = name, ""
-    with Store.read(Path(text)) as store:
-        if store.kind != KIND:
-            raise Findings([Finding(text, 0, f"holds {store.kind}; name the folder of a campaign of scenarios")])
-        with_runs = [version for version in store.versions() if version.runs]
-        if not with_runs:
-            raise Findings([Finding(text, 0, "holds no run yet; wait for the first")])
-        chosen = [version for version in with_runs if str(version.id) == number] if number else with_runs[-1:]
-        if not chosen:
-            known = ", ".join(f"@{version.id}" for version in with_runs)
-            raise Findings([Finding(name, 0, f"no version {number} with runs; there is {known}")])
-        yield store, chosen[0]
+    with opened(name) as found:
+        yield found

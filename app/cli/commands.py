@@ -13,6 +13,7 @@ from regrasp.app.cli import (
     perceive,
     plan,
     records,
+    report,
     robots,
     run,
     scenarios,
@@ -30,6 +31,7 @@ COMMANDS = (  # in the order in which a newcomer uses them; those that only a ta
     "explain",
     "replay",
     "diff",
+    "report",
     "campaign",
     "scenarios",
     "migrate",
@@ -75,6 +77,7 @@ class _Group(TyperGroup):
 app = typer.Typer(cls=_Group, no_args_is_help=True, rich_markup_mode=None, pretty_exceptions_enable=False)
 run.add_to(app)
 records.add_to(app)
+report.add_to(app)
 app.add_typer(campaign.app, name="campaign")
 app.add_typer(scenarios.app, name="scenarios")
 app.add_typer(trees.app, name="trees")

@@ -46,6 +46,9 @@ def run_scenario(
     pictures: Annotated[
         bool, typer.Option("--pictures", help="Keep the cameras' frames at events in the record, as JPEG.")
     ] = False,
+    report: Annotated[
+        bool, typer.Option("--report", help="Write a page that shows the run into its record: report.html.")
+    ] = False,
     renderer: RendererOption = "software",
     wall_limit: WallLimitSeconds = None,
     dry_run: Annotated[
@@ -84,7 +87,7 @@ def run_scenario(
             wrong += folders.file_findings(junit) if junit else []
             _tell(_checked(partial(regrasp.load_cases, scenario, overrides), wrong, out), out)
             return
-        settings = Settings(video, pictures, renderer, quiet, wall_limit or math.inf)
+        settings = Settings(video, pictures, renderer, quiet, wall_limit or math.inf, report)
         raise typer.Exit(run_every(scenario, overrides, jobs or os.cpu_count() or 1, out, junit, settings, wrong))
     wrong += _given("is for many cases; write --all, too", jobs=jobs, junit=junit)
     [loaded] = _checked(lambda: [regrasp.load_scenario(scenario, overrides, case)], wrong, out)
@@ -103,6 +106,8 @@ def run_scenario(
         typer.echo(f"{result.cause.code}: {result.cause.message}, before the run began; there is no record", err=True)
         raise typer.Exit(EXIT_UNMET)
     typer.echo(run_summary(result, folder))
+    if report:
+        tell_report(folder)
     raise typer.Exit(exit_code(result))
 
 
@@ -170,6 +175,20 @@ def _given(message: str, **options: object) -> list[Finding]:
 _NO_DISPLAY = Finding(
     "--gui", 0, "there is no display here (DISPLAY is not set); run without it, and film with --video"
 )
+
+
+def tell_report(folder: Path) -> None:
+    """Write the report of a run into its record, and say where; what is in its way goes to stderr."""
+    from regrasp.app.report.written import write_run_report
+
+    try:
+        made = write_run_report(folder)
+    except Findings as error:
+        typer.echo(f"no report: {error}", err=True)
+        return
+    typer.echo(f"  report  {made}")
+    for finding in made.found:
+        typer.echo(str(finding), err=True)
 
 
 def exit_code(result: "Result") -> int:

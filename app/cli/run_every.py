@@ -1,5 +1,6 @@
 """Runs every case of a scenario and reports the results."""
 
+import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -58,9 +59,23 @@ def run_every(
         cases_done = [JunitCase(r.scenario.name, r.scenario.case, rows.get(n), r.folder) for n, r in enumerate(runs)]
         write_junit(junit, loaded[0].name, cases_done)
     _tell(loaded[0].name, runs, rows, into)
+    if settings and settings.report:
+        _report([run.folder for number, run in enumerate(runs) if number in rows and run.folder])
     if interrupted:
         return EXIT_INTERRUPTED
     return 0 if all(row.succeeded for row in rows.values()) else EXIT_UNMET
+
+
+def _report(records: Sequence[Path]) -> None:
+    """Write each record's report into it; what is in the way of one goes to stderr."""
+    from regrasp.app.report.written import FILE, write_run_report
+
+    for folder in records:
+        try:
+            write_run_report(folder)
+        except Findings as error:
+            print(f"no report: {error}", file=sys.stderr)
+    print(f"reports: {FILE} in each record")
 
 
 def _tell(name: str, runs: "Sequence[Run]", rows: "Mapping[int, Row]", into: Path) -> None:

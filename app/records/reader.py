@@ -54,6 +54,7 @@ class Event:
     event: str
     node: str
     values: dict[str, Any]
+    level: str = ""
 
 
 @dataclass(frozen=True)
@@ -90,6 +91,17 @@ def read_record(folder: Path) -> RunRecord:
     A run that was killed has no result, and its last lines may be incomplete: those are remarks. Raises `Findings` for
     a folder without a run, for invalid files, and for a result that is newer than this program.
     """
+    record, found = read_sound_part(folder)
+    if found:
+        raise Findings(found)
+    return record
+
+
+def read_sound_part(folder: Path) -> tuple[RunRecord, list[Finding]]:
+    """What can be read of a run's folder, and what is wrong in it; wrong lines, or a wrong result, are left out.
+
+    Raises `Findings` for a folder without a run, and for a result that is newer than this program.
+    """
     if not os.path.isdir(folder):
         wrong = "is no folder" if os.path.lexists(folder) else "does not exist"
         raise Findings([Finding(shown(folder), 0, f"{wrong}; name a folder that regrasp run made")])
@@ -106,10 +118,8 @@ def read_record(folder: Path) -> RunRecord:
         ended = any(event.event == "end" for event in events)
         why = "it is lost, for the run ended" if ended else "the run was killed, or still goes on"
         remarks.append(f"there is no result.json: {why}")
-    if found:
-        raise Findings(found)
     at_work = None if result else leaf_at_work(folder)
-    return RunRecord(folder, result, tuple(events), tuple(ticks), tuple(remarks), at_work)
+    return RunRecord(folder, result, tuple(events), tuple(ticks), tuple(remarks), at_work), found
 
 
 @cache
@@ -122,12 +132,13 @@ class _EventHead:
     t: SimSeconds
     event: str
     node: NodePath = ""
+    level: str = ""
 
 
 def _event(value: dict[str, Any]) -> Event:
     head = _adapter(_EventHead).validate_python(value)
     rest = {name: item for name, item in value.items() if name not in ("t", "level", "event", "node")}
-    return Event(head.t, head.event, head.node, rest)
+    return Event(head.t, head.event, head.node, rest, head.level)
 
 
 def _lines(path: Path, make: Callable[[dict[str, Any]], T], found: list[Finding], remarks: list[str]) -> list[T]:
@@ -166,8 +177,9 @@ def _result(path: Path, found: list[Finding]) -> Result | None:
         schema = value.pop("schema", None)
         if not isinstance(schema, int) or schema < 1:
             raise ValueError(f"no 'schema' with a number; a result.json that this program reads has {SCHEMA}")
-        if schema > SCHEMA:
-            raise ValueError(f"schema {schema} is newer than {SCHEMA}, which this program reads; take a newer Regrasp")
+        if schema > SCHEMA:  # what its fields mean is not known
+            message = f"schema {schema} is newer than {SCHEMA}, which this program reads; take a newer Regrasp"
+            raise Findings([Finding(shown(path), 1, message)])
         if schema < SCHEMA:
             _translate(value)
         result = _adapter(Result).validate_python(value)

@@ -31,6 +31,7 @@ class Settings:
     renderer: "RendererName" = "software"
     quiet: bool = False
     wall_limit: float = math.inf
+    report: bool = False  # whether `regrasp run` writes a page into each record
 
 
 @dataclass(frozen=True)

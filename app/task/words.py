@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 Lines = Callable[[Mapping[str, Any]], Iterator[str]]
+Moments = Callable[[Mapping[str, Any]], Iterator[tuple[float, str]]]
 
 
 def name_and_value(values: Mapping[str, Any]) -> Iterator[str]:
@@ -38,6 +39,11 @@ def numbers(values: Any) -> str:
     return "(" + ", ".join(f"{round(value, 3) + 0.0:.3f}" for value in values) + ")"
 
 
+def no_moments(_measured: Mapping[str, Any]) -> Iterator[tuple[float, str]]:
+    """Of a task that tells none."""
+    yield from ()
+
+
 @dataclass(frozen=True)
 class Words:
     """How a task tells of what it measured, and of what its robot knew. The defaults tell names and values."""
@@ -46,6 +52,7 @@ class Words:
     measured_title: str = "What was measured, by ground truth"
     measured_lines: Lines = name_and_value
     belief_lines: Lines = belief_lines
+    measured_moments: Moments = no_moments  # what truly happened when: seconds, and a few words for a time line
     # The words for what an expectation of this name wants; by default "at most" a number, and any other value itself.
     limits: Mapping[str, str] = field(default_factory=dict)  # such as {"slips": "at least {}, all noticed"}
 

@@ -53,6 +53,7 @@ def test_each_case_is_a_test_that_fails_with_the_explanation_alone(suite: pytest
             "Why it ended so",
             "*search_exhausted: not seen from 18 stops",
             "record *cells-gravity=earth-0",
+            "report *cells-gravity=earth-0/report.html",
         ]
     )
     result.stdout.no_fnmatch_line("*Traceback*")

@@ -75,7 +75,7 @@ def _node(box: NodeBox, theme: Theme) -> Group:
     body = Rect(box.x, box.y, box.width, box.height, radius, fill, colour, 2.2 if node.failed else 1.2)
     # A second box behind it shows that nodes are hidden.
     sheets = [replace(body, x=box.x + 3, y=box.y + 3), body] if node.hidden else [body]
-    return Group((*sheets, *_content(box, theme)), tooltip(node))
+    return Group((*sheets, *_content(box, theme)), tooltip(node), node.path)
 
 
 def _frame(box: NodeBox, theme: Theme) -> Group:

@@ -54,10 +54,11 @@ Shape = Rect | Curve | Lines | Text
 
 @dataclass(frozen=True)
 class Group:
-    """Shapes that belong together; the title is their tooltip."""
+    """Shapes that belong together; the title is their tooltip, `node` the path of the node that they show."""
 
     shapes: tuple[Shape, ...]
     title: str = ""
+    node: str = ""
 
 
 @dataclass

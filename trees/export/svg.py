@@ -1,5 +1,6 @@
 """A tree as SVG: one file, no script, no font or picture from elsewhere."""
 
+from collections.abc import Mapping
 from xml.sax.saxutils import escape, quoteattr
 
 from regrasp.trees.export.picture import picture
@@ -10,27 +11,31 @@ from regrasp.trees.graph import Node
 _FONTS = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, 'DejaVu Sans', sans-serif"
 
 
-def to_svg(root: Node, theme: Theme) -> str:
-    """The picture of the tree; a node's tooltip holds everything known about it."""
-    return _document(picture(root, theme))
+def to_svg(root: Node, theme: Theme, marks: Mapping[str, str] = {}) -> str:
+    """The picture of the tree; a node's tooltip holds everything known about it.
+
+    `marks` are words by the paths of nodes, which become `data-node` of what shows the node: for scripts and styles.
+    """
+    return _document(picture(root, theme), marks)
 
 
-def _document(drawing: Drawing) -> str:
+def _document(drawing: Drawing, marks: Mapping[str, str]) -> str:
     width, height = _px(drawing.width), _px(drawing.height)
     lines = [
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" viewBox="0 0 {width} {height}"'
         f' role="img" font-family="{_FONTS}">',
         f"<title>{escape(drawing.title)}</title>",
         f'<rect width="{width}" height="{height}" fill="{drawing.background}"/>',
-        *map(_group, drawing.groups),
+        *(_group(group, marks.get(group.node, "")) for group in drawing.groups),
         "</svg>",
     ]
     return "\n".join(lines)
 
 
-def _group(group: Group) -> str:
+def _group(group: Group, mark: str) -> str:
+    named = f" data-node={quoteattr(mark)}" if mark and group.node else ""
     title = f"<title>{escape(group.title)}</title>" if group.title else ""
-    return f"<g>{title}{''.join(map(_shape, group.shapes))}</g>"
+    return f"<g{named}>{title}{''.join(map(_shape, group.shapes))}</g>"
 
 
 def _shape(shape: Shape) -> str:

@@ -26,6 +26,7 @@ def shortened(text: str, size: float, width: float, bold: bool = False) -> str:
     """The text, cut with … where it would be wider than `width` pixels."""
     if text_width(text, size, bold) <= width:
         return text
+    text = text[: int(width / (size * _REGULAR * min(_CLASSES))) + 1]  # no more fits, of whatever letters
     while text and text_width(text + "…", size, bold) > width:
         text = text[:-1]
     return text + "…"

@@ -14,6 +14,14 @@ def _slip_lines(measured: Mapping[str, Any]) -> Iterator[str]:
         yield f"lost at {slip['released_at']:.2f} s, {seen}"
 
 
+def _slip_moments(measured: Mapping[str, Any]) -> Iterator[tuple[float, str]]:
+    """When the connector was lost, and when that was noticed."""
+    for slip in measured["slips"]:
+        yield slip["released_at"], "slip: the connector is lost"
+        if slip["detected_at"] is not None:
+            yield slip["detected_at"], f"the slip is noticed by {slip['detected_by']}"
+
+
 def _belief_lines(belief: Mapping[str, Any]) -> Iterator[str]:
     yield f"the hand holds {'the connector' if belief['held'] else 'nothing'}"
     if belief["connector"]:
@@ -35,5 +43,6 @@ WORDS = Words(
     measured_title="Losses of the connector, by ground truth",
     measured_lines=_slip_lines,
     belief_lines=_belief_lines,
+    measured_moments=_slip_moments,
     limits={"slips": "at least {}, all noticed"},
 )

@@ -1,0 +1,1 @@
+"""Reports: a run or a campaign as one HTML page that needs nothing else."""

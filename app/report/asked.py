@@ -1,0 +1,89 @@
+"""What was asked of a run: the scenario's own words, its faults, and what else it sets, by the record's copy."""
+
+import shlex
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from regrasp.app.files.findings import Findings
+from regrasp.app.files.resources import read_text
+from regrasp.app.files.yaml_lines import parse
+from regrasp.app.records.reader import RunRecord
+
+TOLD_ELSEWHERE = ("type", "when", "name")
+
+
+@dataclass(frozen=True)
+class Asked:
+    """The description ('' if there is none), facts as names and values, the faults in words, and remarks."""
+
+    description: str
+    facts: tuple[tuple[str, str], ...]
+    faults: tuple[str, ...]
+    again: str  # the command that does the run again, in the record's folder; '' if its scenario is gone
+    remarks: tuple[str, ...] = ()
+
+
+def asked(record: RunRecord) -> Asked:
+    """What the record says of it."""
+    scenario, remarks = _scenario(record)
+    begin = record.begin
+    facts = [(name, _value(begin[name])) for name in ("task", "tree", "cell", "gravity") if begin.get(name)]
+    facts += [(name, _value(value)) for name, value in _mapping(begin.get("inputs")).items()]
+    if obstacles := scenario.get("obstacles"):
+        facts.append(("obstacles", _names(obstacles)))
+    if limit := _mapping(begin.get("limits")).get("sim_seconds"):
+        facts.append(("time limit", f"{_value(limit)} s"))
+    if changed := begin.get("overrides"):
+        facts.append(("changed", _value(changed)))
+    faults = scenario.get("faults")
+    told = tuple(fault_words(one) for one in faults if isinstance(one, dict)) if isinstance(faults, list) else ()
+    again = f"regrasp run scenario.yaml --seed {shlex.quote(_value(_seed(record)))}" if scenario else ""
+    return Asked(str(scenario.get("description") or ""), tuple(facts), told, again, remarks)
+
+
+def _seed(record: RunRecord) -> Any:
+    return record.result.seed if record.result else record.begin.get("seed", 0)
+
+
+def _scenario(record: RunRecord) -> tuple[Mapping[str, Any], tuple[str, ...]]:
+    path = record.folder / "scenario.yaml"
+    try:
+        document = parse(read_text(path), path.name)
+    except Findings as error:
+        return {}, (f"scenario.yaml cannot be read: {error.items[0].message}",)
+    return _mapping(document.value), ()
+
+
+def fault_words(fault: Mapping[str, Any]) -> str:
+    """A fault with what it is given: "joint_stalls: arm right, joint shoulder; when node unplug, after 0.3 to 0.8"."""
+    own = ", ".join(_words(fault, TOLD_ELSEWHERE))
+    when = ", ".join(_words(_mapping(fault.get("when")), ()))
+    told = "; ".join(filter(None, [own, when and f"when {when}"]))
+    return f"{fault.get('type', 'a fault')}{told and f': {told}'}"
+
+
+def _words(values: Mapping[str, Any], without: tuple[str, ...]) -> Iterator[str]:
+    for name, value in values.items():
+        if value is not None and name not in without:
+            yield f"{name} {_value(value)}"
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, (list, tuple)):
+        both_numbers = len(value) == 2 and all(isinstance(one, (int, float)) for one in value)
+        if both_numbers and value[0] == value[1]:
+            return _value(value[0])
+        return (" to " if both_numbers else ", ").join(map(_value, value))
+    if isinstance(value, dict):
+        return ", ".join(_words(value, ()))
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _names(items: Any) -> str:
+    named = [str(one.get("name", "one")) for one in items if isinstance(one, dict)] if isinstance(items, list) else []
+    return f"{len(named)}: {', '.join(named[:8])}"
+
+
+def _mapping(value: Any) -> Mapping[str, Any]:
+    return value if isinstance(value, dict) else {}
