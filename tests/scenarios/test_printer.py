@@ -59,7 +59,7 @@ def test_the_whole_job_is_done_as_it_was_planned(gravity: str, tmp_path: Path) -
     result = regrasp.run(scenario, seed=4, out=tmp_path / "run")
     assert result.succeeded, [str(e) for e in result.expectations]
     told = CliRunner().invoke(app, ["explain", str(tmp_path / "run")]).stdout
-    plan = "take_part draw_out put_into_clamp grip_part twist_off put_into_tray close_door"
+    plan = "take_part draw_out look_at_desk put_into_clamp grip_part twist_off put_into_tray close_door"
     assert f"planned: because=the task begins, actions={plan}" in " ".join(told.split())
 
 
