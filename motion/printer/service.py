@@ -40,7 +40,7 @@ class PrinterMotionParameters(MotionParameters):
     slide_speed: float = 0.2  # share of the rail's speed with the door in hand; choice
     slide_samples: int = 50  # of the way with the door, among which the one nearest to a thing is told; choice
     end_stop: float = 0.02  # m before a slide's goal from which a door that is blocked has come to its stop; choice
-    # m of a slide, and share of the joints' greatest efforts that is a touch on it: the pads came forward as they closed
+    # m of a slide, and share of the joints' greatest efforts that is a touch on it: as they closed the pads came forward
     # and strained the arm along the hand, by up to 50 N, until the handle slides between them (seeds 605, 711)
     breakaway: float = 0.004
     breakaway_share: float = 0.8
