@@ -40,8 +40,8 @@ class PrinterMotionParameters(MotionParameters):
     slide_speed: float = 0.2  # share of the rail's speed with the door in hand; choice
     slide_samples: int = 50  # of the way with the door, among which the one nearest to a thing is told; choice
     end_stop: float = 0.02  # m before a slide's goal from which a door that is blocked has come to its stop; choice
-    # m of a slide, and share of the joints' greatest efforts that is a touch on it: as they closed the pads came forward
-    # and strained the arm along the hand, by up to 50 N, until the handle slides between them (seeds 605, 711)
+    # m of a slide, and share of the joints' greatest efforts that is a touch on it: the pads came forward as the jaw
+    # closed, and strain the arm along the hand, by up to 50 N, until the handle slides between them (seeds 605, 711)
     breakaway: float = 0.004
     breakaway_share: float = 0.8
     back_shares: tuple[float, ...] = (1.0, 0.6, 0.3)  # of the way back, the first that is free; choice
