@@ -2,14 +2,16 @@
 
 import math
 from collections.abc import Generator
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from regrasp.behaviors.leaf import LeafFailed, LeafPort, LeafSteps
 from regrasp.behaviors.printer.leaf import PrinterLeaf
 from regrasp.interfaces.cause import CauseCode
-from regrasp.interfaces.cell import Box
 from regrasp.interfaces.printer.actions import PlaceView, RailGoal
 from regrasp.interfaces.printer.cause import PrinterCause
+
+if TYPE_CHECKING:
+    from regrasp.interfaces.cell import Box
 
 
 class LookAtPlace(PrinterLeaf):
@@ -48,7 +50,7 @@ class LookAtPlace(PrinterLeaf):
             why = f"something stands {1e3 * seen.height:.0f} mm high on the {name}"
             raise LeafFailed(PrinterCause.PLACE_OCCUPIED, why)
 
-    def _look(self, place: Box, name: str) -> Generator[None, None, PlaceView]:
+    def _look(self, place: "Box", name: str) -> Generator[None, None, PlaceView]:
         """Wait for a frame that shows the place."""
         camera, perception = self.services.known.printer.camera, self.services.perception
         begin = self.services.clock.now()
@@ -61,8 +63,10 @@ class LookAtPlace(PrinterLeaf):
             yield None
         return seen
 
-    def _place(self, name: str) -> Box:
+    def _place(self, name: str) -> "Box":
         """The room on the clamp or in the tray that the part shall take up, in the clamp with its plate."""
+        from regrasp.interfaces.cell import Box  # late: a tree's check needs no scipy
+
         printer = self.services.known.printer
         tall = printer.part.size[2] + printer.plate.size[2]
         if name == "clamp":

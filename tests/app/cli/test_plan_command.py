@@ -88,10 +88,12 @@ def test_a_plan_as_a_tree_is_checked_and_does_the_actions_in_order(tmp_path: Pat
     assert (checked.exit_code, checked.stdout) == (0, "1 tree, no findings\n")
     run = ScriptedTree(out)
     assert run.run() == run.status.SUCCESS
-    done = [path.partition("/task/")[2].split("/")[1] for path in run.leaves if "/task/" in path]
-    assert [*dict.fromkeys(done)] == [
-        *("take_part", "draw_out", "put_into_clamp", "grip_part", "twist_off", "put_into_tray", "close_door")
-    ]
+    actions = (
+        *("take_part", "draw_out", "look_at_desk", "put_into_clamp"),
+        *("grip_part", "twist_off", "put_into_tray", "close_door"),
+    )
+    words = [word for path in run.leaves for word in path.partition("/task/")[2].split("/") if word in actions]
+    assert tuple(dict.fromkeys(words)) == actions
 
 
 def test_no_plan_is_told_with_exit_code_1(lamp: Path) -> None:

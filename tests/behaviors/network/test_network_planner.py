@@ -51,7 +51,7 @@ def after(net: TaskNetwork, state: dict[str, str], actions: tuple[str, ...]) -> 
 def test_the_whole_job_is_planned_from_the_start(shipped: TaskNetwork) -> None:
     made = plan(shipped, shipped.start())
     assert made.actions == (
-        *("open_door", "take_part", "draw_out", "put_into_clamp"),
+        *("open_door", "take_part", "draw_out", "look_at_desk", "put_into_clamp"),
         *("grip_part", "twist_off", "put_into_tray", "close_door"),
     )
     assert after(shipped, shipped.start(), made.actions) == {
