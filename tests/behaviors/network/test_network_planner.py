@@ -59,6 +59,7 @@ def test_the_whole_job_is_planned_from_the_start(shipped: TaskNetwork) -> None:
         "plate": "clamp",
         "part": "tray",
         "hand": "empty",
+        "desk": "free",
     }
 
 
