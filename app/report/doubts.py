@@ -14,9 +14,10 @@ def doubts(together: CaseFigures, cases: Sequence[CaseFigures], knobs: Sequence[
     """The sentences of a campaign."""
     n, k = together.runs, together.succeeded
     low, high = together.interval
+    more = 4 * n if 0 < k < n else 2 * n + 4  # Wilson's interval is z^2 / (n + z^2) wide where all came out alike
     yield (
         f"The share of success: {k} of {n} fits anything from {_percent(low)} to {_percent(high)} (95 %). "
-        f"For an interval half as wide about {4 * n} runs are needed."
+        f"For an interval half as wide about {more} runs are needed."
     )
     if k == n:
         yield f"No run failed; and yet {n} such runs fit a robot that fails one time in {math.floor(1 / (1 - low))}."

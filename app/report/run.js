@@ -184,8 +184,15 @@ document.addEventListener("click", (event) => {
   if (go) pick(Number(go.dataset.t));
 });
 const KEYS = { " ": "play", b: "back", f: "forth", n: "fail" };
+const ARROWS = { ArrowLeft: -1, ArrowRight: 1 };  // the slider takes them itself when it has the focus
 document.addEventListener("keydown", (event) => {
-  if (event.ctrlKey || event.metaKey || event.altKey || !KEYS[event.key]) return;
+  if (event.ctrlKey || event.metaKey || event.altKey) return;
+  if (ARROWS[event.key] && event.target === document.body) {
+    slider.stepUp(ARROWS[event.key]);
+    pick(Number(slider.value));
+    event.preventDefault();
+  }
+  if (!KEYS[event.key]) return;
   const typing = event.target.matches("input[type=search], select");
   const presses = event.key === " " && event.target.matches("button, summary");
   if (typing || presses) return;
