@@ -40,10 +40,9 @@ class PrinterMotionParameters(MotionParameters):
     slide_speed: float = 0.2  # share of the rail's speed with the door in hand; choice
     slide_samples: int = 50  # of the way with the door, among which the one nearest to a thing is told; choice
     end_stop: float = 0.02  # m before a slide's goal from which a door that is blocked has come to its stop; choice
-    # m of a slide, and share of the joints' greatest efforts that is a touch on it: the pads came forward as the jaw
-    # closed, and strain the arm along the hand, by up to 50 N, until the handle slides between them (seeds 605, 711)
-    breakaway: float = 0.004
-    breakaway_share: float = 0.8
+    # share of the joints' greatest efforts that is a touch on a slide: the pads came forward as the jaw closed, and
+    # strain the arm along the hand by up to 50 N, until the handle slides between them (seeds 605, 670, 672, 711)
+    slide_share: float = 0.8
     back_shares: tuple[float, ...] = (1.0, 0.6, 0.3)  # of the way back, the first that is free; choice
     blocked: float = 30.0  # N across with which a door presses that goes no further; choice: it takes 8 N to slide
     relieved: float = 6.0  # N across that may be left when a hand has given way to what it holds; choice
@@ -423,9 +422,10 @@ class PrinterMotion(Motion):
                 why = f"on its way with the door the arm would come to {1e3 * distance:.0f} mm from {what}"
                 raise PlanningError(CauseCode.MOTION_BLOCKED, why)
             thickness = self._door.handle.size[1]
+            limits = replace(self._guard.drawing, share=self.parameters.slide_share, back_off=False)
             watch = GripWatch(self.grippers[arm], thickness, self.parameters.execution.jaw.grip.gap)
             try:
-                for _ in self._sliding(arm, path, speed, model):
+                for _ in self._follow(arm, path, speed, model, limits):
                     if (evidence := watch.evidence()).detected:
                         self.execution.halt(arm)
                         trouble = self._lost_or_blocked(arm, evidence.sentence)
@@ -445,16 +445,6 @@ class PrinterMotion(Motion):
             self._on_anomaly(f"{trouble}; {1e3 * abs(left):.0f} mm are left, so this is its end stop")
 
         return self._together(arm, steps())
-
-    def _sliding(self, arm: str, path: FloatArray, speed: float, model: CollisionModel) -> Iterator[None]:
-        """Steps along a path (2, n) with the handle in the hand, the first bit of it with less feeling."""
-        values, limits = self.parameters, replace(self._guard.drawing, back_off=False)
-        length = float(np.max(np.abs(path[1] - path[0])))  # m: the rail alone moves
-        first = path[0] + min(values.breakaway / max(length, 1e-9), 1.0) * (path[1] - path[0])
-        strained = replace(limits, share=values.breakaway_share)
-        yield from self._follow(arm, np.array([path[0], first]), speed, model, strained)
-        if length > values.breakaway:
-            yield from self._follow(arm, np.array([first, path[1]]), speed, model, limits)
 
     def _lost_or_blocked(self, arm: str, gap: str) -> PlanningError:
         """Why the pads of a hand that slides the door stand otherwise than they held, as the sentence `gap` says.
