@@ -120,7 +120,7 @@ def compare(first: Iterable[StoredRow], second: Iterable[StoredRow]) -> Comparis
     worse = [scene for scene in both if a[scene].succeeded and not b[scene].succeeded]
     timed = [scene for scene in both if a[scene].succeeded and b[scene].succeeded]
     seconds = [[rows[scene].sim_seconds for scene in timed] for rows in (a, b)]
-    medians = tuple(statistics.median(each) if each else math.nan for each in seconds)
+    medians = tuple(statistics.median_low(each) if each else math.nan for each in seconds)
     return Comparison(
         scenes=len(both),
         only_first=len(a) - len(both),

@@ -15,18 +15,18 @@ TOLD_ELSEWHERE = ("type", "when", "name")
 
 @dataclass(frozen=True)
 class Asked:
-    """The description ('' if there is none), facts as names and values, the faults in words, and remarks."""
+    """The description ('' if there is none), facts as names and values, the faults in words, and damage."""
 
     description: str
     facts: tuple[tuple[str, str], ...]
     faults: tuple[str, ...]
     again: str  # the command that does the run again, in the record's folder; '' if its scenario is gone
-    remarks: tuple[str, ...] = ()
+    damage: tuple[str, ...] = ()
 
 
 def asked(record: RunRecord) -> Asked:
     """What the record says of it."""
-    scenario, remarks = _scenario(record)
+    scenario, damage = _scenario(record)
     begin = record.begin
     facts = [(name, _value(begin[name])) for name in ("task", "tree", "cell", "gravity") if begin.get(name)]
     facts += [(name, _value(value)) for name, value in _mapping(begin.get("inputs")).items()]
@@ -39,7 +39,7 @@ def asked(record: RunRecord) -> Asked:
     faults = scenario.get("faults")
     told = tuple(fault_words(one) for one in faults if isinstance(one, dict)) if isinstance(faults, list) else ()
     again = f"regrasp run scenario.yaml --seed {shlex.quote(_value(_seed(record)))}" if scenario else ""
-    return Asked(str(scenario.get("description") or ""), tuple(facts), told, again, remarks)
+    return Asked(str(scenario.get("description") or ""), tuple(facts), told, again, damage)
 
 
 def _seed(record: RunRecord) -> Any:

@@ -39,6 +39,13 @@ function stateOf(number, t) {
   return at < 0 ? "i" : own[2 * at + 1];
 }
 
+// Whether a node changed its state at this very moment.
+function changedAt(number, t) {
+  const own = data.changes[number] || [];
+  const at = last(own.length / 2, (i) => own[2 * i], t);
+  return at >= 0 && Math.abs(own[2 * at] - t) < 0.03;
+}
+
 function showTree(t) {
   const running = [];
   for (const node of nodes) {
@@ -52,7 +59,9 @@ function showTree(t) {
   const leaves = running.filter((path) => !running.some((other) => other.startsWith(path + "/")));
   const failed = nodes.filter((node) => node.state === "f").map((node) => data.paths[node.number]);
   const told = find("states");
-  if (!playing) reveal(running.length ? leaves : failed);
+  const failing = nodes.filter((node) => node.state === "f" && changedAt(node.number, t)).map((node) => data.paths[node.number]);
+  const deepest = failing.sort((a, b) => b.split("/").length - a.split("/").length);
+  if (!playing) reveal(deepest.length ? deepest : running.length ? leaves : failed);
   if (told) told.textContent = `Running: ${leaves.join(", ") || "nothing"}. Failed: ${failed.join(", ") || "nothing"}.`;
 }
 
@@ -137,7 +146,8 @@ function show(t) {
   const event = showLog(now);
   const busy = data.work.filter(([from, to]) => from <= now + 1e-6 && now < to).map((one) => one[2].split("/").pop());
   const words = `${busy.length ? "at work: " + [...new Set(busy)].join(", ") : "no leaf at work"}${event ? " · last event: " + event : ""}`;
-  if (!playing) find("now").textContent = words;
+  find("now").setAttribute("aria-live", playing ? "off" : "polite");
+  find("now").textContent = words;
   slider.setAttribute("aria-valuetext", `${now.toFixed(2)} seconds, ${words}`);
   if (film && !playing && film.readyState > 0) film.currentTime = Math.min(now, film.duration || now);
 }
@@ -181,7 +191,9 @@ find("speed").addEventListener("change", () => { if (playing) { pause(); play();
 slider.addEventListener("input", () => pick(Number(slider.value)));
 document.addEventListener("click", (event) => {
   const go = event.target.closest("button.go");
-  if (go) pick(Number(go.dataset.t));
+  if (!go) return;
+  pick(Number(go.dataset.t));
+  if (!go.closest("#course")) find("course").scrollIntoView();
 });
 const KEYS = { " ": "play", b: "back", f: "forth", n: "fail" };
 const ARROWS = { ArrowLeft: -1, ArrowRight: 1 };  // the slider takes them itself when it has the focus

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from regrasp.app.files.findings import Finding, Findings
+from regrasp.app.files.findings import Finding, Findings, shown
 from regrasp.app.records.history import attempts
 from regrasp.app.records.reader import RunRecord, read_sound_part
 from regrasp.app.records.result import DEFAULT_CASE, Attempt, Result
@@ -45,21 +45,31 @@ def run_page(folder: Path) -> tuple[bytes, list[Finding]]:
     signals, of_signals = _signals(record)
     found += of_signals
     tried, tree, what = attempts(record), tree_picture(record), asked(record)
-    shown = pictures(record, Sightings(record, signals))
+    kept = pictures(record, Sightings(record, signals))
     curves = panels(signals) if signals else []
     end = max([record.end, record.result.sim_seconds if record.result else 0.0, *(one.ended for one in tried)])
     told = [f"{Path(one.source).name}{f', line {one.line}' if one.line else ''}: {one.message}" for one in found]
     no_curves = [] if of_signals else _without_signals(record, signals, curves)
-    missing = [*record.remarks, *told, *what.remarks, *tree.remarks, *shown.remarks, *no_curves]
+    missing = [*record.remarks, *told, *what.damage, *tree.damage, *tree.remarks, *kept.remarks, *no_curves]
+    if record.result is not None or any(event.event == "end" for event in record.events):
+        empty = () if record.events else ("is empty",)
+        of_files = {"": record.remarks, "events.jsonl": empty, "scenario.yaml": what.damage, "tree.xml": tree.damage}
+        found += _cut(folder, of_files | {SIGNALS: no_curves})
     values = {
         **_glance(record),
         **_course(record, tried, tree, curves, end),
         "asked": what,
-        "cameras": _by_camera(shown.frames),
-        "film": shown.film,
+        "cameras": _by_camera(kept.frames),
+        "film": kept.film,
         "missing": list(dict.fromkeys(missing)),
     }
     return page("run.html", "run.js", **values), found
+
+
+def _cut(folder: Path, remarks: Mapping[str, Sequence[str]]) -> list[Finding]:
+    """The remarks on files that are there: a run that ended wrote them whole. An old record has not all of them."""
+    there = {name: told for name, told in remarks.items() if (folder / name).exists()}
+    return [Finding(shown(folder / name), 0, remark) for name, told in there.items() for remark in told]
 
 
 def _glance(record: RunRecord) -> dict[str, Any]:

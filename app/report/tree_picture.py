@@ -21,26 +21,30 @@ LETTERS = {"RUNNING": "r", "SUCCESS": "s", "FAILURE": "f", "INVALID": "i"}
 
 @dataclass(frozen=True)
 class TreePicture:
-    """The picture ('' if there is none), the paths of its nodes in their order, and remarks on what is missing."""
+    """The picture ('' if there is none), the paths of its nodes in their order, and remarks on what is missing.
+
+    `damage` is a remark where the record's tree cannot be read.
+    """
 
     svg: Markup
     paths: tuple[str, ...]
     phases: Mapping[str, str]  # of a leaf's path the outermost SubTree that it is in, by its own name
+    damage: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
 
 
 def tree_picture(record: RunRecord) -> TreePicture:
     """The tree that ran, by the record's copy, or, where that cannot be read, by the paths in its ticks."""
-    node, remarks = _graph(record)
+    node, damage = _graph(record)
     if node is None:
-        return TreePicture(Markup(), (), {}, remarks)
+        return TreePicture(Markup(), (), {}, damage)
     nodes = [one for one in node.walk() if one.kind != "subtree" or not one.children]
     if len(nodes) > MAX_DRAWN:
         remark = f"the tree has {len(nodes)} nodes, which is too many for a picture here; regrasp trees export draws it"
-        return TreePicture(Markup(), (), _phases(node), (*remarks, remark))
+        return TreePicture(Markup(), (), _phases(node), damage, (remark,))
     paths = tuple(one.path for one in nodes)
     svg = to_svg(node, TREE, {path: str(number) for number, path in enumerate(paths)})
-    return TreePicture(Markup(_fitted(svg)), paths, _phases(node), remarks)  # the export escapes texts of the file
+    return TreePicture(Markup(_fitted(svg)), paths, _phases(node), damage)  # the export escapes texts of the file
 
 
 def _fitted(svg: str) -> str:

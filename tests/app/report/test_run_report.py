@@ -120,16 +120,16 @@ def test_what_can_be_read_of_a_damaged_record_is_shown(copy: Path, name: str, co
     told = typed(copy)
     text = (copy / "report.html").read_text()
     assert "toy" in text or name == "events.jsonl"
-    cut_off = {"events.jsonl": (b"", b'{"schema"'), "ticks.jsonl": (b"", b'{"schema"'), "signals.f32": (b"",)}
-    assert told.exit_code == (0 if content in cut_off.get(name, ()) else 2)
-    assert told.exit_code == 0 or f"run/{name}" in told.stderr
+    no_tick = name == "ticks.jsonl" and not content  # a run may end before its first
+    assert told.exit_code == (0 if no_tick else 2)
+    assert no_tick or name in told.stderr
     assert "Traceback" not in told.output
 
 
 @pytest.mark.parametrize("name", ["scenario.yaml", "tree.xml", "cell.yaml", "pictures/0000.50-rear-slip.jpg"])
 def test_files_beside_the_record_may_be_broken(copy: Path, name: str) -> None:
     (copy / name).write_bytes(b"\xff\x00{[")
-    assert typed(copy).exit_code == 0
+    assert typed(copy).exit_code == (2 if name in ("scenario.yaml", "tree.xml") else 0)
     assert name == "cell.yaml" or name.rpartition("/")[2] in (copy / "report.html").read_text()
 
 
