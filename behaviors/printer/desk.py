@@ -23,7 +23,6 @@ class LookAtPlace(PrinterLeaf):
 
     least_points = 300  # that must show the place; choice: a free one has 1000
     least_above = 20  # of them that make a thing; choice: a cube of 3 cm has 150
-
     rim = 0.02  # m of the tray's edges that do not count: its walls, 1 cm thick, by camera and arm 5 mm off; choice
 
     INPUT_PORTS: ClassVar[dict[str, Any]] = {
