@@ -30,8 +30,8 @@ class ServoParameters:
     corridor: float = 0.004  # m beside the goal's axis within which the hand goes on along it; choice
     funnel: float = 2.0  # m before the goal for each m that it is further beside; choice
     most_before: float = 0.10  # m; choice: from there fingers 0.05 m long do not reach the target
-    # m before the target's front from where its last place and velocity are trusted: nearer than 3 mm the fingers hide a
-    # part of it, and its front is measured up to 8 mm too far away
+    # m before the target's front from where its last place and velocity are trusted: nearer than 3 mm the fingers hide
+    # a part of it, and its front is measured up to 8 mm too far away
     blind: float = 0.015
     lost: float = 1.0  # s without a picture that shows the target; a sound camera needs 0.1
     timeout: float = 20.0  # s; without a fault it takes 3
