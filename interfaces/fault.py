@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar, Literal, Self
 import numpy as np
 from pydantic import AfterValidator, Field, model_validator
 
-from regrasp.interfaces.fields import Direction, Fraction, Model, Vector, in_order
+from regrasp.interfaces.fields import Direction, Fraction, Model, Vector, in_order, unit
 
 SimTime = Annotated[float, Field(ge=0, le=3600)]  # seconds
 TimeRange = Annotated[tuple[SimTime, SimTime], AfterValidator(in_order)]
@@ -25,7 +25,10 @@ class When(Model):
     SHARES: ClassVar[tuple[str, ...]] = ()
 
     at: TimeRange | None = Field(
-        default=None, description="Simulated seconds; drawn from this range.", examples=[[5.0, 8.0]]
+        default=None,
+        description="Simulated seconds; drawn from this range.",
+        json_schema_extra=unit("s"),
+        examples=[[5.0, 8.0]],
     )
     node: str | None = Field(
         default=None,
@@ -35,6 +38,7 @@ class When(Model):
     after: TimeRange | None = Field(
         default=None,
         description="With `node`: seconds after it is entered; drawn from this range.",
+        json_schema_extra=unit("s"),
         examples=[[0.5, 1.5]],
     )
 
@@ -67,7 +71,10 @@ class Lasting(Fault):
     """A fault that may end before the run does."""
 
     seconds: Annotated[float, Field(gt=0, le=600)] | None = Field(
-        default=None, description="How long it lasts, in seconds; without it, to the end of the run.", examples=[2.0]
+        default=None,
+        description="How long it lasts, in seconds; without it, to the end of the run.",
+        json_schema_extra=unit("s"),
+        examples=[2.0],
     )
 
 
@@ -82,7 +89,10 @@ class JawOpens(JawFault):
 
     type: Literal["jaw_opens"] = Field(description="This fault.", examples=["jaw_opens"])
     seconds: Annotated[float, Field(gt=0, le=600)] | None = Field(
-        default=1.0, description="How long it lasts, in seconds; null means to the end of the run.", examples=[1.0]
+        default=1.0,
+        description="How long it lasts, in seconds; null means to the end of the run.",
+        json_schema_extra=unit("s"),
+        examples=[1.0],
     )
 
 
@@ -172,7 +182,9 @@ class EncoderJumps(JointFault):
 
     type: Literal["encoder_jumps"] = Field(description="This fault.", examples=["encoder_jumps"])
     angle: Annotated[float, Field(ge=-3.2, le=3.2)] = Field(
-        description="Radians (metres of a rail) by which its readings are too large from then on.", examples=[0.3]
+        description="Radians (metres of a rail) by which its readings are too large from then on.",
+        json_schema_extra=unit("rad"),
+        examples=[0.3],
     )
 
 
@@ -181,8 +193,12 @@ class ObstacleMovesIn(Fault):
 
     type: Literal["obstacle_moves_in"] = Field(description="This fault.", examples=["obstacle_moves_in"])
     obstacle: str = Field(description="Name of one of the scenario's obstacles.", examples=["short"])
-    by: Vector = Field(description="Displacement along x, y and z in metres.", examples=[[0.0, -0.5, 0.0]])
-    speed: Annotated[float, Field(gt=0, le=2)] = Field(default=0.25, description="Metres a second.", examples=[0.25])
+    by: Vector = Field(
+        description="Displacement along x, y and z in metres.", json_schema_extra=unit("m"), examples=[[0.0, -0.5, 0.0]]
+    )
+    speed: Annotated[float, Field(gt=0, le=2)] = Field(
+        default=0.25, description="Metres a second.", json_schema_extra=unit("m/s"), examples=[0.25]
+    )
 
 
 class ServiceFault(Lasting):

@@ -3,7 +3,7 @@
 The bounds are wide: a number beyond them is a slip of the pen, and arithmetic overflows on some of them.
 """
 
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
@@ -26,6 +26,11 @@ UnsignedDegrees = Annotated[float, Field(ge=0, le=180)]
 Vector = tuple[Coordinate, Coordinate, Coordinate]
 Size = tuple[Length, Length, Length]
 Color = tuple[Fraction, Fraction, Fraction]  # RGB
+
+
+def unit(symbol: str) -> dict[str, Any]:
+    """For a field's `json_schema_extra`: the unit of its number, which a report writes behind it."""
+    return {"unit": symbol}
 
 
 def _not_zero(v: Vector) -> Vector:

@@ -23,6 +23,21 @@ def printable(text: str) -> str:
     return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
 
 
+def arm_words(name: str) -> str:
+    """An arm for a sentence: "the right arm"; "the arm" where its name says no more."""
+    return "the arm" if name == "arm" else f"the {name} arm"
+
+
+def near_words(distance: float, what: str) -> str:
+    """How near something would come to a thing (m; below 0 it would reach into it): "would come to 3 mm from a box"."""
+    near = (
+        f"would come to {1e3 * distance:.0f} mm from"
+        if distance >= 0.0
+        else f"would reach {-1e3 * distance:.0f} mm into"
+    )
+    return f"{near} {what}"
+
+
 def closest(name: str, names: Iterable[str], compared: int | None = None) -> str | None:
     """The known name that is the same but for upper and lower case, else the one most like it; None where none is.
 

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.frame import RgbdFrame
+from regrasp.interfaces.outline import Outline
 from regrasp.interfaces.request import Request
 
 if TYPE_CHECKING:
@@ -114,6 +115,10 @@ class PerceptionService(Protocol):
 
     def frame(self, camera: str) -> RgbdFrame | None:
         """The newest frame; None before the first."""
+        ...
+
+    def outlines(self, camera: str) -> Sequence[Outline]:
+        """What was found last in the pictures of a camera, for the record."""
         ...
 
     def trouble(self, camera: str) -> str | None:

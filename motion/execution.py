@@ -11,6 +11,7 @@ from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.devices import Arm, Clock, Gripper
 from regrasp.interfaces.evidence import Evidence
+from regrasp.interfaces.quote import arm_words
 from regrasp.interfaces.robot.chain import Chain
 from regrasp.interfaces.trajectory import Trajectory
 from regrasp.motion.failure import GraspEmptyError, JawBlockedError, PlanningError, StoppedShortError, TouchError
@@ -348,7 +349,9 @@ class Execution:
     def _felt(self, arm: str, touch: Touch) -> str:
         joint = int(np.argmax(np.abs(touch.efforts) / self._chains[arm].torques))
         name, unit = self._chains[arm].names[joint].replace("_", " "), "N" if self._chains[arm].slides[joint] else "N m"
-        return f"the {arm} arm touched something: its {name} felt {abs(touch.efforts[joint]):.1f} {unit} from outside"
+        return (
+            f"{arm_words(arm)} touched something: its {name} felt {abs(touch.efforts[joint]):.1f} {unit} from outside"
+        )
 
     def _run(
         self, arm: str, trajectory: Trajectory, guard: ContactGuard
@@ -380,7 +383,7 @@ class Execution:
             yield
         error = self._goal_error(arm, goal)
         if error > tolerance:
-            message = f"the {arm} arm stopped {error:.2f} rad short of its goal, more than {tolerance:.2f}"
+            message = f"{arm_words(arm)} stopped {error:.2f} rad short of its goal, more than {tolerance:.2f}"
             raise StoppedShortError(message)
 
     def _goal_error(self, arm: str, goal: FloatArray) -> float:

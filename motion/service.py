@@ -18,6 +18,7 @@ from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.cell import Box, KnownCell
 from regrasp.interfaces.devices import Arm, Clock, Gripper
+from regrasp.interfaces.quote import arm_words
 from regrasp.interfaces.request import Request
 from regrasp.motion.execution import Execution, ExecutionParameters
 from regrasp.motion.failure import NO_WAY, PlanningError, StoppedShortError, TouchError
@@ -341,7 +342,7 @@ class Motion(PlanningScene):
                 if error.code is not CauseCode.OUT_OF_REACH:
                     raise
                 where = self._how_far(arm, world_from_cylinder.translation)
-                raise PlanningError(error.code, f"{error} of the {arm} arm: {where}") from None
+                raise PlanningError(error.code, f"{error} of {arm_words(arm)}: {where}") from None
             approaches = [path for path in approaches if onward(path[-1])] or approaches
             self.grippers[arm].open(jaw.open_gap)
             path = self._plan(model, q, np.array([approach[0] for approach in approaches]))
@@ -398,7 +399,7 @@ class Motion(PlanningScene):
                 touched.append(q)
                 if again or len(touched) == (self.parameters.touches if most is None else most):
                     raise
-                self._on_anomaly(f"felt at {place.round(3).tolist()}: the {arm} arm looks for another way")
+                self._on_anomaly(f"felt at {place.round(3).tolist()}: {arm_words(arm)} looks for another way")
             except PlanningError as error:
                 if error.code not in NO_WAY or isinstance(error, StoppedShortError):
                     raise
@@ -417,9 +418,9 @@ class Motion(PlanningScene):
     def _unreachable(self, arm: str, place: FloatArray, ends: int) -> PlanningError:
         """The error for a pose of the tool at `place` (3,) m that `ends` joint angles reach, none with a way on."""
         if ends:
-            why = f"{ends} joint angles bring the {arm} arm's tool there, but from none it can go straight on"
+            why = f"{ends} joint angles bring the tool of {arm_words(arm)} there, but from none it can go straight on"
         else:
-            why = f"no joint angles bring the {arm} arm's tool there: {self._how_far(arm, place)}"
+            why = f"no joint angles bring the tool of {arm_words(arm)} there: {self._how_far(arm, place)}"
         return PlanningError(CauseCode.OUT_OF_REACH, why)
 
     def _how_far(self, arm: str, place: FloatArray) -> str:

@@ -66,6 +66,12 @@ def peaks(
     return rows[kept], columns[kept], scores[kept], [tuple(box) for box in boxes[kept].tolist()]
 
 
+def corners(box: PixelBox) -> FloatArray:
+    """The box's corners (4, 2) px, in their order round it."""
+    u0, v0, u1, v1 = box
+    return np.array([(u0, v0), (u1, v0), (u1, v1), (u0, v1)])
+
+
 def intersection_over_union(a: PixelBox, b: PixelBox) -> float:
     """Shared area over joint area of two boxes; 0 for two without area."""
     across, down = min(a[2], b[2]) - max(a[0], b[0]), min(a[3], b[3]) - max(a[1], b[1])

@@ -12,6 +12,7 @@ from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cell import FixedMount, KnownCell, MappedRegion
 from regrasp.interfaces.devices import Camera, Clock
 from regrasp.interfaces.frame import RgbdFrame
+from regrasp.interfaces.outline import Outline
 from regrasp.interfaces.services import Obstacles
 from regrasp.interfaces.wall_time import counts_as
 from regrasp.perception.camera.health import CameraHealth, CameraHealthParameters
@@ -74,6 +75,7 @@ class Perception:
         self._health = {name: CameraHealth(name, parameters.health) for name in cameras}
         region = parameters.region if known.mapped is None else known.mapped
         self.occupancy = Occupancy(region, known.solids(), self._spared(), parameters.occupancy)
+        self._outlines: dict[str, Outline] = {}  # by camera
 
     @property
     def fixed_cameras(self) -> tuple[str, ...]:
@@ -83,6 +85,14 @@ class Perception:
     def frame(self, camera: str) -> RgbdFrame | None:
         """The newest frame; None before the first."""
         return self._cameras[camera].latest()
+
+    def found(self, camera: str, outline: Outline) -> None:
+        """Keep what was found in a camera's picture, until the next is found there: a record may draw it."""
+        self._outlines[camera] = outline
+
+    def outlines(self, camera: str) -> list[Outline]:
+        """What was found last in the pictures of a camera."""
+        return [self._outlines[camera]] if camera in self._outlines else []
 
     @counts_as("perception")
     def trouble(self, camera: str) -> str | None:

@@ -75,7 +75,8 @@ def limit_words(expectation: "Expectation", task: str) -> str:
     if (words := words_of(task).limits.get(name)) is not None:
         return words.format(limit)
     is_number = isinstance(expectation.limit, (int, float)) and not isinstance(expectation.limit, bool)
-    return f"at most {limit}" if is_number else limit
+    unit = words_of(task).unit(name)
+    return f"at most {limit}{unit and f' {unit}'}" if is_number else limit
 
 
 def measured_lines(result: "Result") -> Iterator[str]:
@@ -86,9 +87,12 @@ def measured_lines(result: "Result") -> Iterator[str]:
         yield f"not in the form that the task {result.task} writes"
 
 
-def event_words(event: str, values: Mapping[str, Any]) -> str:
-    """An event's name, and its values as name=value, but for mappings and lists of words, which are for programs."""
-    told = ", ".join(f"{name}={_short(value)}" for name, value in values.items() if not _structured(value))
+def event_words(event: str, values: Mapping[str, Any], between: str = "=") -> str:
+    """An event's name, and its values as name=value, but for mappings and lists of words, which are for programs.
+
+    `between` stands for the equals sign.
+    """
+    told = ", ".join(f"{name}{between}{_short(value)}" for name, value in values.items() if not _structured(value))
     return f"{event}: {told}" if told else event
 
 

@@ -3,12 +3,18 @@
 import shlex
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any
+
+from pydantic import BaseModel
 
 from regrasp.app.files.findings import Findings
 from regrasp.app.files.resources import read_text
 from regrasp.app.files.yaml_lines import parse
 from regrasp.app.records.reader import RunRecord
+from regrasp.app.scenario.schema import fault_types
+from regrasp.app.task import find
+from regrasp.interfaces.fault import Fault
 
 TOLD_ELSEWHERE = ("type", "when", "name")
 
@@ -37,7 +43,8 @@ def asked(record: RunRecord) -> Asked:
     if changed := begin.get("overrides"):
         facts.append(("changed", _value(changed)))
     faults = scenario.get("faults")
-    told = tuple(fault_words(one) for one in faults if isinstance(one, dict)) if isinstance(faults, list) else ()
+    known = _known_faults(record) if faults else {}
+    told = tuple(fault_words(one, known) for one in faults if isinstance(one, dict)) if isinstance(faults, list) else ()
     again = f"regrasp run scenario.yaml --seed {shlex.quote(_value(_seed(record)))}" if scenario else ""
     return Asked(str(scenario.get("description") or ""), tuple(facts), told, again, damage)
 
@@ -55,18 +62,42 @@ def _scenario(record: RunRecord) -> tuple[Mapping[str, Any], tuple[str, ...]]:
     return _mapping(document.value), ()
 
 
-def fault_words(fault: Mapping[str, Any]) -> str:
-    """A fault with what it is given: "joint_stalls: arm right, joint shoulder; when node unplug, after 0.3 to 0.8"."""
-    own = ", ".join(_words(fault, TOLD_ELSEWHERE))
-    when = ", ".join(_words(_mapping(fault.get("when")), ()))
+def _known_faults(record: RunRecord) -> Mapping[str, type[Fault]]:
+    """The faults of the record's task by their types; none if the task is not installed any more."""
+    task = record.result.task if record.result else str(record.begin.get("task", ""))
+    try:
+        return fault_types(find.task_named(task))
+    except Findings:
+        return {}
+
+
+def fault_words(fault: Mapping[str, Any], known: Mapping[str, type[BaseModel]] = MappingProxyType({})) -> str:
+    """A fault with what it is given: "joint_stalls: arm right, joint shoulder; when node unplug, after 0.3 to 0.8 s".
+
+    `known` holds the models by type; they tell the units.
+    """
+    model = known.get(str(fault.get("type")))
+    own = ", ".join(_words(fault, model, TOLD_ELSEWHERE))
+    when = ", ".join(_words(_mapping(fault.get("when")), _model_of(model, "when")))
     told = "; ".join(filter(None, [own, when and f"when {when}"]))
     return f"{fault.get('type', 'a fault')}{told and f': {told}'}"
 
 
-def _words(values: Mapping[str, Any], without: tuple[str, ...]) -> Iterator[str]:
+def _model_of(model: type[BaseModel] | None, field: str) -> type[BaseModel] | None:
+    annotation = model.model_fields[field].annotation if model and field in model.model_fields else None
+    return annotation if isinstance(annotation, type) and issubclass(annotation, BaseModel) else None
+
+
+def _words(
+    values: Mapping[str, Any], model: type[BaseModel] | None = None, without: tuple[str, ...] = ()
+) -> Iterator[str]:
+    """Each value with its name, and with the unit that the model gives its field."""
     for name, value in values.items():
         if value is not None and name not in without:
-            yield f"{name} {_value(value)}"
+            field = model.model_fields.get(name) if model else None
+            extra = field.json_schema_extra if field else None
+            symbol = extra.get("unit") if isinstance(extra, dict) else None
+            yield f"{name} {_value(value)}{f' {symbol}' if symbol else ''}"
 
 
 def _value(value: Any) -> str:
@@ -76,7 +107,7 @@ def _value(value: Any) -> str:
             return _value(value[0])
         return (" to " if both_numbers else ", ").join(map(_value, value))
     if isinstance(value, dict):
-        return ", ".join(_words(value, ()))
+        return ", ".join(_words(value))
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 

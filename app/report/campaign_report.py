@@ -1,7 +1,7 @@
 """The page of a campaign: how often, why not, how long, and what decides it."""
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,7 @@ from regrasp.app.report.knobs import knobs
 from regrasp.app.report.page import FILE, page
 from regrasp.app.report.run_report import Verdict
 from regrasp.app.run.batch import Row
+from regrasp.app.task.find import words_of
 
 WIDTH = 110  # characters of an explanation
 
@@ -75,7 +76,7 @@ def _page(
     stored = [*store.rows(version.id)]
     rows = [row_in(one) for one in stored]
     *cases, together = by_case(stored)
-    found, varied, groups = figures(rows), knobs(rows, stored), failure_groups(stored)
+    found, varied, groups = figures(rows, _unit_in(rows)), knobs(rows, stored), failure_groups(stored)
     told = _told(store, [one for group in groups for one in group.rows[: limits.of_group]][: limits.told], page_folder)
     slow = sorted(range(len(rows)), key=lambda place: (-rows[place].sim_seconds, place))[: limits.slowest]
     shown = _shown(stored, rows, limits.rows)
@@ -122,6 +123,12 @@ def _shown(stored: Sequence[StoredRow], rows: Sequence[Row], most: int) -> list[
     if len(pairs) <= most:
         return pairs
     return sorted(sorted(pairs, key=lambda pair: pair[1].succeeded)[:most], key=lambda pair: pair[0].number)
+
+
+def _unit_in(rows: Sequence[Row]) -> Callable[[str], str]:
+    """The unit of what the runs' tasks measure, by its name."""
+    words = [words_of(task) for task in sorted({row.task for row in rows if row.task})]
+    return lambda name: next(filter(None, (one.unit(name) for one in words)), "")
 
 
 def _told(store: Store, chosen: Sequence[StoredRow], page_folder: Path) -> dict[int, Told]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from regrasp.app.records.reader import Event, RunRecord
 from regrasp.app.records.result import Attempt
-from regrasp.app.records.timeline import event_text
+from regrasp.app.records.summary import event_words
 from regrasp.app.task.find import words_of
 
 MAX_LANES, MAX_BARS = 60, 1500  # of a time line; choice: more cannot be told apart
@@ -107,7 +107,10 @@ def _words(event: Event) -> str:
         return f"failed: {values.get('code')}: {values['message']}{passed}"
     if event.event == "planned":
         return f"planned, because {values.get('because')}: {values.get('actions')}"
-    return "begin" if event.event == "begin" else event_text(event)
+    if event.event == "end":
+        return f"end: {values.get('outcome')}, {'' if values.get('succeeded') else 'not '}as expected"
+    told = {name.replace("_", " "): value for name, value in values.items()}
+    return "begin" if event.event == "begin" else event_words(event.event, told, " ")
 
 
 def kind_of(event: Event) -> str:

@@ -8,6 +8,7 @@ import numpy as np
 
 from regrasp.app.records.signals import Signals
 from regrasp.interfaces.arrays import FloatArray
+from regrasp.interfaces.quote import arm_words
 
 POSE_WIDTH = 12  # numbers of a pose: rows of (3, 4)
 CHI2_95 = 7.815  # the 95 % quantile of chi square with three degrees of freedom
@@ -85,7 +86,7 @@ def _speeds(signals: Signals) -> Panel:
         joints = signals.get(f"{arm}.joints")
         if joints is not None:
             speed = np.abs(np.diff(joints.reshape(len(joints), -1), axis=0)).max(axis=1) * signals.rate
-            found.append(_curve(f"{arm} arm", signals, np.append(0.0, speed), peaks=True))
+            found.append(_curve(arm_words(arm).removeprefix("the "), signals, np.append(0.0, speed), peaks=True))
     return Panel("Fastest joint", "rad/s", "As the encoders read; in m/s where the fastest joint slides.", tuple(found))
 
 
@@ -95,7 +96,7 @@ def _forces(signals: Signals) -> Panel:
         for name, words in (("force_true", "in its grasp"), ("forbidden_force_true", "on what it must not touch")):
             force = signals.get(f"{arm}.{name}")
             if force is not None and np.nanmax(force, initial=0.0) > 0.0:
-                found.append(_curve(f"{arm} arm, {words}", signals, force, peaks=True))
+                found.append(_curve(f"{arm_words(arm).removeprefix('the ')}, {words}", signals, force, peaks=True))
     return Panel("Contact force", "N", "By ground truth; a force that stays 0 is left out.", tuple(found))
 
 

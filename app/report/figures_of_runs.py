@@ -1,7 +1,7 @@
 """Numbers of each run of a campaign: their names, their spread, and which runs lie far from the others."""
 
 import statistics
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from regrasp.app.run.batch import Row
@@ -26,8 +26,11 @@ class Figure:
     of_task: bool
 
 
-def figures(rows: Sequence[Row]) -> list[Figure]:
-    """The numbers that differ between runs; a run whose process died has no times."""
+def figures(rows: Sequence[Row], unit: Callable[[str], str] = lambda name: "") -> list[Figure]:
+    """The numbers that differ between runs; a run whose process died has no times.
+
+    `unit` tells that of what a task measures, '' for none.
+    """
     found: dict[str, dict[int, float]] = {name: {} for name in OWN}
     for place, row in enumerate(rows):
         for name, own in found.items():
@@ -35,8 +38,15 @@ def figures(rows: Sequence[Row]) -> list[Figure]:
             if isinstance(value, (int, float)) and row.wall_seconds:
                 own[place] = float(value)
     made = [Figure(OWN[name], values, of_task=False) for name, values in found.items()]
-    made += [Figure(name, values, of_task=True) for name, values in _measured(rows).items()][:MAX_FIGURES]
+    made += [Figure(_with_unit(name, unit), values, of_task=True) for name, values in _measured(rows).items()][
+        :MAX_FIGURES
+    ]
     return [one for one in made if len({*one.values.values()}) > 1]
+
+
+def _with_unit(name: str, unit: Callable[[str], str]) -> str:
+    symbol = unit(name.rpartition(".")[2])
+    return f"{name} ({symbol})" if symbol else name
 
 
 def _measured(rows: Sequence[Row]) -> dict[str, dict[int, float]]:
@@ -55,7 +65,7 @@ def _numbers(measured: object, name: str = "") -> Iterator[tuple[str, float]]:
     elif isinstance(measured, list):
         yield f"number of {name}", float(len(measured))
     elif isinstance(measured, (int, float)) and not isinstance(measured, bool):
-        yield f"{name} (SI)", float(measured)
+        yield name, float(measured)
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,9 @@
 """The key frames and the film of a run, as data that a page holds, within its limit of bytes."""
 
 import base64
+import json
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -11,7 +12,8 @@ from markupsafe import Markup
 from regrasp.app.records.reader import RunRecord
 from regrasp.app.report.sightings import Sighting, Sightings
 
-FOLDER, FILM = "pictures", "video.mp4"
+FOLDER, FILM, OUTLINES = "pictures", "video.mp4", "outlines.jsonl"
+MOST_CORNERS = 100  # of an outline that is drawn; choice
 _NAME = re.compile(r"(\d+\.\d+)-(.+)-([^-]*)\.jpg")
 
 
@@ -27,8 +29,20 @@ class PictureLimits:
 
 
 @dataclass(frozen=True)
+class Found:
+    """What perception found in a picture: its name, and the corners of its outline as fractions of the picture."""
+
+    name: str
+    corners: tuple[tuple[float, float], ...]
+
+    def points(self, width: int, height: int) -> str:
+        """The corners for SVG, in a picture of this size in px."""
+        return " ".join(f"{x * width:.1f},{y * height:.1f}" for x, y in self.corners)
+
+
+@dataclass(frozen=True)
 class KeyFrame:
-    """A camera's picture at a moment: its size in px, its data, and what the robot knew of things in it then."""
+    """A camera's picture at a moment: its size in px, its data, what the robot knew of things in it then, and found."""
 
     t: float
     camera: str
@@ -37,6 +51,7 @@ class KeyFrame:
     height: int
     data: Markup  # base64
     sightings: tuple[Sighting, ...] = ()
+    found: tuple[Found, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -58,9 +73,10 @@ def pictures(record: RunRecord, sightings: Sightings, limits: PictureLimits = Pi
         remarks.append(f"of {len(files)} pictures {limits.count}, evenly chosen, are shown")
         files = [files[number * len(files) // limits.count] for number in range(limits.count)]
     small = sum(path.stat().st_size for _, _, _, path in files) > limits.pictures
+    outlines = _outlines(record.folder / FOLDER / OUTLINES, remarks) if files else {}
     frames, left = [], limits.pictures
     for t, camera, event, path in files:
-        frame = _key_frame(t, camera, event, path, limits if small else None)
+        frame = _key_frame(t, camera, event, path, limits if small else None, outlines.get(path.name, ()))
         if frame is None:
             remarks.append(f"{FOLDER}/{path.name} is no picture that can be read")
             continue
@@ -81,7 +97,34 @@ def _files(folder: Path) -> Iterator[tuple[float, str, str, Path]]:
                 yield float(parts[1]), parts[2], parts[3].replace("_", " "), path
 
 
-def _key_frame(t: float, camera: str, event: str, path: Path, limits: PictureLimits | None) -> KeyFrame | None:
+def _outlines(file: Path, remarks: list[str]) -> dict[str, list[tuple[str, list[list[float]]]]]:
+    """By a picture's name, the name and the outline (n, 2) px of each thing that was found in it."""
+    found: dict[str, list[tuple[str, list[list[float]]]]] = {}
+    try:
+        lines = file.read_text(encoding="utf-8").splitlines() if file.is_file() else []
+    except (OSError, UnicodeDecodeError):
+        lines = [""]
+    unread = 0
+    for line in lines:
+        try:
+            row = json.loads(line)
+            corners = [[float(u), float(v)] for u, v in row["outline"][:MOST_CORNERS]]
+            found.setdefault(str(row["picture"]), []).append((str(row["found"]), corners))
+        except (ValueError, TypeError, KeyError, RecursionError):
+            unread += 1
+    if unread:
+        remarks.append(f"{FOLDER}/{OUTLINES}: {unread} lines cannot be read, so some outlines are not drawn")
+    return found
+
+
+def _key_frame(
+    t: float,
+    camera: str,
+    event: str,
+    path: Path,
+    limits: PictureLimits | None,
+    outlines: Sequence[tuple[str, list[list[float]]]],
+) -> KeyFrame | None:
     """The picture, made smaller if there are limits; None if it cannot be read."""
     import cv2  # late: it takes a moment
     import numpy as np
@@ -94,6 +137,7 @@ def _key_frame(t: float, camera: str, event: str, path: Path, limits: PictureLim
     if image is None:
         return None
     height, width = image.shape[:2]
+    found = tuple(Found(name, tuple((u / width, v / height) for u, v in corners)) for name, corners in outlines)
     if limits is not None:
         scale = min(1.0, limits.width / width)
         small = cv2.resize(
@@ -101,7 +145,7 @@ def _key_frame(t: float, camera: str, event: str, path: Path, limits: PictureLim
         )
         data = cv2.imencode(".jpg", small, [cv2.IMWRITE_JPEG_QUALITY, limits.quality])[1].tobytes()
         height, width = small.shape[:2]
-    return KeyFrame(t, camera, event, width, height, Markup(base64.b64encode(data).decode()))
+    return KeyFrame(t, camera, event, width, height, Markup(base64.b64encode(data).decode()), found=found)
 
 
 def _film(path: Path, most: int) -> tuple[Markup, tuple[str, ...]]:

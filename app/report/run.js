@@ -61,7 +61,7 @@ function showTree(t) {
   const told = find("states");
   const failing = nodes.filter((node) => node.state === "f" && changedAt(node.number, t)).map((node) => data.paths[node.number]);
   const deepest = failing.sort((a, b) => b.split("/").length - a.split("/").length);
-  if (!playing) reveal(deepest.length ? deepest : running.length ? leaves : failed);
+  if (!playing) reveal([deepest, leaves, failed, data.paths.slice(0, 1)].find((some) => some.length) || []);
   if (told) told.textContent = `Running: ${leaves.join(", ") || "nothing"}. Failed: ${failed.join(", ") || "nothing"}.`;
 }
 

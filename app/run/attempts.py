@@ -184,7 +184,8 @@ class Attempts(py_trees.visitors.VisitorBase):
 def _why(node: Behaviour, child: Behaviour | None) -> str:
     """Why a node with children failed, in words; `child` decided it."""
     if isinstance(node, Selector):
-        return f"all {len(node.children)} children failed"
+        every = {1: "its only child", 2: "both children"}
+        return f"{every.get(len(node.children), f'all {len(node.children)} children')} failed"
     if isinstance(node, Retry):
         return f"{node.failures} of {node.num_failures} tries failed"
     if isinstance(node, Decorator):

@@ -69,6 +69,7 @@ class Row:
     real_time_factor: float = 0.0
     wall_by_part: dict[str, float] = field(default_factory=dict)  # real seconds
     longest_tick: float = 0.0  # real seconds
+    task: str = ""
 
 
 def run_all(
@@ -170,6 +171,7 @@ def row_of(run: Run, done: Done[Result]) -> Row:
         longest_tick=result.longest_tick,
         peak_memory_mb=round(done.peak_memory_mb, 1),
         renderer=result.renderer or "software",
+        task=result.task,
     )
 
 

@@ -28,6 +28,7 @@ from regrasp.app.scenario.scene_draw import drawn
 from regrasp.app.task.expectation import Expectation
 from regrasp.app.task.signals import SignalGroup
 from regrasp.behaviors.keys import causes
+from regrasp.behaviors.services import Services
 from regrasp.interfaces.cause import Cause, CauseCode
 from regrasp.interfaces.devices import TICK
 from regrasp.interfaces.wall_time import WallTime, counts_as, measured
@@ -114,7 +115,7 @@ def run_episode(
                 wall.switch("tree")
 
                 def on_tick(seconds: float, leaf: str) -> None:
-                    _noted(rows, key_frames)
+                    _noted(rows, key_frames, episode.services)
                     observers.tick(seconds, leaf)
 
                 ending = _run(episode, scenario, film, on_tick, log, wall)
@@ -150,11 +151,11 @@ def _signals(episode: Episode) -> list[SignalGroup]:
 
 
 @counts_as("record")
-def _noted(rows: SignalWriter | None, key_frames: Pictures) -> None:
+def _noted(rows: SignalWriter | None, key_frames: Pictures, services: Services) -> None:
     """After a tick: what the record keeps of it besides its logs."""
     if rows is not None:
         rows.sample()
-    key_frames.take()
+    key_frames.take(services.perception.outlines)
 
 
 def _run(episode: Episode, scenario: Scenario, film: Film, on_tick: Progress, log: Any, wall: WallTime) -> Ending:

@@ -1,16 +1,19 @@
-"""Key frames of a run: what the cameras saw at its events, as JPEG files in the record."""
+"""Key frames of a run: what the cameras saw at its events, as JPEG files in the record, and what was found in them."""
 
-from collections.abc import Mapping
+import json
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import cv2
 
+from regrasp.interfaces.outline import Outline
 from regrasp.interfaces.wall_time import counts_as
 from regrasp.sim.world import World
 
 FOLDER = "pictures"
+OUTLINES = "outlines.jsonl"  # in that folder: a line for each thing found in a picture
 
 
 @dataclass(frozen=True)
@@ -19,11 +22,13 @@ class PictureParameters:
 
     quality: int = 80  # of JPEG, 0 to 100
     every: float = 0.5  # simulated s between two pictures of a camera, at least
+    longest_gap: float = 2.0  # s without an event after which a picture is kept all the same
+    newest: float = 0.1  # s: what was found in a frame so long before still lies about there; choice
     max_bytes: int = 3_000_000  # of all pictures of a run; later ones are left out
 
 
 class Pictures:
-    """Keeps the newest frame of each camera when an event has come. Without a folder it does nothing.
+    """Keeps the newest frame of each camera when an event has come, or none for long. Without a folder it does nothing.
 
     A frame is drawn the same whoever reads it, so no log changes.
     """
@@ -42,12 +47,16 @@ class Pictures:
             self._event = self._event or str(values["event"])
 
     @counts_as("record")
-    def take(self) -> None:
-        """After a tick: keep the frames if an event has come in it."""
-        event, self._event = self._event, ""
+    def take(self, outlines: Callable[[str], Sequence[Outline]] = lambda camera: ()) -> None:
+        """After a tick: keep the frames if an event has come in it, or none for long.
+
+        `outlines` tells what was found in a camera's frames.
+        """
+        now = self._world.now()
+        quiet = now - max((at for _, at in self._taken.values()), default=0.0) >= self._parameters.longest_gap
+        event, self._event = self._event or ("no event" if quiet else ""), ""
         if not event or self._folder is None:
             return
-        now = self._world.now()
         for name, camera in self._world.cameras.items():
             number, at = self._taken.get(name, (-1, float("-inf")))
             frame = camera.latest() if now - at >= self._parameters.every else None
@@ -61,4 +70,16 @@ class Pictures:
                 return
             self._folder.mkdir(exist_ok=True)
             words = "".join(letter if letter.isalnum() else "_" for letter in event)[:40]
-            (self._folder / f"{now:07.2f}-{name}-{words}.jpg").write_bytes(data)
+            file = self._folder / f"{now:07.2f}-{name}-{words}.jpg"
+            file.write_bytes(data)
+            self._note(
+                file.name, [one for one in outlines(name) if abs(frame.stamp - one.stamp) < self._parameters.newest]
+            )
+
+    def _note(self, picture: str, found: Sequence[Outline]) -> None:
+        """Write down what was found in a picture."""
+        assert self._folder is not None
+        with (self._folder / OUTLINES).open("a", encoding="utf-8") as file:
+            for one in found:
+                row = {"picture": picture, "found": one.label, "outline": one.polygon.round(1).tolist()}
+                file.write(json.dumps(row) + "\n")

@@ -55,6 +55,14 @@ class Words:
     measured_moments: Moments = no_moments  # what truly happened when: seconds, and a few words for a time line
     # The words for what an expectation of this name wants; by default "at most" a number, and any other value itself.
     limits: Mapping[str, str] = field(default_factory=dict)  # such as {"slips": "at least {}, all noticed"}
+    # The units of what the judge measures and of expectations, by their names: {"door_open": "m"}; see `unit`.
+    units: Mapping[str, str] = field(default_factory=dict)
 
+    def unit(self, name: str) -> str:
+        """The unit of a measured value or an expectation; '' if it has none, or none is known."""
+        return self.units.get(name, _UNITS.get(name, ""))
+
+
+_UNITS = {"unintended_force": "N"}  # of every task
 
 PLAIN = Words()

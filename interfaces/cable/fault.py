@@ -5,7 +5,7 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import Field
 
 from regrasp.interfaces.fault import Fault, FractionRange, Lasting, When
-from regrasp.interfaces.fields import Fraction, Vector
+from regrasp.interfaces.fields import Fraction, Vector, unit
 
 Phase = Literal["unplugged", "carried", "lost", "settled", "regrasped"]
 
@@ -33,7 +33,11 @@ class ConnectorKnocked(Fault):
     """A push on the connector's centre: a constant force for 20 ms."""
 
     type: Literal["connector_knocked"] = Field(description="This fault.", examples=["connector_knocked"])
-    impulse: Vector = Field(description="Newton seconds along x, y and z, each at most 5.", examples=[[0.0, 0.1, 0.05]])
+    impulse: Vector = Field(
+        description="Newton seconds along x, y and z, each at most 5.",
+        json_schema_extra=unit("N s"),
+        examples=[[0.0, 0.1, 0.05]],
+    )
 
 
 class CableSnags(Lasting):
@@ -44,10 +48,13 @@ class CableSnags(Lasting):
         default=0.6, description="Share of the cable's length from its fixed end to the link.", examples=[0.6]
     )
     stiffness: Annotated[float, Field(gt=0, le=2000)] = Field(
-        default=100.0, description="Newtons a metre.", examples=[100.0]
+        default=100.0, description="Newtons a metre.", json_schema_extra=unit("N/m"), examples=[100.0]
     )
     max_force: Annotated[float, Field(gt=0, le=200)] = Field(
-        default=20.0, description="Largest force of the spring in newtons.", examples=[20.0]
+        default=20.0,
+        description="Largest force of the spring in newtons.",
+        json_schema_extra=unit("N"),
+        examples=[20.0],
     )
 
 

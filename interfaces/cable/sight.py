@@ -41,6 +41,7 @@ class Estimate:
         extent: length of the visible part along the axis.
         whole: both ends are in sight, or one is and the known length gave the other.
         sign_seen: the frame itself told the cable's end from the tip.
+        world_from_camera: where the camera was taken to be; None of an estimate from several frames.
     """
 
     stamp: float
@@ -54,6 +55,7 @@ class Estimate:
     extent: float
     whole: bool
     sign_seen: bool = False
+    world_from_camera: "RigidTransform | None" = None
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import Field
 
 from regrasp.interfaces.fault import Fault, FractionRange, Lasting, When
+from regrasp.interfaces.fields import unit
 
 Way = Annotated[float, Field(ge=-0.05, le=0.05)]  # metres
 Speed = Annotated[float, Field(ge=-0.2, le=0.2)]  # metres a second
@@ -27,7 +28,10 @@ class DoorJams(Lasting):
 
     type: Literal["door_jams"] = Field(description="This fault.", examples=["door_jams"])
     friction: Annotated[float, Field(gt=0, le=2000)] = Field(
-        default=300.0, description="Newtons that the slide resists with then.", examples=[300.0]
+        default=300.0,
+        description="Newtons that the slide resists with then.",
+        json_schema_extra=unit("N"),
+        examples=[300.0],
     )
 
 
@@ -36,7 +40,10 @@ class HandleMoves(Fault):
 
     type: Literal["handle_moves"] = Field(description="This fault.", examples=["handle_moves"])
     by: Annotated[float, Field(ge=-0.05, le=0.05)] = Field(
-        default=0.02, description="Metres along the door; positive the way it opens.", examples=[0.02]
+        default=0.02,
+        description="Metres along the door; positive the way it opens.",
+        json_schema_extra=unit("m"),
+        examples=[0.02],
     )
 
 
@@ -45,7 +52,10 @@ class PartKnocked(Fault):
 
     type: Literal["part_knocked"] = Field(description="This fault.", examples=["part_knocked"])
     by: tuple[Way, Way] = Field(
-        default=(0.0, 0.02), description="Metres along x and y from where it was printed.", examples=[[0.0, 0.02]]
+        default=(0.0, 0.02),
+        description="Metres along x and y from where it was printed.",
+        json_schema_extra=unit("m"),
+        examples=[[0.0, 0.02]],
     )
 
 
@@ -54,7 +64,10 @@ class PartFloats(Lasting):
 
     type: Literal["part_floats"] = Field(description="This fault.", examples=["part_floats"])
     velocity: tuple[Speed, Speed, Speed] = Field(
-        default=(0.0, 0.014, 0.014), description="Metres a second along x, y and z.", examples=[[0.0, 0.014, 0.014]]
+        default=(0.0, 0.014, 0.014),
+        description="Metres a second along x, y and z.",
+        json_schema_extra=unit("m/s"),
+        examples=[[0.0, 0.014, 0.014]],
     )
 
 
@@ -75,7 +88,10 @@ class PlateSticks(Fault):
 
     type: Literal["plate_sticks"] = Field(description="This fault.", examples=["plate_sticks"])
     force: Annotated[float, Field(gt=0, le=2000)] = Field(
-        default=15.0, description="Newtons along x at which it lets go then.", examples=[15.0]
+        default=15.0,
+        description="Newtons along x at which it lets go then.",
+        json_schema_extra=unit("N"),
+        examples=[15.0],
     )
 
 
@@ -84,7 +100,10 @@ class DoorCloses(Fault):
 
     type: Literal["door_closes"] = Field(description="This fault.", examples=["door_closes"])
     force: Annotated[float, Field(gt=0, le=200)] = Field(
-        default=20.0, description="Newtons at most with which it is pushed.", examples=[20.0]
+        default=20.0,
+        description="Newtons at most with which it is pushed.",
+        json_schema_extra=unit("N"),
+        examples=[20.0],
     )
 
 

@@ -51,5 +51,6 @@ def pull_gently(
     forces = [force(felt - efforts[0]) for felt in efforts]
     stiffness = float(np.polyfit(ways, forces, 1)[0])
     over = 1e3 * (ways[-1] - ways[0])
-    told = f"over {over:.1f} mm the pull rose by {1e-3 * stiffness:.2f} N/mm, limit {1e-3 * parameters.stiffness:.2f}"
+    least = f"held from {1e-3 * parameters.stiffness:.2f} on"
+    told = f"over {over:.1f} mm the pull rose by {1e-3 * stiffness:.2f} N/mm ({least})"
     return Evidence(stiffness > parameters.stiffness, "pull", stiffness, parameters.stiffness, told)

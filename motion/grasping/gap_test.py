@@ -46,8 +46,10 @@ class GapTest:
             sentence = f"{len(self._gaps)} of {self._gaps.maxlen} finger readings so far"
             return Evidence(False, "gap", float("nan"), self._closed, sentence)
         value = float(np.median([reading.gap for reading in self._gaps]))
-        limit = self._open if value > self._open else self._closed
-        sentence = f"pads {1e3 * value:.1f} mm apart, limit {1e3 * limit:.1f} mm"
+        too_far = value > self._open
+        limit = self._open if too_far else self._closed
+        allowed = f"{'at most' if too_far else 'at least'} {1e3 * limit:.1f} mm"
+        sentence = f"pads {1e3 * value:.1f} mm apart; {allowed} while they hold it"
         return Evidence(not self._closed <= value <= self._open, "gap", value, limit, sentence)
 
 

@@ -16,7 +16,7 @@ from regrasp.interfaces.frame import RgbdFrame
 from regrasp.interfaces.printer.actions import PART_AND_BED
 from regrasp.interfaces.printer.cell import PrinterKnown
 from regrasp.interfaces.printer.target import TargetTracker
-from regrasp.interfaces.quote import nearest, quoted
+from regrasp.interfaces.quote import arm_words, near_words, nearest, quoted
 from regrasp.interfaces.request import Request
 from regrasp.motion.failure import NO_WAY, GraspEmptyError, PlanningError, TouchError
 from regrasp.motion.grasping.gap_test import GripWatch
@@ -419,7 +419,7 @@ class PrinterMotion(Motion):
             if not model.path_free(path, 0.0):
                 between = np.linspace(path[0], path[1], self.parameters.slide_samples)
                 distance, what = min(model.nearest(q) for q in between)
-                why = f"on its way with the door the arm would come to {1e3 * distance:.0f} mm from {what}"
+                why = f"on its way with the door the arm {near_words(distance, what)}"
                 raise PlanningError(CauseCode.MOTION_BLOCKED, why)
             thickness = self._door.handle.size[1]
             limits = replace(self._guard.drawing, share=self.parameters.slide_share, back_off=False)
@@ -459,7 +459,7 @@ class PrinterMotion(Motion):
     def _rail(self, arm: str) -> int:
         rail = self.kinematics[arm].robot.rail
         if rail is None:
-            raise PlanningError(CauseCode.OUT_OF_REACH, f"the {arm} arm stands on no rail")
+            raise PlanningError(CauseCode.OUT_OF_REACH, f"{arm_words(arm)} stands on no rail")
         return 0
 
     def _with_rail(self, arm: str, position: float) -> FloatArray:

@@ -10,6 +10,7 @@ from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.devices import Clock
 from regrasp.interfaces.printer.cause import PrinterCause
 from regrasp.interfaces.printer.target import TargetEstimate, TargetTracker
+from regrasp.interfaces.quote import near_words
 from regrasp.interfaces.trajectory import Trajectory
 from regrasp.motion.failure import PlanningError
 from regrasp.motion.planning.following import FollowingParameters, followed
@@ -140,6 +141,6 @@ class Servo:
         velocities[0] = self._speeds
         if not self._model.path_free(positions, values.stop_margin):
             distance, what = min(self._model.nearest(q) for q in positions)
-            why = f"on its way to the target the arm would come to {1e3 * distance:.0f} mm from {what}"
+            why = f"on its way to the target the arm {near_words(distance, what)}"
             raise PlanningError(CauseCode.MOTION_BLOCKED, why)
         return Trajectory(samples.times, positions, velocities)

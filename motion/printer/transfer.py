@@ -181,7 +181,7 @@ class TransferMotion(PrinterMotion):
                 yield
             yield from self._turned(arm, arc[:1] if abs(moment) > limit else arc[::-1])
             if abs(moment) > limit:
-                why = f"the part turns back with {abs(moment):.1f} N m, limit {limit:g} N m"
+                why = f"the part turns back with {abs(moment):.1f} N m (at most {limit:g} N m)"
                 raise PlanningError(PrinterCause.BOND_HOLDS, why)
 
         return self._together(arm, steps())

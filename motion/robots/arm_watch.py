@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from regrasp.interfaces.arrays import FloatArray
+from regrasp.interfaces.quote import arm_words
 from regrasp.interfaces.reading import JointReading
 from regrasp.interfaces.robot.chain import Chain
 from regrasp.interfaces.trajectory import Trajectory
@@ -70,7 +71,7 @@ class ArmWatch:
         if abs(error[worst]) <= limit:
             return None
         joint, unit = self._chain.names[worst].replace("_", " "), "m" if self._chain.slides[worst] else "rad"
-        return f"the {self._name} arm's {joint} reads {abs(error[worst]):.3f} {unit} {what}, limit {limit:.3f}"
+        return f"{arm_words(self._name)}'s {joint} reads {abs(error[worst]):.3f} {unit} {what} (at most {limit:.3f})"
 
 
 def remaining_waypoints(path: FloatArray, reached: FloatArray) -> FloatArray:

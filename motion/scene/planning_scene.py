@@ -12,6 +12,7 @@ from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.cell import Box, KnownCell, WristMount
 from regrasp.interfaces.devices import Arm, Gripper
 from regrasp.interfaces.frame import RgbdFrame
+from regrasp.interfaces.quote import arm_words
 from regrasp.interfaces.wall_time import counts_as
 from regrasp.motion.failure import PlanningError
 from regrasp.motion.robots.contact_guard import Touch
@@ -221,7 +222,7 @@ class PlanningScene:
         if not np.isfinite(positions).all():
             names = self.kinematics[arm].chain.names
             silent = ", ".join(names[i] for i in np.flatnonzero(~np.isfinite(positions)))
-            message = f"the {arm} arm's encoders give no number for {silent}"
+            message = f"the encoders of {arm_words(arm)} give no number for {silent}"
             raise PlanningError(CauseCode.ARM_FAILED, message)
         return positions
 

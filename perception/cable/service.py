@@ -7,7 +7,7 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import FloatArray
-from regrasp.interfaces.cable.cell import CableKnown
+from regrasp.interfaces.cable.cell import CableKnown, Connector
 from regrasp.interfaces.cable.sight import (
     Estimate,
     InHand,
@@ -20,12 +20,14 @@ from regrasp.interfaces.cable.sight import (
 from regrasp.interfaces.devices import Camera, Clock
 from regrasp.interfaces.evidence import Evidence
 from regrasp.interfaces.frame import RgbdFrame
+from regrasp.interfaces.outline import Outline
 from regrasp.interfaces.request import Request
 from regrasp.interfaces.services import Obstacles
 from regrasp.interfaces.wall_time import counts_as
 from regrasp.perception.cable.in_hand import InHandParameters, connector_axis, connector_in_hand
 from regrasp.perception.cable.reach import within_reach
 from regrasp.perception.cable.watching import FrameRule, watched
+from regrasp.perception.camera.model import hull
 from regrasp.perception.mapping.occupancy import Spared, Spheres
 from regrasp.perception.pose.fusion import fuse
 from regrasp.perception.pose.technique import make_technique
@@ -104,6 +106,15 @@ class CablePerception(Perception):
         self._results[camera] = (newest.number, result)
         self.track.feed(result)
         return result
+
+    def outlines(self, camera: str) -> list[Outline]:
+        """As in every task, and the connector as it was estimated last: a cylinder of its size."""
+        found = super().outlines(camera)
+        frame, (_, seen) = self.frame(camera), self._results.get(camera, (0, None))
+        if frame is not None and isinstance(seen, Estimate) and seen.world_from_camera is not None:
+            rims = (seen.world_from_camera.inv() * seen.world_from_connector).apply(_rims(self._known.cable.connector))
+            found.append(Outline("connector, as estimated", seen.stamp, hull(rims, frame.intrinsics)))
+        return found
 
     def watch(
         self,
@@ -194,6 +205,14 @@ class CablePerception(Perception):
     def _spared(self) -> Spared | None:
         connector = self._known.cable.connector
         return Spared(connector.color, 2 * connector.radius)
+
+
+def _rims(connector: Connector) -> FloatArray:
+    """Points (n, 3) m round both ends of a connector, in its frame."""
+    angles = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
+    rim = connector.radius * np.column_stack([np.zeros(24), np.cos(angles), np.sin(angles)])
+    end = np.array([0.5 * connector.length, 0.0, 0.0])
+    return np.vstack([rim - end, rim + end])
 
 
 def _distance_to_axis(points: FloatArray, connector: RigidTransform, half: float) -> FloatArray:

@@ -47,12 +47,12 @@ class CameraHealth:
         """Why the camera is not to be trusted at time `now` (s), with the numbers; None when all is well."""
         who, limits, age = f"the {self._camera} camera", self._parameters, now - self._stamp
         if age > limits.max_frame_age:
-            return f"{who} gave no new frame for {age:.2f} s, limit {limits.max_frame_age:.2f}"
+            return f"{who} gave no new frame for {age:.2f} s (at most {limits.max_frame_age:.2f})"
         if self._brightness < limits.min_brightness:
-            return f"{who} is dark: mean {self._brightness:.1f} of 255, limit {limits.min_brightness:.0f}"
+            return f"{who} is dark: mean {self._brightness:.1f} of 255 (at least {limits.min_brightness:.0f})"
         if self._depth_share < limits.min_depth_share:
-            least = f"limit {100 * limits.min_depth_share:.0f}"
-            return f"{who} measures depth on {100 * self._depth_share:.0f} % of its pixels, {least}"
+            least = f"at least {100 * limits.min_depth_share:.0f}"
+            return f"{who} measures depth on {100 * self._depth_share:.0f} % of its pixels ({least})"
         if self._repeats >= limits.max_repeats:
             return f"{who} is frozen: {self._repeats + 1} frames with the same depth to the bit"
         return None

@@ -2,6 +2,7 @@
 
 from functools import lru_cache
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -43,6 +44,14 @@ def project(points: FloatArray, intrinsics: Intrinsics) -> FloatArray:
     u = intrinsics.fx * points[:, 0] / z + intrinsics.cx
     v = intrinsics.fy * points[:, 1] / z + intrinsics.cy
     return np.column_stack([u, v])
+
+
+def hull(points: FloatArray, intrinsics: Intrinsics) -> FloatArray:
+    """The convex outline (k, 2) px of `points` (n, 3) m in the optical frame; (0, 2) if one is behind the camera."""
+    pixels = project(points, intrinsics)
+    if not np.isfinite(pixels).all():
+        return np.empty((0, 2))
+    return np.asarray(cv2.convexHull(pixels.astype(np.float32))[:, 0], float)
 
 
 def subsampled(intrinsics: Intrinsics, step: int) -> Intrinsics:

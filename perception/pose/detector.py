@@ -135,7 +135,20 @@ class Detector:
         width, height = found.size
         extent = depth * float(np.hypot(width / k.fx, height / k.fy))
         stamp, camera, area = frame.stamp, frame.camera, round(width * height)
-        return Estimate(stamp, camera, position, direction, pose, covariance, len(readings), area, extent, False)
+        points, seen_from = len(readings), world_from_camera
+        return Estimate(
+            stamp,
+            camera,
+            position,
+            direction,
+            pose,
+            covariance,
+            points,
+            area,
+            extent,
+            False,
+            world_from_camera=seen_from,
+        )
 
     def _best(
         self, frame: RgbdFrame, world_from_camera: RigidTransform, near: FloatArray | None

@@ -104,6 +104,7 @@ class Fiducial:
             self._connector.length,
             whole=True,
             sign_seen=True,
+            world_from_camera=world_from_camera,
         )
 
     def seat(self, frame: RgbdFrame, world_from_camera: RigidTransform) -> TagPose | NoEstimate:

@@ -73,6 +73,7 @@ class Rgbd:
             found.area,
             extent,
             whole=False,
+            world_from_camera=world_from_camera,
         )
 
 

@@ -11,14 +11,17 @@ from regrasp.interfaces.arrays import ColorImage
 from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.devices import Clock
 from regrasp.interfaces.frame import RgbdFrame
+from regrasp.interfaces.outline import Outline
 from regrasp.interfaces.printer.actions import Action, ImageFeedback, ImageGoal, PartClass, Sighting, Target
 from regrasp.interfaces.printer.cause import PrinterCause
 from regrasp.interfaces.printer.cell import KnownPrinter
 from regrasp.interfaces.request import RequestError
 from regrasp.perception.camera.color import SegmentationParameters, color_mask
-from regrasp.perception.detection import PixelBox, intersection_over_union
+from regrasp.perception.detection import PixelBox, corners, intersection_over_union
 from regrasp.perception.printer.detector import PartDetector
 from regrasp.perception.service import Perception
+
+WORDS: dict[Target, str] = {"obj": "printed part", "targ": "gripping section"}
 
 
 @dataclass(frozen=True)
@@ -124,7 +127,11 @@ class PartAnalyzer:
 
     def find(self, frame: RgbdFrame, target: Target) -> Sighting | None:
         """The target in a frame; None if it shows too little of it."""
-        return self._finder.find(frame.rgb, target, frame.stamp)
+        found = self._finder.find(frame.rgb, target, frame.stamp)
+        if found is not None:
+            by = "its colour" if found.confidence is None else f"the network, {found.confidence:.2f}"
+            self._perception.found(frame.camera, Outline(f"{WORDS[target]}, by {by}", frame.stamp, corners(found.box)))
+        return found
 
 
 def _largest_blob(mask: NDArray[np.uint8], least_area: int) -> PixelBox | None:

@@ -8,6 +8,7 @@ from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.frame import RgbdFrame
+from regrasp.interfaces.outline import Outline
 from regrasp.interfaces.printer.cell import PrinterKnown
 from regrasp.interfaces.printer.target import TargetEstimate
 from regrasp.interfaces.wall_time import counts_as
@@ -86,6 +87,7 @@ class PartTracker:
         if isinstance(seen, NoSection):
             self.why = seen.why
             return
+        self._perception.found(self._camera, Outline("gripping section, as fitted", frame.stamp, seen.outline))
         tool = world_from_tool.as_matrix()
         way = tool[:3, :3] @ [np.cos(seen.yaw), np.sin(seen.yaw), 0.0]
         yaw = float(np.arctan2(way[1], way[0]))

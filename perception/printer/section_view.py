@@ -11,7 +11,7 @@ from regrasp.interfaces.arrays import DepthImage, FloatArray, Mask
 from regrasp.interfaces.frame import Intrinsics, RgbdFrame
 from regrasp.interfaces.printer.cell import PrintedPart
 from regrasp.perception.camera.color import SegmentationParameters, color_mask
-from regrasp.perception.camera.model import NEAREST_DEPTH, pixel_rays
+from regrasp.perception.camera.model import NEAREST_DEPTH, hull, pixel_rays
 
 
 @dataclass(frozen=True)
@@ -41,6 +41,7 @@ class SectionSighting:
 
     `yaw` (rad) is the turn about the tool's z axis of the way into the part, from the tool's x axis. `deviation` (m) is
     of each axis, `yaw_deviation` (rad) of the yaw. Lengths are as the depth image scales them.
+    `outline` (k, 2) px is that of a section of the known size there, in the picture.
     """
 
     stamp: float
@@ -48,6 +49,7 @@ class SectionSighting:
     yaw: float
     deviation: float
     yaw_deviation: float
+    outline: FloatArray
 
 
 @dataclass(frozen=True)
@@ -133,7 +135,7 @@ class SectionView:
         self,
         frame: RgbdFrame,
         near: tuple[slice, slice],
-        outline: tuple[float, float, float],
+        edges: tuple[float, float, float],
         plane: FloatArray,
         by_size: bool,
         camera_from_tool: FloatArray,
@@ -143,7 +145,7 @@ class SectionView:
         `by_size`: its distance is not by depth, but by how wide it looks, and it may be turned.
         """
         values, k = self._parameters, frame.intrinsics
-        left, right, top = outline[0] + near[1].start, outline[1] + near[1].start, outline[2] + near[0].start
+        left, right, top = edges[0] + near[1].start, edges[1] + near[1].start, edges[2] + near[0].start
         turn, shift = camera_from_tool[:3, :3], camera_from_tool[:3, 3]
         camera = -shift @ turn  # in the tool's frame
         yaw = float(np.arctan(-plane[1]))
@@ -169,13 +171,14 @@ class SectionView:
             step = np.array([across * z / k.fx, (top - v.min()) * z / k.fy, 0.0]) @ turn
             place = place + np.array([0.0, step[1], step[2]])
             place[0] = camera[0] + plane[0] + plane[1] * (place[1] - camera[1])
+        outline = hull((corners + place) @ turn.T + shift, k)
         distance = float(place[0] - camera[0])
         deviation = values.deviation * max(1.0, distance / values.deviation_distance) * (1.0 if whole else 3.0)
         if by_size:
             deviation += distance / (right - left)  # of 1 px
-            return SectionSighting(frame.stamp, place, yaw, deviation, values.unknown_yaw)
+            return SectionSighting(frame.stamp, place, yaw, deviation, values.unknown_yaw, outline)
         yaw_deviation = values.yaw_deviation * max(1.0, distance / values.deviation_distance) ** 2
-        return SectionSighting(frame.stamp, place, yaw, deviation, yaw_deviation)
+        return SectionSighting(frame.stamp, place, yaw, deviation, yaw_deviation, outline)
 
 
 def _largest(mask: NDArray[np.uint8]) -> FloatArray | None:

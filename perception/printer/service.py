@@ -10,11 +10,13 @@ from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cell import Box
 from regrasp.interfaces.devices import Camera, Clock
 from regrasp.interfaces.frame import RgbdFrame
+from regrasp.interfaces.outline import Outline
 from regrasp.interfaces.printer.actions import PlaceView, Sighting
 from regrasp.interfaces.printer.cell import PrinterKnown
 from regrasp.interfaces.wall_time import counts_as
 from regrasp.perception.camera.color import SegmentationParameters, color_mask
 from regrasp.perception.camera.model import deproject
+from regrasp.perception.detection import corners
 from regrasp.perception.mapping.occupancy import Spheres
 from regrasp.perception.printer.approach_tables import ApproachTables, load_tables
 from regrasp.perception.printer.part_track import PartTracker, PartTrackParameters
@@ -87,7 +89,9 @@ class PrinterPerception(Perception):
         depths = deproject(frame.depth, mask, frame.intrinsics)[:, 2]
         if len(depths) < self.parameters.least_points:
             return None
-        v, u = np.percentile(np.argwhere(mask), self.parameters.span, axis=0).mean(axis=0)
+        (top, left), (bottom, right) = np.percentile(np.argwhere(mask), self.parameters.span, axis=0)
+        self.found(camera, Outline("handle, by its colour", frame.stamp, corners((left, top, right, bottom))))
+        u, v = 0.5 * (left + right), 0.5 * (top + bottom)
         k, depth = frame.intrinsics, float(np.median(depths))
         return self.pose_of(frame).apply([depth * (u - k.cx) / k.fx, depth * (v - k.cy) / k.fy, depth])
 

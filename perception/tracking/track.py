@@ -66,7 +66,7 @@ class ConnectorTrack:
         age = now - self.last.stamp
         change = self._change(now)
         fresh, live = age <= limits.max_age, change >= limits.min_change
-        seen = f"seen {age:.2f} s ago by the {self.last.camera} camera, limit {limits.max_age:.2f} s"
+        seen = f"seen {age:.2f} s ago by the {self.last.camera} camera (at most {limits.max_age:.2f} s)"
         moved = f"changed {1e3 * change:.3f} mm within {limits.live_interval:.1f} s"
         return TrackHealth(True, fresh, live, f"connector {seen}; {moved}")
 

@@ -72,7 +72,7 @@ def test_an_arm_that_does_not_follow_is_led_on_slower_and_then_given_up(
 ) -> None:
     rig.arms["right"].at = ASIDE
     rig.arms["right"].stuck = 0.0
-    with pytest.raises(PlanningError, match=r"off its trajectory, limit 0.080, 3 times") as error:
+    with pytest.raises(PlanningError, match=r"off its trajectory \(at most 0.080\), 3 times") as error:
         rig.run(work(rig.motion))
     assert error.value.code is CauseCode.ARM_FAILED
     assert rig.arms["right"].stops == 3
@@ -89,7 +89,7 @@ def test_an_arm_that_does_not_follow_is_led_on_slower_and_then_given_up(
 def test_an_arm_that_pulls_something_elastic_and_falls_behind_is_blocked_but_in_order(rig: Rig) -> None:
     rig.arms["right"].at = READY
     rig.arms["right"].stuck = 0.0
-    with pytest.raises(PlanningError, match=r"off its trajectory, limit 0.080, 3 times") as error:
+    with pytest.raises(PlanningError, match=r"off its trajectory \(at most 0.080\), 3 times") as error:
         rig.run(rig.motion.sleep("right", pulling=True))
     assert error.value.code is CauseCode.MOTION_BLOCKED
     rig.arms["right"].stuck = 1.0

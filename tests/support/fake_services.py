@@ -23,6 +23,7 @@ from regrasp.interfaces.cell import Box, FixedMount
 from regrasp.interfaces.devices import TICK
 from regrasp.interfaces.evidence import Evidence
 from regrasp.interfaces.frame import RgbdFrame
+from regrasp.interfaces.outline import Outline
 from regrasp.interfaces.reading import GripperReading
 from regrasp.interfaces.request import Request
 from regrasp.interfaces.services import Obstacles
@@ -338,6 +339,9 @@ class FakePerception:
 
     def frame(self, camera: str) -> RgbdFrame | None:
         return self.frames(np.floor(self.clock.t * 15 + 1e-6) / 15)
+
+    def outlines(self, camera: str) -> list[Outline]:
+        return []
 
     def trouble(self, camera: str) -> str | None:
         return self.troubles.get(camera)

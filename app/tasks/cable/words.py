@@ -45,4 +45,5 @@ WORDS = Words(
     belief_lines=_belief_lines,
     measured_moments=_slip_moments,
     limits={"slips": "at least {}, all noticed"},
+    units={"detection_delay": "s", "pose_error.position": "m", "pose_error.angle_deg": "degrees"},
 )

@@ -2,4 +2,9 @@
 
 from regrasp.app.task.words import Words
 
-WORDS = Words(measured="printer", measured_title="The printer, by ground truth", limits={"door_open": "at least {} m"})
+WORDS = Words(
+    measured="printer",
+    measured_title="The printer, by ground truth",
+    limits={"door_open": "at least {} m"},
+    units={"door_open": "m"},
+)

@@ -211,4 +211,5 @@ def _estimate(frame: RgbdFrame, camera: Registration, found: _Found, hint: Float
         visible_extent(found.blob, found.fit),
         found.whole,
         bool(found.sign),
+        camera.world_from_camera,
     )

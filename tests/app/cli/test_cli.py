@@ -78,7 +78,7 @@ def test_run_ends_with_a_summary_on_stdout_and_progress_on_stderr(calls: list[Si
     assert ran.stdout.splitlines() == [
         "mine, seed 7: success, 2 of 2 expectations met",
         "  ✓ slips: 1 (expected: at least 1, all noticed)",
-        "  ✓ unintended_force: 1.23 (expected: at most 5)",
+        "  ✓ unintended_force: 1.23 (expected: at most 5 N)",
         "  slip    lost at 12.00 s, noticed at 12.25 s by gap",
         "  record  runs/mine-7-1",
         "  time    80.0 s simulated in 100.0 s, real-time factor 0.80, renderer moderngl",

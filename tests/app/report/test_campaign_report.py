@@ -35,7 +35,8 @@ def row(seed: int, failed: bool, words: str = "18 stops", **changes: Any) -> dic
         "why": words if failed else "",
         "sim_seconds": 20.0 + seed % 5,
         "wall_seconds": 5.0,
-        "measured": {"error": 0.001 * seed, "slips": [{"at": 1.0}] * (seed % 3)},
+        "task": "printer",
+        "measured": {"door_open": 0.001 * seed, "slips": [{"at": 1.0}] * (seed % 3)},
         "source": {"scenario": "toy.yaml", "overrides": [], "scene": {"obstacles": float(seed)}},
         **changes,
     }
@@ -76,7 +77,7 @@ def test_a_page_says_how_often_why_and_what_decides(folder: Path) -> None:
         "search_exhausted",
         'id="run-2"',
         "light.brightness",
-        "error (SI)",
+        "door_open (m)",
         "number of slips",
         "What so many runs cannot tell",
         "these 40 scenes, run again after it",

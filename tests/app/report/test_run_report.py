@@ -45,7 +45,7 @@ def test_a_page_says_what_was_asked_what_came_out_and_why(rich: Path) -> None:
         "toy, seed 7",
         "Failure",
         "The part is to be fetched.",
-        "jaw_opens: seconds 1; when at 0.4 to 0.6",
+        "jaw_opens: seconds 1 s; when at 0.4 to 0.6 s",
         "1 of 2 expectations met",
         "regrasp run scenario.yaml --seed 7",
         "slip: the connector is lost",
@@ -131,6 +131,17 @@ def test_files_beside_the_record_may_be_broken(copy: Path, name: str) -> None:
     (copy / name).write_bytes(b"\xff\x00{[")
     assert typed(copy).exit_code == (2 if name in ("scenario.yaml", "tree.xml") else 0)
     assert name == "cell.yaml" or name.rpartition("/")[2] in (copy / "report.html").read_text()
+
+
+def test_what_was_found_is_drawn_into_its_picture(copy: Path) -> None:
+    name = next((copy / "pictures").glob("*.jpg")).name
+    found = {"picture": name, "found": "part <b>here</b>", "outline": [[8.0, 6.0], [16.0, 6.0], [16.0, 12.0]]}
+    lines = [found, {"picture": name, "found": "no outline"}, {"picture": "gone.jpg", "found": "x", "outline": []}]
+    (copy / "pictures/outlines.jsonl").write_text("\n".join([*map(json.dumps, lines), "{"]))
+    text = run_page(copy)[0].decode()
+    [points] = re.findall(r'<polygon class="found" points="([^"]+)"><title>part &lt;b&gt;here', text)
+    assert points == "8.0,6.0 16.0,6.0 16.0,12.0"
+    assert "outlines.jsonl: 2 lines cannot be read" in text
 
 
 def test_a_result_of_a_later_version_is_refused(copy: Path) -> None:

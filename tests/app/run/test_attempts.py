@@ -90,7 +90,7 @@ def test_the_chain_goes_through_retry_and_sequence_to_the_last_try() -> None:
         ("stop", 2.0, 3.0, "FAILURE", None, 1),
     ]
     assert chain(attempts) == [
-        ("root", "Fallback", "all 2 children failed"),
+        ("root", "Fallback", "both children failed"),
         ("mission", "Sequence", "child tries failed (2 of 2)"),
         ("tries", "Retry", "2 of 2 tries failed"),
         ("try", "Sequence", "child grasp failed (2 of 2)"),

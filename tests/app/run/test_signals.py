@@ -1,5 +1,6 @@
 """Signals and pictures in a record: they are right, and asking for them changes no log."""
 
+import json
 from pathlib import Path
 
 import cv2
@@ -31,16 +32,33 @@ def test_asking_for_pictures_changes_no_log(records: Path) -> None:
 
 
 def test_pictures_show_what_the_cameras_saw_at_events(records: Path) -> None:
-    pictures = sorted((records / "with/pictures").iterdir())
+    pictures = sorted((records / "with/pictures").glob("*.jpg"))
     assert {path.name.split("-")[1] for path in pictures} == {"rear", "wrist"}
     assert sum(path.stat().st_size for path in pictures) < 3e6
     seconds = [float(path.name.split("-")[0]) for path in pictures]
     events = {round(event.t, 2) for event in regrasp.read_record(records / "with").events}
-    assert set(seconds) <= {round(t, 2) for t in events}
+    at_events = [s for s, path in zip(seconds, pictures, strict=True) if "no_event" not in path.name]
+    assert {*at_events} <= {round(t, 2) for t in events}
+    assert max(np.diff(sorted({*seconds, 0.0, SECONDS}))) < 2.2
     for path in pictures:
         image = cv2.imread(str(path))
         assert image is not None
         assert np.std(np.asarray(image)) > 10
+
+
+def test_what_was_found_in_a_picture_lies_on_it(records: Path) -> None:
+    folder = records / "with/pictures"
+    rows = [json.loads(line) for line in (folder / "outlines.jsonl").read_text().splitlines()]
+    assert rows
+    for row in rows:
+        assert row["found"] == "connector, as estimated"
+        image = cv2.imread(str(folder / row["picture"]))
+        assert image is not None
+        inside = cv2.fillPoly(
+            np.zeros(image.shape[:2], np.uint8), [np.array(row["outline"]).round().astype(np.int32)], 1
+        )
+        blue, _, red = image[inside > 0].mean(axis=0)
+        assert red > 2 * blue, "the connector is red"
 
 
 def test_the_rows_are_the_ticks_and_say_what_is_so(records: Path) -> None:
