@@ -17,8 +17,10 @@ FILE = "report.html"  # a report in the folder that it shows
 MAX_TEXT = 2000  # characters of one text; a longer one is cut in its middle
 
 
-def page(template: str, script: str, **values: Any) -> bytes:
+def page(template: str, script: str, *, reload: int = 0, **values: Any) -> bytes:
     """The page of a template, such as "run.html", with the script of that file name, in UTF-8.
+
+    It loads itself anew every `reload` s; 0: not.
 
     Texts in `values` are escaped, control characters and marks of direction among them; `Markup` goes in as it is. The
     page's policy allows its own style and script by their digests, pictures and films inside the page, and no request.
@@ -30,7 +32,9 @@ def page(template: str, script: str, **values: Any) -> bytes:
         "img-src data:; media-src data:; base-uri 'none'; form-action 'none'"
     )
     made = (
-        _environment().get_template(template).render(policy=policy, style=Markup(style), script=Markup(code), **values)
+        _environment()
+        .get_template(template)
+        .render(policy=policy, style=Markup(style), script=Markup(code), reload=reload, **values)
     )
     return made.encode("utf-8", "replace")
 

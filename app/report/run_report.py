@@ -36,8 +36,10 @@ class Verdict:
     rest: str
 
 
-def run_page(folder: Path) -> tuple[bytes, list[Finding]]:
+def run_page(folder: Path, reload: int = 0) -> tuple[bytes, list[Finding]]:
     """The page of a run's folder, and what is wrong in the folder: that is left out, and said in the page.
+
+    `reload`: the run still goes on, and the page loads itself anew every so many seconds.
 
     Raises `Findings` for a folder without a run, or with one that is newer than this program.
     """
@@ -63,7 +65,10 @@ def run_page(folder: Path) -> tuple[bytes, list[Finding]]:
         "film": kept.film,
         "missing": list(dict.fromkeys(missing)),
     }
-    return page("run.html", "run.js", **values), found
+    if reload:
+        values |= {"missing": [one for one in values["missing"] if "result.json" not in one]}
+        values |= {"verdict": Verdict("unknown", "Running", f"The page loads itself anew every {reload} s.")}
+    return page("run.html", "run.js", reload=reload, **values), found
 
 
 def _cut(folder: Path, remarks: Mapping[str, Sequence[str]]) -> list[Finding]:

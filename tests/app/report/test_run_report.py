@@ -18,6 +18,7 @@ from regrasp.app.cli.commands import app
 from regrasp.app.records.reader import read_record
 from regrasp.app.report.curves import half_axes, panels
 from regrasp.app.report.run_report import run_page
+from regrasp.app.report.written import FollowParameters, follow_run
 
 
 @pytest.fixture(scope="module")
@@ -131,6 +132,29 @@ def test_files_beside_the_record_may_be_broken(copy: Path, name: str) -> None:
     (copy / name).write_bytes(b"\xff\x00{[")
     assert typed(copy).exit_code == (2 if name in ("scenario.yaml", "tree.xml") else 0)
     assert name == "cell.yaml" or name.rpartition("/")[2] in (copy / "report.html").read_text()
+
+
+def test_the_page_of_a_run_that_goes_on_loads_itself_anew_until_it_ends(copy: Path) -> None:
+    page, result = copy / "live.html", (copy / "result.json").read_bytes()
+    (copy / "result.json").unlink()
+    pages = follow_run(copy, page, FollowParameters(every=1))
+    next(pages)
+    text = page.read_text()
+    assert '<meta http-equiv="refresh" content="1">' in text
+    assert "What it does now" in text
+    assert "result.json" not in text
+    (copy / "result.json").write_bytes(result)
+    assert next(pages).page == page
+    assert 'http-equiv="refresh"' not in page.read_text()
+    assert next(pages, None) is None
+
+
+def test_a_run_that_fell_silent_is_not_followed(copy: Path) -> None:
+    (copy / "result.json").unlink()
+    for file in copy.rglob("*"):
+        os.utime(file, (1e9, 1e9))
+    assert typed(copy, "--follow").exit_code == 0
+    assert 'http-equiv="refresh"' not in (copy / "report.html").read_text()
 
 
 def test_what_was_found_is_drawn_into_its_picture(copy: Path) -> None:
