@@ -1,5 +1,6 @@
 """What was asked of a run: the scenario's own words, its faults, and what else it sets, by the record's copy."""
 
+import re
 import shlex
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -21,8 +22,9 @@ TOLD_ELSEWHERE = ("type", "when", "name")
 
 @dataclass(frozen=True)
 class Asked:
-    """The description ('' if there is none), facts as names and values, the faults in words, and damage."""
+    """What the tree does and what the scenario is, '' where nothing says so; facts, faults in words, and damage."""
 
+    task: str
     description: str
     facts: tuple[tuple[str, str], ...]
     faults: tuple[str, ...]
@@ -46,7 +48,17 @@ def asked(record: RunRecord) -> Asked:
     known = _known_faults(record) if faults else {}
     told = tuple(fault_words(one, known) for one in faults if isinstance(one, dict)) if isinstance(faults, list) else ()
     again = f"regrasp run scenario.yaml --seed {shlex.quote(_value(_seed(record)))}" if scenario else ""
-    return Asked(str(scenario.get("description") or ""), tuple(facts), told, again, damage)
+    return Asked(_head(record), str(scenario.get("description") or ""), tuple(facts), told, again, damage)
+
+
+def _head(record: RunRecord) -> str:
+    """The comment at the head of the record's tree, which says what it does; '' if there is none."""
+    try:
+        text = read_text(record.folder / "tree.xml")
+    except Findings:
+        return ""
+    found = re.match(r"\s*(?:<\?xml[^>]*\?>\s*)?<!--(.*?)-->", text, re.DOTALL)
+    return " ".join(found[1].split()) if found else ""
 
 
 def _seed(record: RunRecord) -> Any:

@@ -109,8 +109,11 @@ def _words(event: Event) -> str:
         return f"planned, because {values.get('because')}: {values.get('actions')}"
     if event.event == "end":
         return f"end: {values.get('outcome')}, {'' if values.get('succeeded') else 'not '}as expected"
-    told = {name.replace("_", " "): value for name, value in values.items()}
-    return "begin" if event.event == "begin" else event_words(event.event, told, " ")
+    if event.event == "begin":
+        return "begin"
+    told = {name.replace("_", " "): value for name, value in values.items() if name != "why"}
+    why = f": {values['why']}" if "why" in values else ""
+    return f"{event_words(event.event, told, ' ')}{why}"
 
 
 def kind_of(event: Event) -> str:

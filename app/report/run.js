@@ -46,6 +46,8 @@ function changedAt(number, t) {
   return at >= 0 && Math.abs(own[2 * at] - t) < 0.03;
 }
 
+const byDepth = (a, b) => b.split("/").length - a.split("/").length;
+
 function showTree(t) {
   const running = [];
   for (const node of nodes) {
@@ -57,10 +59,10 @@ function showTree(t) {
     node.sign.textContent = SIGNS[state];
   }
   const leaves = running.filter((path) => !running.some((other) => other.startsWith(path + "/")));
-  const failed = nodes.filter((node) => node.state === "f").map((node) => data.paths[node.number]);
+  const failed = nodes.filter((node) => node.state === "f").map((node) => data.paths[node.number]).sort(byDepth);
   const told = find("states");
   const failing = nodes.filter((node) => node.state === "f" && changedAt(node.number, t)).map((node) => data.paths[node.number]);
-  const deepest = failing.sort((a, b) => b.split("/").length - a.split("/").length);
+  const deepest = failing.sort(byDepth);
   if (!playing) reveal([deepest, leaves, failed, data.paths.slice(0, 1)].find((some) => some.length) || []);
   if (told) told.textContent = `Running: ${leaves.join(", ") || "nothing"}. Failed: ${failed.join(", ") || "nothing"}.`;
 }
@@ -71,8 +73,8 @@ function reveal(paths) {
   const node = nodes.find((one) => data.paths[one.number] === paths[0]);
   if (!node) return;
   const place = node.group.getBoundingClientRect(), frame = box.getBoundingClientRect();
-  if (place.top < frame.top || place.bottom > frame.bottom) box.scrollTop += place.top - frame.top - frame.height / 2;
-  if (place.left < frame.left || place.right > frame.right) box.scrollLeft += place.left - frame.left - frame.width / 2;
+  if (place.top < frame.top + 30 || place.bottom > frame.bottom - 30) box.scrollTop += place.top - frame.top - frame.height / 2;
+  if (place.left < frame.left + 10 || place.right > frame.right - 10) box.scrollLeft += place.left - frame.left - frame.width / 2;
 }
 
 const cameras = all(".camera[data-camera]").map((figure) => ({
@@ -84,7 +86,8 @@ function showPictures(t) {
     const at = last(frames.length, (i) => Number(frames[i].dataset.t), t);
     frames.forEach((frame, i) => { frame.hidden = i !== at; });
     none.hidden = at >= 0;
-    caption.textContent = at < 0 ? "" : frames[at].dataset.caption;
+    const age = at < 0 ? 0 : t - Number(frames[at].dataset.t);
+    caption.textContent = at < 0 ? "" : frames[at].dataset.caption + (age > 0.06 ? ` (${age.toFixed(1)} s before)` : "");
   }
 }
 
@@ -110,10 +113,15 @@ function showCharts(t) {
   const x = LEFT + (RIGHT - LEFT) * (data.end ? t / Math.max(data.end, 0.1) : 0);
   for (const { cursor, width } of charts) {
     for (const end of ["x1", "x2"]) cursor.setAttribute(end, (x / WIDTH) * width);
+    const box = cursor.ownerSVGElement.parentElement;
+    const at = (x / WIDTH) * cursor.ownerSVGElement.clientWidth;
+    if (at < box.scrollLeft || at > box.scrollLeft + box.clientWidth) box.scrollLeft = at - box.clientWidth / 2;
   }
   data.panels.forEach((panel, i) => panel.curves.forEach((curve, j) => {
     const at = last(curve.t.length, (n) => curve.t[n], t);
+    const old = at >= 0 && t - curve.t[at] > 1 ? ` at ${curve.t[at].toFixed(1)} s` : "";
     find(`reading-${i}-${j}`).textContent = at < 0 || curve.v[at] === null ? "–" : String(curve.v[at]);
+    find(`reading-${i}-${j}`).nextElementSibling.textContent = find(`reading-${i}-${j}`).nextElementSibling.dataset.unit + old;
   }));
   const stamp = find("reading-time");
   if (stamp) stamp.textContent = `${t.toFixed(2)} s`;
@@ -145,7 +153,7 @@ function show(t) {
   showCharts(now);
   const event = showLog(now);
   const busy = data.work.filter(([from, to]) => from <= now + 1e-6 && now < to).map((one) => one[2].split("/").pop());
-  const words = `${busy.length ? "at work: " + [...new Set(busy)].join(", ") : "no leaf at work"}${event ? " · last event: " + event : ""}`;
+  const words = `${busy.length ? "at work: " + [...new Set(busy)].join(", ") : "nothing is running"}${event ? " · last event: " + event : ""}`;
   find("now").setAttribute("aria-live", playing ? "off" : "polite");
   find("now").textContent = words;
   slider.setAttribute("aria-valuetext", `${now.toFixed(2)} seconds, ${words}`);

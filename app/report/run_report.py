@@ -229,6 +229,7 @@ def _data(
     stops |= {round(one.ended, 3) for one in tried}
     failed = sorted({round(one.ended, 3) for one in tried if one.status == "FAILURE" and one.cause})
     chain = record.result.chain if record.result else None
+    failed = sorted({*failed, *(round(link.at, 3) for link in chain or ())})
     return {
         "end": round(end, 3),
         "begin": round(chain[-1].at, 3) if chain else round(end, 3),

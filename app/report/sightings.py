@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from regrasp.interfaces.cell import CameraSpec, Cell
     from regrasp.interfaces.robot.chain import Chain
 
-NEWEST = 0.5  # s: an event this near to a picture told of what is in it
+NEWEST = 0.1  # s: an event this near to a picture told of what is in it
 STALE = 2.0  # s: an older estimate is not drawn
 MAX_RADIUS = 0.3  # of a picture's width; a larger region says no more
 

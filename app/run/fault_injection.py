@@ -27,6 +27,9 @@ class EnteredNodes(py_trees.visitors.VisitorBase):
             self._notice(path)
 
 
+_WHAT = ("arm", "joint", "camera", "obstacle", "service")  # fields that name what a fault concerns
+
+
 class FaultLog(py_trees.visitors.VisitorBase):
     """A visitor of the tree that logs when each fault begins and ends."""
 
@@ -41,7 +44,8 @@ class FaultLog(py_trees.visitors.VisitorBase):
             for event, at in (("began", fault.began_at), ("ended", fault.ended_at)):
                 if at is not None and (i, event) not in self._told:
                     self._told.add((i, event))
-                    self._log.info(f"fault {event}", fault=fault.spec.type, at=round(at, 4))
+                    what = {name: getattr(fault.spec, name) for name in _WHAT if hasattr(fault.spec, name)}
+                    self._log.info(f"fault {event}", fault=fault.spec.type, **what, at=round(at, 4))
 
 
 def break_services(services: Services, faults: Iterable[ScheduledFault], now: Callable[[], float]) -> None:

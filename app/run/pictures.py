@@ -37,7 +37,7 @@ class Pictures:
         self, folder: Path | None, world: World[Any], parameters: PictureParameters = PictureParameters()
     ) -> None:
         self._folder, self._world, self._parameters = folder and folder / FOLDER, world, parameters
-        self._event = ""
+        self._event, self._urgent = "", False  # urgent: a failure or a warning, of which a picture is always kept
         self._taken: dict[str, tuple[int, float]] = {}  # of a camera: frame number, second
         self._bytes = 0
 
@@ -45,6 +45,7 @@ class Pictures:
         """An event has come."""
         if self._folder is not None and values["level"] != "debug":
             self._event = self._event or str(values["event"])
+            self._urgent = self._urgent or values["event"] == "failed" or values["level"] != "info"
 
     @counts_as("record")
     def take(self, outlines: Callable[[str], Sequence[Outline]] = lambda camera: ()) -> None:
@@ -55,11 +56,12 @@ class Pictures:
         now = self._world.now()
         quiet = now - max((at for _, at in self._taken.values()), default=0.0) >= self._parameters.longest_gap
         event, self._event = self._event or ("no event" if quiet else ""), ""
+        urgent, self._urgent = self._urgent, False
         if not event or self._folder is None:
             return
         for name, camera in self._world.cameras.items():
             number, at = self._taken.get(name, (-1, float("-inf")))
-            frame = camera.latest() if now - at >= self._parameters.every else None
+            frame = camera.latest() if urgent or now - at >= self._parameters.every else None
             if frame is None or frame.number == number:
                 continue
             settings = [cv2.IMWRITE_JPEG_QUALITY, self._parameters.quality]

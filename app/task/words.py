@@ -4,6 +4,8 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from regrasp.interfaces.quote import arm_words
+
 Lines = Callable[[Mapping[str, Any]], Iterator[str]]
 Moments = Callable[[Mapping[str, Any]], Iterator[tuple[float, str]]]
 
@@ -17,7 +19,7 @@ def robot_lines(belief: Mapping[str, Any]) -> Iterator[str]:
     """The obstacles that the robot has mapped, and where it reads its arms."""
     yield f"obstacles mapped: {belief.get('occupied_voxels', 0)} voxels"
     for name, arm in belief.get("arms", {}).items():
-        yield f"{name} arm: tool at {place(arm['tool'])}"
+        yield f"{arm_words(name).removeprefix('the ')}: tool at {place(arm['tool'])}"
         yield f"  joints {numbers(arm['joints'])} rad"
 
 

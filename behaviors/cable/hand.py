@@ -139,7 +139,7 @@ class HandLeaf(CableLeaf):
         """Draw the hand straight back as far as is free. Where no distance is free, only an event says so."""
         why = yield from self.ask(self.services.motion.draw_back())
         if why:
-            self.say("left out", why=why)
+            self.say("did not draw back", why=why)
 
 
 class LookInHand(HandLeaf):

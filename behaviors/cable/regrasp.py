@@ -22,6 +22,8 @@ class RegraspParameters:
 
     hang_time: float = 3.0  # s for the end to hang still
     look_time: float = 1.5  # s of looking then
+    places: int = 3  # to which it is lifted, one after the other, where it cannot be taken from the one before
+    failed_grasps: int = 2  # from which on an end with a blocked way is pulled out, too
 
 
 class Regrasp(HandLeaf):
@@ -42,7 +44,8 @@ class Regrasp(HandLeaf):
         try:
             yield from self._take(connector)
         except PlanningError as error:
-            if error.code not in NO_GRASP or len(self.services.known.arms) == 1:
+            again = error.code in NO_WAY and self.services.motion.failed_grasps >= self.parameters.failed_grasps
+            if not (again or error.code in NO_GRASP) or len(self.services.known.arms) == 1:
                 raise
             yield from self._take_by_cable(connector, error)
 
@@ -58,7 +61,7 @@ class Regrasp(HandLeaf):
 
     def _take_by_cable(self, connector: "RigidTransform", no_grasp: PlanningError) -> LeafSteps:
         """Lift the connector out by its cable, and grip it with another arm. Raises `no_grasp` where none can."""
-        motion, perception = self.services.motion, self.services.perception
+        motion = self.services.motion
         try:
             arm = yield from self.ask(motion.pull_cable(connector))
         except PlanningError as error:
@@ -67,13 +70,36 @@ class Regrasp(HandLeaf):
             self.say("the cable cannot be taken, either", why=str(error))
             raise no_grasp from None
         self.say("lifted by its cable", arm=arm)
-        yield from self.wait(self.parameters.hang_time)
-        looked = yield from self.ask(perception.watch(self.overview, self.parameters.look_time, later=True))
         try:
-            if not looked.estimates:
-                raise no_grasp
-            yield from self._take(perception.fuse(looked.estimates).world_from_connector, arm)
+            yield from self._take_lifted(arm, no_grasp)
         except PlanningError:
             yield from self.ask(motion.let_go_of_cable(arm))
             raise
         yield from self.ask(motion.let_go_of_cable(arm))
+
+    def _take_lifted(self, arm: str, no_grasp: PlanningError) -> LeafSteps:
+        """Grip the connector whose cable an arm holds; where that fails the arm brings it elsewhere first.
+
+        At last it stays elsewhere: what falls from there may lie where it can be taken.
+        """
+        for left in reversed(range(self.parameters.places)):
+            try:
+                yield from self._take_hanging(arm, no_grasp)
+                return
+            except PlanningError as error:
+                if error.code not in (*NO_WAY, *NO_GRASP, CauseCode.GRASP_EMPTY):
+                    raise
+                self.say("brought elsewhere by its cable", arm=arm, why=str(error))
+                yield from self.ask(self.services.motion.bring_cable(arm))
+                if not left:
+                    raise
+
+    def _take_hanging(self, arm: str, no_grasp: PlanningError) -> LeafSteps:
+        """Look for the connector whose cable an arm holds, and grip it. Raises `no_grasp` where it is not seen."""
+        yield from self.wait(self.parameters.hang_time)
+        looked = yield from self.ask(
+            self.services.perception.watch(self.overview, self.parameters.look_time, later=True)
+        )
+        if not looked.estimates:
+            raise no_grasp
+        yield from self._take(self.services.perception.fuse(looked.estimates).world_from_connector, arm)

@@ -1,15 +1,17 @@
 """How an arm pulls at the cable: it brings the connector out of a place where no jaw gets round it."""
 
-from collections.abc import Generator, Iterator
+from collections.abc import Generator, Iterator, Sequence
 from contextlib import suppress
 from itertools import product
 
 import numpy as np
+from scipy.spatial import cKDTree
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arguments import finite_pose
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.cause import CauseCode
+from regrasp.interfaces.quote import arm_words
 from regrasp.interfaces.request import Request
 from regrasp.motion.cable.cable_section import CableSection, section_of_cable
 from regrasp.motion.cable.cable_shape import cable_course
@@ -20,6 +22,9 @@ from regrasp.motion.grasping.approach import pick_candidates
 
 class PullingMotion(TakingMotion):
     """Takes hold of the cable of a connector that cannot be taken where it lies."""
+
+    _been: list[FloatArray]  # where (3,) m the tool was that holds the cable
+    _below: float  # m of cable and connector that hang from it
 
     def pull_cable(self, world_from_connector: RigidTransform) -> Request[str]:
         """Let an arm take hold of the cable near the loose connector, and lift it; the answer is the arm.
@@ -39,6 +44,7 @@ class PullingMotion(TakingMotion):
                 yield from self._leave_cable(arm)
                 raise
             yield from self._lift(arm, place)
+            self._been, self._below = [self.tool(arm).translation], place + self.known.cable.connector.length
             return arm
 
         def stop() -> None:
@@ -46,6 +52,50 @@ class PullingMotion(TakingMotion):
                 self.execution.halt(arm)
 
         return Request(steps(), stop)
+
+    def bring_cable(self, arm: str) -> Request[None]:
+        """Bring what an arm holds of the cable to another place, where its end has room and may be taken.
+
+        It fails with NO_COLLISION_FREE_GOAL where no way leads to any. A touch ends it.
+        """
+
+        def steps() -> Iterator[None]:
+            values, q = self.parameters.pulling, self.joints(arm)
+            model, places = self.start_model(arm, optimistic=True), self._roomy_places(arm)
+            for first in range(0, len(places), values.at_once):
+                yield
+                try:
+                    path = self._plan(model, q, self._holding_at(arm, places[first : first + values.at_once]))
+                except PlanningError:
+                    continue
+                with suppress(TouchError):
+                    yield from self._follow(arm, path, self._pace(True), model, self._guard.pulling)
+                self._been.append(self.tool(arm).translation)
+                return
+            message = f"no way leads {arm_words(arm)} to another place with what it holds of the cable"
+            raise PlanningError(CauseCode.NO_COLLISION_FREE_GOAL, message)
+
+        return self._together(arm, steps())
+
+    def _roomy_places(self, arm: str) -> FloatArray:
+        """Places (n, 3) m for the tool of an arm that holds the cable, those with the most room below first.
+
+        Not where it was before, and no further from the cable's anchor than the cable reaches.
+        """
+        values, known = self.parameters.pulling, self.known.cable
+        grid = np.array([*product(values.places_x, values.places_y, values.places_z)])
+        near = np.linalg.norm(grid - known.anchor[0], axis=1) < known.length - (self._below - known.connector.length)
+        fresh = np.linalg.norm(grid[:, None] - np.array(self._been)[None], axis=2).min(axis=1) > values.apart
+        places = grid[near & fresh]
+        seen = np.vstack([self._points, self._unseen])
+        if not len(places) or not len(seen):
+            return places
+        below = np.linspace(0.0, self._below, 5)
+        ends = places[:, None] - below[None, :, None] * [0.0, 0.0, 1.0]
+        to_seen = np.asarray(cKDTree(seen).query(ends, distance_upper_bound=values.room)[0])
+        room = np.minimum(to_seen, values.room).min(axis=1)
+        way = np.linalg.norm(places - self.tool(arm).translation, axis=1)
+        return np.asarray(places[np.lexsort([way, -room.round(2)])])
 
     def let_go_of_cable(self, arm: str) -> Request[None]:
         """Open the jaw of an arm that holds the cable, and bring the arm to its sleep pose."""
@@ -99,13 +149,16 @@ class PullingMotion(TakingMotion):
 
         No further than `reach` m from the cable's anchor, and with the jaw turned as it is all the way there.
         """
-        values, q = self.parameters.pulling, self.joints(arm)
-        kin, anchor = self.kinematics[arm], self.known.cable.anchor[0]
+        values, anchor = self.parameters.pulling, self.known.cable.anchor[0]
         places = [np.add(tool.translation, [x, y, lift]) for x, y in product(values.aside, repeat=2)]
-        near = [place for place in places if np.linalg.norm(place - anchor) < reach]
-        goals = [RigidTransform.from_components(place, tool.rotation) for place in near]
-        ends = kin.ik_of_all(goals, q)
-        return ends[np.abs(ends - q).max(axis=1) < values.turn]
+        return self._holding_at(arm, [place for place in places if np.linalg.norm(place - anchor) < reach])
+
+    def _holding_at(self, arm: str, places: Sequence[FloatArray] | FloatArray) -> FloatArray:
+        """Joint angles (n, joints) that hold the tool at these places (m) with the jaw turned as it is."""
+        q, turned = self.joints(arm), self.tool(arm).rotation
+        goals = [RigidTransform.from_components(place, turned) for place in places]
+        ends = self.kinematics[arm].ik_of_all(goals, q)
+        return ends[np.abs(ends - q).max(axis=1) < self.parameters.pulling.turn]
 
     def _leave_cable(self, arm: str) -> Iterator[None]:
         """Open a jaw, draw it straight back as far as is free, and bring the arm to its sleep pose."""

@@ -109,6 +109,8 @@ class FakeMotion:
         self.clip_stiffness: Callable[[int], float] = lambda insertion: 1600.0  # N/m, after so many insertions
         self.forced: list[bool] = []  # for each carry, whether the cable might be bent by force
         self.pulled: list[str] = []  # arms that hold the cable
+        self.brought = 0  # how often the cable was brought elsewhere
+        self.failed_grasps = 0
         self.stopped = 0
         self.rest: list[RigidTransform] = []
         self.reachable: Callable[[RigidTransform], bool] = lambda pose: True
@@ -204,6 +206,10 @@ class FakeMotion:
             return arm
 
         return Request(steps())
+
+    def bring_cable(self, arm: str) -> Request[None]:
+        self.brought += 1
+        return Request(self._steps())
 
     def let_go_of_cable(self, arm: str) -> Request[None]:
         self.pulled.remove(arm)

@@ -28,7 +28,7 @@ def _belief_lines(belief: Mapping[str, Any]) -> Iterator[str]:
         sure = "all of it seen" if belief["sure"] else "a part of it seen"
         yield f"connector found by the {belief['found_by'] or 'unknown'} camera at {place(belief['connector'])}, {sure}"
     else:
-        yield "connector not found since it was lost, or never lost"
+        yield "no estimate of the connector for a grasp: it was never lost, or not found since"
     if seen := belief["last_seen"]:
         at, where = f"{seen['at']:.2f} s", numbers(seen["position"])
         yield f"connector seen last at {at} by the {seen['camera']} camera at {where} m"

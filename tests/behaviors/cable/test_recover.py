@@ -93,4 +93,6 @@ def test_a_way_back_that_is_nowhere_free_is_left_out_and_said_once(stage: Stage)
     tree = stage.tree(ROOM)
     while stage.motion.moves == [] and stage.clock.t < 10.0:
         stage.run(tree, 0.05)
-    assert [line["why"] for line in stage.log.of("left out")] == ["0.03 m straight on the arm is 5 mm in back_panel"]
+    assert [line["why"] for line in stage.log.of("did not draw back")] == [
+        "0.03 m straight on the arm is 5 mm in back_panel"
+    ]
