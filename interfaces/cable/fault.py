@@ -19,6 +19,7 @@ class CableWhen(When):
         default=None,
         description="Share of the straight line from socket to clip that the held connector has moved along; "
         "drawn from this range.",
+        json_schema_extra=unit("of the way"),
         examples=[[0.3, 0.6]],
     )
     phase: Phase | None = Field(

@@ -19,6 +19,7 @@ class PrinterWhen(When):
     opened: FractionRange | None = Field(
         default=None,
         description="Share of its travel that the door has been opened; drawn from this range.",
+        json_schema_extra=unit("of the way"),
         examples=[[0.3, 0.6]],
     )
 

@@ -15,7 +15,7 @@ from regrasp.interfaces.printer.actions import PlaceView, Sighting
 from regrasp.interfaces.printer.cell import PrinterKnown
 from regrasp.interfaces.wall_time import counts_as
 from regrasp.perception.camera.color import SegmentationParameters, color_mask
-from regrasp.perception.camera.model import deproject
+from regrasp.perception.camera.model import deproject, hull
 from regrasp.perception.detection import corners
 from regrasp.perception.mapping.occupancy import Spheres
 from regrasp.perception.printer.approach_tables import ApproachTables, load_tables
@@ -108,6 +108,25 @@ class PrinterPerception(Perception):
         bottom = np.array(place.center) - 0.5 * np.array(place.size)
         off = points - bottom
         beside = np.array([values.place_inset, values.place_inset, -values.place_rise])
-        over = off[np.all((off > beside) & (off < np.array(place.size) - np.maximum(beside, 0.0)), axis=1)][:, 2]
+        within = np.all((off > beside) & (off < np.array(place.size) - np.maximum(beside, 0.0)), axis=1)
+        inside, over = points[within], off[within][:, 2]
         above = over[over > values.place_rise]
-        return PlaceView(len(over), len(above), float(np.quantile(over, values.place_top)) if len(over) else 0.0)
+        height = float(np.quantile(over, values.place_top)) if len(over) else 0.0
+        self._outline_place(camera, place, inside[over > values.place_rise], height)
+        return PlaceView(len(over), len(above), height)
+
+    def _outline_place(self, camera: str, place: Box, above: FloatArray, height: float) -> None:
+        """Note what was found on a place: points (n, 3) m over its floor up to `height` m, or that it is free."""
+        frame = self.frame(camera)
+        if frame is None:
+            return
+        low, high = (
+            np.array(place.center) - 0.5 * np.array(place.size),
+            np.array(place.center) + 0.5 * np.array(place.size),
+        )
+        floor = np.array(
+            [(x, y, low[2]) for x, y in ((low[0], low[1]), (high[0], low[1]), (high[0], high[1]), (low[0], high[1]))]
+        )
+        label = f"{1e3 * height:.0f} mm high in the {place.name}" if len(above) else f"{place.name}, free"
+        points = self.pose_of(frame).inv().apply(above if len(above) else floor)
+        self.found(camera, Outline(label, frame.stamp, hull(points, frame.intrinsics)))
