@@ -115,6 +115,7 @@ class Execution:
         self._limits = {name: JointLimits(chains[name].speeds, chains[name].accelerations) for name in arms}
         self._commanded: dict[str, FloatArray] = {}  # where an arm was told to come to rest
         self._speed_share = dict.fromkeys(arms, 1.0)  # of the speed asked for; less for an arm that fell behind
+        self._held_back: set[str] = set()  # arms that something elastic seems to hold
         self._out_of_order: dict[str, PlanningError] = {}
 
     def request(self, arm: str, steps: Iterator[None]) -> MotionRequest:
@@ -190,11 +191,17 @@ class Execution:
             message = f"{trouble}, {self.parameters.attempts} times"
             if contact.elastic:
                 self._speed_share[arm] = share
+                self._held_back.add(arm)
                 raise StoppedShortError(message)
             raise self.give_up(arm, CauseCode.ARM_FAILED, message)
+        self._held_back.discard(arm)
         self._commanded[arm] = path[-1]
         yield from self._arrive(arm, path[-1])
         self._watches[arm].leave(self._joints(arm))
+
+    def held_back(self, arm: str) -> bool:
+        """Whether something elastic seems to have held an arm back in its last motion, and no other has ended since."""
+        return arm in self._held_back
 
     def standing(self, arm: str) -> FloatArray:
         """The joints (n,) at which an arm at rest stands: those it was told where it was left, else as read."""

@@ -23,7 +23,7 @@ class RegraspParameters:
     hang_time: float = 3.0  # s for the end to hang still
     look_time: float = 1.5  # s of looking then
     places: int = 3  # to which it is lifted, one after the other, where it cannot be taken from the one before
-    failed_grasps: int = 2  # from which on an end with a blocked way is pulled out, too
+    blocked: int = 2  # times in a row that every arm's way was blocked, from which on the end is pulled out, too
 
 
 class Regrasp(HandLeaf):
@@ -37,6 +37,7 @@ class Regrasp(HandLeaf):
     NEEDS: ClassVar[Keys] = (FOUND,)
     WRITES: ClassVar[Keys] = (HELD, VAIN_CARRIES)
     parameters: ClassVar[RegraspParameters] = RegraspParameters()
+    _blocked = 0  # times in a row that no arm found a way
 
     def steps(self) -> LeafSteps:
         """See the class."""
@@ -44,7 +45,8 @@ class Regrasp(HandLeaf):
         try:
             yield from self._take(connector)
         except PlanningError as error:
-            again = error.code in NO_WAY and self.services.motion.failed_grasps >= self.parameters.failed_grasps
+            self._blocked += error.code in NO_WAY
+            again = error.code in NO_WAY and self._blocked >= self.parameters.blocked
             if not (again or error.code in NO_GRASP) or len(self.services.known.arms) == 1:
                 raise
             yield from self._take_by_cable(connector, error)
@@ -57,6 +59,7 @@ class Regrasp(HandLeaf):
         yield from self.take(hands, lambda: motion.pick_loose(connector, point_cloud=self.overview_points))
         self.say("took it", arm=motion.hand)
         yield from self.grip_or_leave(connector)
+        self._blocked = 0
         self.services.take_over_map()  # what nobody has seen beside the connector counts again
 
     def _take_by_cable(self, connector: "RigidTransform", no_grasp: PlanningError) -> LeafSteps:

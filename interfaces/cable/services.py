@@ -76,11 +76,6 @@ class CableMotionService(MotionService, Protocol):
         """Bring what an arm holds of the cable to another place, where its end has room."""
         ...
 
-    @property
-    def failed_grasps(self) -> int:
-        """How many grasps of the loose connector have failed since it was held last."""
-        ...
-
     def let_go_of_cable(self, arm: str) -> Request[None]:
         """Open the jaw of an arm that holds the cable, and bring the arm to its sleep pose."""
         ...

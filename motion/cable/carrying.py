@@ -107,7 +107,9 @@ class CarryMotion(SearchMotion):
 
         def tries() -> Iterator[None]:
             natural, *more = self.parameters.tether.bends
-            levels: list[tuple[float | None, ContactLimits]] = [(natural, self._guard.carrying)]
+            # What held it back just now may do so again: it is not broken.
+            carrying = replace(self._guard.carrying, elastic=self.execution.held_back(arm))
+            levels: list[tuple[float | None, ContactLimits]] = [(natural, carrying)]
             if forced:
                 # What stopped it on its natural ways may have been its cable: there it may pull harder now.
                 levels += [(bend, self._guard.pulling) for bend in (natural, *more, None)]

@@ -69,7 +69,7 @@ class PullingMotion(TakingMotion):
                 except PlanningError:
                     continue
                 with suppress(TouchError):
-                    yield from self._follow(arm, path, self._pace(True), model, self._guard.pulling)
+                    yield from self._follow(arm, path, self.parameters.pulling.speed, model, self._guard.lifting)
                 self._been.append(self.tool(arm).translation)
                 return
             message = f"no way leads {arm_words(arm)} to another place with what it holds of the cable"
@@ -137,7 +137,7 @@ class PullingMotion(TakingMotion):
             try:
                 model, q = self.start_model(arm, optimistic=True), self.joints(arm)
                 path = self._plan(model, q, self._lifted(arm, tool, lift, self.known.cable.length - place))
-                yield from self._follow(arm, path, self._pace(True), model, self._guard.pulling)
+                yield from self._follow(arm, path, self.parameters.pulling.speed, model, self._guard.lifting)
                 return
             except TouchError:
                 return

@@ -110,11 +110,6 @@ class TakingMotion(CarryMotion):
         """The arm that handles the cable now; at first the cell's."""
         return self._hand
 
-    @property
-    def failed_grasps(self) -> int:
-        """How many grasps of the loose connector have closed on nothing or touched something since it was held last."""
-        return len(self._missed)
-
     def take_with(self, arm: str) -> None:
         """Let an arm of that name handle the cable from now on."""
         self._hand = self.known.arm(arm).name

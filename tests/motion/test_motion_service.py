@@ -92,9 +92,11 @@ def test_an_arm_that_pulls_something_elastic_and_falls_behind_is_blocked_but_in_
     with pytest.raises(PlanningError, match=r"off its trajectory \(at most 0.080\), 3 times") as error:
         rig.run(rig.motion.sleep("right", pulling=True))
     assert error.value.code is CauseCode.MOTION_BLOCKED
+    assert rig.motion.execution.held_back("right")
     rig.arms["right"].stuck = 1.0
     rig.run(rig.motion.move("right", ASIDE[None]))
     assert rig.motion.joints("right") == pytest.approx(ASIDE)
+    assert not rig.motion.execution.held_back("right")
 
 
 def test_an_arm_goes_slowly_beside_what_was_seen_and_fast_elsewhere(rig: Rig) -> None:

@@ -110,7 +110,6 @@ class FakeMotion:
         self.forced: list[bool] = []  # for each carry, whether the cable might be bent by force
         self.pulled: list[str] = []  # arms that hold the cable
         self.brought = 0  # how often the cable was brought elsewhere
-        self.failed_grasps = 0
         self.stopped = 0
         self.rest: list[RigidTransform] = []
         self.reachable: Callable[[RigidTransform], bool] = lambda pose: True

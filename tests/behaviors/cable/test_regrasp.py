@@ -105,6 +105,22 @@ def test_what_is_not_seen_once_lifted_is_let_go(stage: Stage) -> None:
     assert not motion.pulled
 
 
+def test_what_cannot_be_taken_once_lifted_is_brought_elsewhere_and_let_go_there(stage: Stage) -> None:
+    nowhere = CauseCode.NO_COLLISION_FREE_GOAL
+    motion = hindered(stage, left=nowhere, right=nowhere)  # and no camera sees it then
+    assert stage.run(stage.tree(REGRASP), 120.0) is Status.FAILURE
+    assert motion.brought == 3
+    assert not motion.pulled
+
+
+def test_where_the_way_is_blocked_again_the_cable_is_pulled(stage: Stage) -> None:
+    blocked, tree = CauseCode.MOTION_BLOCKED, stage.tree(REGRASP)
+    for lifted in (0, 1):
+        hindered(stage, left=blocked, right=blocked)
+        assert stage.run(tree, 120.0) is Status.FAILURE
+        assert len(stage.log.of("lifted by its cable")) == lifted
+
+
 def test_where_there_is_a_grasp_but_no_way_to_it_nothing_pulls_at_the_cable(stage: Stage) -> None:
     hindered(stage, left=CauseCode.PLANNING_FAILED, right=CauseCode.PLANNING_FAILED)
     assert stage.run(stage.tree(REGRASP), 60.0) is Status.FAILURE

@@ -1,5 +1,7 @@
 """Where the cable is taken hold of, and how far it is lifted then."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from fake_devices import Rig
@@ -55,6 +57,34 @@ def test_the_arm_that_lets_go_of_the_cable_goes_to_sleep(rig: Rig) -> None:
     rig.run(rig.motion.let_go_of_cable(arm))
     assert rig.grippers[arm].told[-1][1] == "open"
     assert rig.motion.joints(arm) == pytest.approx(rig.known.arm(arm).sleep, abs=1e-3)
+
+
+def test_a_lifted_cable_is_brought_to_another_place_with_room_below(rig: Rig) -> None:
+    rig.run(request := rig.motion.pull_cable(CONNECTOR))
+    arm, been = request.answer, [rig.motion.tool(request.answer).translation]
+    turned = rig.motion.tool(arm).rotation
+    y, z = np.mgrid[-0.3:0.0:0.02, 0.05:0.2:0.02]
+    wall = np.column_stack([np.full(y.size, 0.3), y.ravel(), z.ravel()])
+    rig.motion.set_obstacles(wall, 0.02)
+    for _ in range(2):
+        rig.run(rig.motion.bring_cable(arm))
+        tool = rig.motion.tool(arm)
+        assert min(np.linalg.norm(tool.translation - place) for place in been) > 0.08
+        below = tool.translation - np.linspace(0.0, 0.15, 4)[:, None] * [0.0, 0.0, 1.0]
+        assert np.linalg.norm(below[:, None] - wall, axis=2).min() > 0.05
+        assert (tool.rotation * turned.inv()).magnitude() < 0.1
+        been.append(tool.translation)
+    assert rig.grippers[arm].told[-1][1] == "close"
+
+
+def test_a_cable_that_can_be_brought_nowhere_is_a_named_cause(rig: Rig) -> None:
+    rig.run(request := rig.motion.pull_cable(CONNECTOR))
+    rig.motion.parameters = replace(
+        rig.motion.parameters, pulling=replace(rig.motion.parameters.pulling, places_x=(2.0,))
+    )
+    with pytest.raises(PlanningError, match="no way leads") as failure:
+        rig.run(rig.motion.bring_cable(request.answer))
+    assert failure.value.code is CauseCode.NO_COLLISION_FREE_GOAL
 
 
 def test_a_jaw_that_closes_beside_the_cable_opens_and_the_arm_sleeps(rig: Rig) -> None:
