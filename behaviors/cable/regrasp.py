@@ -1,13 +1,15 @@
 """Grasp the connector again where it was found."""
 
+from collections.abc import Generator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from regrasp.behaviors.cable.hand import HandLeaf
 from regrasp.behaviors.cable.keys import FOUND, HELD, VAIN_CARRIES
 from regrasp.behaviors.keys import Keys
 from regrasp.behaviors.leaf import LeafSteps
 from regrasp.interfaces.cause import CauseCode
+from regrasp.interfaces.request import Request
 from regrasp.motion.failure import NO_WAY, PlanningError
 
 if TYPE_CHECKING:
@@ -86,23 +88,23 @@ class Regrasp(HandLeaf):
         At last it stays elsewhere: what falls from there may lie where it can be taken.
         """
         for left in reversed(range(self.parameters.places)):
+            hanging = yield from self._look_at_hanging()
             try:
-                yield from self._take_hanging(arm, no_grasp)
+                if hanging is None:
+                    raise no_grasp
+                yield from self._take(hanging, arm)
                 return
             except PlanningError as error:
                 if error.code not in (*NO_WAY, *NO_GRASP, CauseCode.GRASP_EMPTY):
                     raise
                 self.say("brought elsewhere by its cable", arm=arm, why=str(error))
-                yield from self.ask(self.services.motion.bring_cable(arm))
+                yield from self.ask(self.services.motion.bring_cable(arm, hanging))
                 if not left:
                     raise
 
-    def _take_hanging(self, arm: str, no_grasp: PlanningError) -> LeafSteps:
-        """Look for the connector whose cable an arm holds, and grip it. Raises `no_grasp` where it is not seen."""
+    def _look_at_hanging(self) -> Generator[Request[Any] | None, None, "RigidTransform | None"]:
+        """Where a connector hangs whose cable an arm holds (world_from_connector); None where it is not seen."""
+        perception = self.services.perception
         yield from self.wait(self.parameters.hang_time)
-        looked = yield from self.ask(
-            self.services.perception.watch(self.overview, self.parameters.look_time, later=True)
-        )
-        if not looked.estimates:
-            raise no_grasp
-        yield from self._take(self.services.perception.fuse(looked.estimates).world_from_connector, arm)
+        looked = yield from self.ask(perception.watch(self.overview, self.parameters.look_time, later=True))
+        return perception.fuse(looked.estimates).world_from_connector if looked.estimates else None

@@ -72,8 +72,8 @@ class CableMotionService(MotionService, Protocol):
         """Let an arm take hold of the cable near the loose connector, lift it, and keep hold; the answer is the arm."""
         ...
 
-    def bring_cable(self, arm: str) -> Request[None]:
-        """Bring what an arm holds of the cable to another place, where its end has room."""
+    def bring_cable(self, arm: str, world_from_connector: "RigidTransform | None") -> Request[None]:
+        """Bring what an arm holds of the cable to another place, where its end, which hangs there now, has room."""
         ...
 
     def let_go_of_cable(self, arm: str) -> Request[None]:

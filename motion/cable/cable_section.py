@@ -33,6 +33,7 @@ class PullingParameters:
     speed: float = 0.15  # share of the joints' speed: the cable's pull grows slowly then, and what touches is felt
     room: float = 0.12  # m round and below such a place beyond which more does not count
     apart: float = 0.10  # m from where it was before
+    asked: int = 24  # places of which it is asked whether another arm can take the end there
     at_once: int = 8  # places of which one plan chooses, those with the most room first
     turn: float = 1.5  # rad, the most that a joint may turn for that: the jaw does not turn over
 

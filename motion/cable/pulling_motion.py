@@ -53,19 +53,24 @@ class PullingMotion(TakingMotion):
 
         return Request(steps(), stop)
 
-    def bring_cable(self, arm: str) -> Request[None]:
+    def bring_cable(self, arm: str, world_from_connector: RigidTransform | None) -> Request[None]:
         """Bring what an arm holds of the cable to another place, where its end has room and may be taken.
 
-        It fails with NO_COLLISION_FREE_GOAL where no way leads to any. A touch ends it.
+        `world_from_connector` is where the connector hangs now, None where that is not known. The arm takes it along as
+        it hangs. The request fails with NO_COLLISION_FREE_GOAL where no way leads to any place. A touch ends it.
         """
+        if world_from_connector is not None:
+            finite_pose("the connector's pose", world_from_connector)
 
         def steps() -> Iterator[None]:
-            values, q = self.parameters.pulling, self.joints(arm)
-            model, places = self.start_model(arm, optimistic=True), self._roomy_places(arm)
-            for first in range(0, len(places), values.at_once):
+            q = self.joints(arm)
+            model, places = self.start_model(arm, optimistic=True), self._roomy_places(arm, world_from_connector)
+            for some in self._takeable_first(arm, places, world_from_connector):
                 yield
+                if not len(some):
+                    continue
                 try:
-                    path = self._plan(model, q, self._holding_at(arm, places[first : first + values.at_once]))
+                    path = self._plan(model, q, self._holding_at(arm, some))
                 except PlanningError:
                     continue
                 with suppress(TouchError):
@@ -77,12 +82,30 @@ class PullingMotion(TakingMotion):
 
         return self._together(arm, steps())
 
-    def _roomy_places(self, arm: str) -> FloatArray:
-        """Places (n, 3) m for the tool of an arm that holds the cable, those with the most room below first.
+    def _takeable_first(self, arm: str, places: FloatArray, connector: RigidTransform | None) -> Iterator[FloatArray]:
+        """The places (n, 3) m in groups: one by one those where another arm can take the connector, then all.
 
-        Not where it was before, and no further from the cable's anchor than the cable reaches.
+        A group is empty where none is found in a tick.
         """
-        values, known = self.parameters.pulling, self.known.cable
+        values, now = self.parameters.pulling, self.tool(arm)
+        if connector is not None:
+            for place in places[: values.asked]:
+                there = RigidTransform.from_components(place, now.rotation) * now.inv() * connector
+                others = (other for other in self.arms if other != arm)
+                found = any(
+                    self._has_grasp(one, there, self._candidates(one, there), optimistic=True) for one in others
+                )
+                yield place[None] if found else places[:0]
+        for first in range(0, len(places), values.at_once):
+            yield places[first : first + values.at_once]
+
+    def _roomy_places(self, arm: str, connector: RigidTransform | None) -> FloatArray:
+        """Places (n, 3) m for the tool of an arm that holds the cable, those with the most room for its end first.
+
+        Not where it was before, and no further from the cable's anchor than the cable reaches. An end of which nobody
+        knows where it hangs is taken to hang down.
+        """
+        values, known, now = self.parameters.pulling, self.known.cable, self.tool(arm).translation
         grid = np.array([*product(values.places_x, values.places_y, values.places_z)])
         near = np.linalg.norm(grid - known.anchor[0], axis=1) < known.length - (self._below - known.connector.length)
         fresh = np.linalg.norm(grid[:, None] - np.array(self._been)[None], axis=2).min(axis=1) > values.apart
@@ -90,12 +113,12 @@ class PullingMotion(TakingMotion):
         seen = np.vstack([self._points, self._unseen])
         if not len(places) or not len(seen):
             return places
-        below = np.linspace(0.0, self._below, 5)
-        ends = places[:, None] - below[None, :, None] * [0.0, 0.0, 1.0]
-        to_seen = np.asarray(cKDTree(seen).query(ends, distance_upper_bound=values.room)[0])
+        shares, end = np.linspace(0.0, 1.0, 5)[:, None], np.array([0.0, 0.0, -self._below])
+        if connector is not None:
+            end = connector.apply([0.5 * known.connector.length, 0.0, 0.0]) - now
+        to_seen = np.asarray(cKDTree(seen).query(places[:, None] + shares * end, distance_upper_bound=values.room)[0])
         room = np.minimum(to_seen, values.room).min(axis=1)
-        way = np.linalg.norm(places - self.tool(arm).translation, axis=1)
-        return np.asarray(places[np.lexsort([way, -room.round(2)])])
+        return np.asarray(places[np.lexsort([np.linalg.norm(places - now, axis=1), -room.round(2)])])
 
     def let_go_of_cable(self, arm: str) -> Request[None]:
         """Open the jaw of an arm that holds the cable, and bring the arm to its sleep pose."""

@@ -206,7 +206,7 @@ class FakeMotion:
 
         return Request(steps())
 
-    def bring_cable(self, arm: str) -> Request[None]:
+    def bring_cable(self, arm: str, world_from_connector: RigidTransform | None) -> Request[None]:
         self.brought += 1
         return Request(self._steps())
 

@@ -67,7 +67,7 @@ def test_a_lifted_cable_is_brought_to_another_place_with_room_below(rig: Rig) ->
     wall = np.column_stack([np.full(y.size, 0.3), y.ravel(), z.ravel()])
     rig.motion.set_obstacles(wall, 0.02)
     for _ in range(2):
-        rig.run(rig.motion.bring_cable(arm))
+        rig.run(rig.motion.bring_cable(arm, None))
         tool = rig.motion.tool(arm)
         assert min(np.linalg.norm(tool.translation - place) for place in been) > 0.08
         below = tool.translation - np.linspace(0.0, 0.15, 4)[:, None] * [0.0, 0.0, 1.0]
@@ -83,7 +83,7 @@ def test_a_cable_that_can_be_brought_nowhere_is_a_named_cause(rig: Rig) -> None:
         rig.motion.parameters, pulling=replace(rig.motion.parameters.pulling, places_x=(2.0,))
     )
     with pytest.raises(PlanningError, match="no way leads") as failure:
-        rig.run(rig.motion.bring_cable(request.answer))
+        rig.run(rig.motion.bring_cable(request.answer, None))
     assert failure.value.code is CauseCode.NO_COLLISION_FREE_GOAL
 
 
