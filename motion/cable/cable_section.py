@@ -30,7 +30,7 @@ class PullingParameters:
     places_x: tuple[float, ...] = (0.22, 0.27, 0.32, 0.37)
     places_y: tuple[float, ...] = (-0.24, -0.18, -0.12, -0.06, 0.0, 0.06, 0.12, 0.18, 0.24)
     places_z: tuple[float, ...] = (0.22, 0.30, 0.38)
-    speed: float = 0.15  # share of the joints' speed: the cable's pull grows slowly then, and what touches is felt
+    speed: float = 0.15  # share of the joints' speed: the cable's pull grows slowly then
     room: float = 0.12  # m round and below such a place beyond which more does not count
     apart: float = 0.10  # m from where it was before
     asked: int = 24  # places of which it is asked whether another arm can take the end there

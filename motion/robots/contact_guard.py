@@ -51,9 +51,9 @@ class ContactGuardParameters:
     # touched, it is pressed with 12 and 36 N in the median. An adaptation of 1 s feels slow pressing (scene 7436: 17 N
     # in place of 36), but keeps the arm from ways that the scenes 7457 and 7467 need.
     pulling: ContactLimits = ContactLimits(0.18, elastic=True, far=0.9)
-    # One that is lifted by a jaw between its ends pulls at that with 20 N (scene 9013 on Earth);
-    # what is gained is kept; choice
-    lifting: ContactLimits = ContactLimits(0.6, elastic=True, back_off=False, far=1.2)
+    # One that is lifted by a jaw between its ends pulls with 20 N and more (scene 9013 on Earth). The arm is slow then,
+    # so that the pull grows slowly. Foam, which presses with 1 N a mm more, is felt at 12 N. What is gained is kept.
+    lifting: ContactLimits = ContactLimits(0.4, adaptation=1.0, elastic=True, far=0.9, back_off=False)
     # A plug that is gripped askew jams in its socket up to what the drives can do: this stops at a blow only; choice
     pressing: ContactLimits = ContactLimits(2.5)
 
