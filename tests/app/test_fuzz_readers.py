@@ -3,8 +3,8 @@
 from fuzz_readers import fuzz
 
 
-def test_forty_hostile_files_end_in_success_or_findings() -> None:
-    tally, failures = fuzz(40, seed=0)
+def test_twenty_hostile_files_end_in_success_or_findings() -> None:
+    tally, failures = fuzz(20, seed=0)
     assert not failures, "\n".join(failures)
-    assert sum(tally.values()) == 40
-    assert tally["findings"] > 20
+    assert sum(tally.values()) == 20
+    assert tally["findings"] > 10

@@ -94,14 +94,14 @@ def test_an_arm_that_touches_something_says_what_and_how_deep(rig: Rig) -> None:
 def test_an_encoder_without_a_number_is_the_arms_failure(rig: Rig) -> None:
     rig.arms["right"].at = changed(2, np.nan)
     error = refused(rig, lambda m: m.move("right", READY[None]))
-    assert (error.code, str(error)) == (CauseCode.ARM_FAILED, "the right arm's encoders give no number for elbow")
+    assert (error.code, str(error)) == (CauseCode.ARM_FAILED, "the encoders of the right arm give no number for elbow")
 
 
 def test_a_tool_out_of_reach_says_how_far(rig: Rig) -> None:
     far = RigidTransform.from_translation([3.0, -0.1778, 0.0])
     error = refused(rig, lambda m: m.move_tool("right", far))
     assert error.code is CauseCode.OUT_OF_REACH
-    assert "the right arm's tool there: 3.00 m from its base, and its links measure 0.93 m" in str(error)
+    assert "the tool of the right arm there: 3.00 m from its base, and its links measure 0.93 m" in str(error)
     error = refused(rig, lambda m: m.pick_loose(far))
     assert error.code is CauseCode.OUT_OF_REACH
     assert "1152 out of reach of the right arm: 3.00 m from its base" in str(error)
@@ -112,7 +112,7 @@ def test_a_tool_that_cannot_go_on_says_so(rig: Rig) -> None:
     onward = [RigidTransform.from_translation([2.0, 0.0, 0.0])]
     error = refused(rig, lambda m: m.move_tool("right", tool, onward=onward))
     assert error.code is CauseCode.OUT_OF_REACH
-    assert "joint angles bring the right arm's tool there, but from none it can go straight on" in str(error)
+    assert "joint angles bring the tool of the right arm there, but from none it can go straight on" in str(error)
 
 
 def test_an_endless_line_is_out_of_reach(rig: Rig) -> None:

@@ -59,7 +59,14 @@ SLOW = {
         "planning_finds_nothing",
         "printer_dark",
     ),
-    *("connector_knocked", "desk_occupied", "obstacle_moves_in", "rail_stalls_for_good", "service_raises"),
+    *(
+        "connector_knocked",
+        "desk_occupied",
+        "handle_moves",
+        "obstacle_moves_in",
+        "rail_stalls_for_good",
+        "service_raises",
+    ),
 }
 
 

@@ -185,7 +185,7 @@ def test_a_target_that_the_network_does_not_see_is_found_by_its_colour(
 @pytest.mark.parametrize(
     ("goal", "code", "why"),
     [
-        (PoseGoal(pose(1.9, 2.2, 1.0)), CauseCode.OUT_OF_REACH, "no joint angles bring the arm arm's tool there"),
+        (PoseGoal(pose(1.9, 2.2, 1.0)), CauseCode.OUT_OF_REACH, "no joint angles bring the tool of the arm there"),
         (PoseGoal(pose(-0.6, 2.25, 1.6)), CauseCode.NO_COLLISION_FREE_GOAL, "printer_left"),
         (PoseRelGoal((-0.6, 0.0, 0.0)), CauseCode.MOTION_BLOCKED, "straight on"),
         (JointGoal((9.0, 0.0, 0.0, 0.0, 0.0, 0.0)), CauseCode.OUT_OF_REACH, "limits"),

@@ -170,7 +170,7 @@ def test_many_frames_of_a_worse_camera_do_not_outweigh_a_better_one() -> None:
 
 
 @pytest.mark.parametrize("cameras", [("rear",), ("rear", "wrist")])
-@pytest.mark.parametrize("frames", [1, 2, 12])
+@pytest.mark.parametrize("frames", [1, 2, pytest.param(12, marks=pytest.mark.slow)])
 def test_the_truth_lies_in_the_stated_regions_as_often_as_they_say(cameras: tuple[str, ...], frames: int) -> None:
     rng = np.random.default_rng(frames)
     axis = np.array([0.6, 0.0, 0.8])
