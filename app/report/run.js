@@ -231,6 +231,9 @@ find("filter").addEventListener("input", (event) => {
 });
 
 if (film) film.addEventListener("loadedmetadata", () => { film.currentTime = Math.min(now, film.duration); }, { once: true });
-window.addEventListener("beforeprint", () => all(".frame").forEach((frame) => { frame.hidden = false; }));
+window.addEventListener("beforeprint", () => {
+  all(".frame").forEach((frame) => { frame.hidden = false; });
+  all("details").forEach((part) => { part.open = true; });
+});
 window.addEventListener("afterprint", () => showPictures(now));
 show(data.begin);
