@@ -36,7 +36,8 @@ const nodes = all(".tree g[data-node]").map((group) => {
 function stateOf(number, t) {
   const own = data.changes[number] || [];
   const at = last(own.length / 2, (i) => own[2 * i], t);
-  return at < 0 ? "i" : own[2 * at + 1];
+  const state = at < 0 ? "i" : own[2 * at + 1];
+  return state === "i" && at > 0 ? "i ran" : state; // idle, but it was at work before
 }
 
 // Whether a node changed its state at this very moment.
@@ -56,13 +57,13 @@ function showTree(t) {
     if (state === node.state) continue;
     node.state = state;
     node.group.setAttribute("class", state);
-    node.sign.textContent = SIGNS[state];
+    node.sign.textContent = SIGNS[state[0]];
   }
   const leaves = running.filter((path) => !running.some((other) => other.startsWith(path + "/")));
   const failed = nodes.filter((node) => node.state === "f").map((node) => data.paths[node.number]).sort(byDepth);
   const told = find("states");
   const failing = nodes.filter((node) => node.state === "f" && changedAt(node.number, t)).map((node) => data.paths[node.number]);
-  const deepest = failing.sort(byDepth);
+  const deepest = failed.filter((path) => failing.some((other) => `${path}/`.startsWith(`${other}/`)));
   if (!playing) reveal([deepest, leaves, failed, data.paths.slice(0, 1)].find((some) => some.length) || []);
   if (told) told.textContent = `Running: ${leaves.join(", ") || "nothing"}. Failed: ${failed.join(", ") || "nothing"}.`;
 }
