@@ -5,12 +5,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from regrasp.behaviors.cable.hand import HandLeaf
-from regrasp.behaviors.cable.keys import FOUND, HELD, VAIN_CARRIES
+from regrasp.behaviors.cable.keys import FOUND, HELD, NOTICES, VAIN_CARRIES
 from regrasp.behaviors.keys import Keys
 from regrasp.behaviors.leaf import LeafSteps
 from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.request import Request
-from regrasp.motion.failure import NO_WAY, PlanningError
+from regrasp.motion.failure import NO_WAY, GraspEmptyError, PlanningError
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import RigidTransform
@@ -37,7 +37,8 @@ class Regrasp(HandLeaf):
     """
 
     NEEDS: ClassVar[Keys] = (FOUND,)
-    WRITES: ClassVar[Keys] = (HELD, VAIN_CARRIES)
+    READS: ClassVar[Keys] = (NOTICES,)
+    WRITES: ClassVar[Keys] = (HELD, NOTICES, VAIN_CARRIES)
     parameters: ClassVar[RegraspParameters] = RegraspParameters()
     _blocked = 0  # times in a row that no arm found a way
 
@@ -52,6 +53,14 @@ class Regrasp(HandLeaf):
             if not (again or error.code in NO_GRASP) or len(self.services.known.arms) == 1:
                 raise
             yield from self._take_by_cable(connector, error)
+
+    def grip(self, world_from_connector: "RigidTransform") -> LeafSteps:
+        """As every hand does; a jaw that closes on nothing may have held the connector for a moment, and lost it."""
+        try:
+            yield from super().grip(world_from_connector)
+        except GraspEmptyError:
+            self.note_loss("grasp")
+            raise
 
     def _take(self, connector: "RigidTransform", holds_cable: str | None = None) -> LeafSteps:
         """Grip the connector (world_from_connector) with the best arm, but for one that `holds_cable`."""

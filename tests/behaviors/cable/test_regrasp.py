@@ -9,7 +9,7 @@ from fake_services import FakeMotion, PointCloud, Stage, seen
 from py_trees.common import Status
 from scipy.spatial.transform import RigidTransform
 
-from regrasp.behaviors.cable.keys import HELD, Found
+from regrasp.behaviors.cable.keys import HELD, NOTICES, Found
 from regrasp.behaviors.keys import value_of
 from regrasp.interfaces.cable.cell import CableKnown
 from regrasp.interfaces.cause import CauseCode
@@ -62,6 +62,15 @@ def test_the_best_arm_is_the_hand_from_then_on(stage: Stage) -> None:
     assert "close" in [word for word, _ in motion.grippers["left"].told]
     assert "close" not in [word for word, _ in motion.grippers["right"].told]
     assert value_of(HELD, None) is not None
+
+
+def test_a_jaw_that_closes_on_nothing_may_have_lost_the_connector(stage: Stage) -> None:
+    for gripper in stage.motion.grippers.values():
+        gripper.gap = 0.0
+    assert stage.run(stage.tree(REGRASP), 60.0) is Status.FAILURE
+    assert stage.causes[-1].code is CauseCode.GRASP_EMPTY
+    assert [notice.by for notice in value_of(NOTICES)] == ["grasp"]
+    assert value_of(HELD, None) is None
 
 
 def test_an_arm_without_a_way_goes_to_sleep_before_the_other_one_tries(stage: Stage) -> None:
