@@ -73,7 +73,8 @@ def run_campaign(
     ] = None,
     keep: Annotated[Literal["all", "failed", "none"], typer.Option(help="Which runs' records are kept.")] = "failed",
     pictures: Annotated[
-        bool, typer.Option("--pictures", help="Keep the cameras' frames at events in the records, as JPEG.")
+        bool,
+        typer.Option("--pictures", help="Keep the cameras' frames at events and every 2 s in the records, as JPEG."),
     ] = False,
     report: Annotated[
         bool, typer.Option("--report", help="Write a page that shows the campaign into its folder: report.html.")
@@ -307,7 +308,8 @@ def rerun(
     out: Annotated[Path | None, typer.Option(help="The record's folder; default in runs/.")] = None,
     video: Annotated[bool, typer.Option("--video", help="Film the run into the record.")] = False,
     pictures: Annotated[
-        bool, typer.Option("--pictures", help="Keep the cameras' frames at events in the record, as JPEG.")
+        bool,
+        typer.Option("--pictures", help="Keep the cameras' frames at events and every 2 s in the record, as JPEG."),
     ] = False,
     quiet: Annotated[bool, typer.Option("--quiet", help="No progress; only the summary.")] = False,
 ) -> None:

@@ -44,7 +44,8 @@ def run_scenario(
     junit: Annotated[Path | None, typer.Option(metavar="FILE", help="With --all: write JUnit XML, too.")] = None,
     video: Annotated[bool, typer.Option("--video", help="Film the run into the record.")] = False,
     pictures: Annotated[
-        bool, typer.Option("--pictures", help="Keep the cameras' frames at events in the record, as JPEG.")
+        bool,
+        typer.Option("--pictures", help="Keep the cameras' frames at events and every 2 s in the record, as JPEG."),
     ] = False,
     report: Annotated[
         bool, typer.Option("--report", help="Write a page that shows the run into its record: report.html.")

@@ -13,6 +13,7 @@ from regrasp.interfaces.quote import quoted
 
 RUNS = Path("runs")  # where records go by default
 RUN_FILES = ("result.json", "events.jsonl", "ticks.jsonl")  # by which a run's folder is known
+PICTURES, OUTLINES = "pictures", "outlines.jsonl"  # the folder of a run's pictures; in it, what was found in them
 FILES = (*RUN_FILES, "signals.f32", "scenario.yaml", "cell.yaml", "tree.xml")  # of a run's folder
 
 

@@ -9,10 +9,11 @@ from pathlib import Path
 
 from markupsafe import Markup
 
+from regrasp.app.records.folders import OUTLINES, PICTURES
 from regrasp.app.records.reader import RunRecord
 from regrasp.app.report.sightings import Sighting, Sightings
 
-FOLDER, FILM, OUTLINES = "pictures", "video.mp4", "outlines.jsonl"
+FILM = "video.mp4"
 MOST_CORNERS = 100  # of an outline that is drawn; choice
 _NAME = re.compile(r"(\d+\.\d+)-(.+)-([^-]*)\.jpg")
 
@@ -66,19 +67,19 @@ class Pictures:
 def pictures(record: RunRecord, sightings: Sightings, limits: PictureLimits = PictureLimits()) -> Pictures:
     """The pictures of a record."""
     remarks: list[str] = []
-    files = [*_files(record.folder / FOLDER)]
+    files = [*_files(record.folder / PICTURES)]
     if not files:
         remarks.append("the run kept no pictures; regrasp run --pictures keeps some")
     elif len(files) > limits.count:
         remarks.append(f"of {len(files)} pictures {limits.count}, evenly chosen, are shown")
         files = [files[number * len(files) // limits.count] for number in range(limits.count)]
     small = sum(path.stat().st_size for _, _, _, path in files) > limits.pictures
-    outlines = _outlines(record.folder / FOLDER / OUTLINES, remarks) if files else {}
+    outlines = _outlines(record.folder / PICTURES / OUTLINES, remarks) if files else {}
     frames, left = [], limits.pictures
     for t, camera, event, path in files:
         frame = _key_frame(t, camera, event, path, limits if small else None, outlines.get(path.name, ()))
         if frame is None:
-            remarks.append(f"{FOLDER}/{path.name} is no picture that can be read")
+            remarks.append(f"{PICTURES}/{path.name} is no picture that can be read")
             continue
         left -= len(frame.data) * 3 // 4
         if left < 0:
@@ -113,7 +114,7 @@ def _outlines(file: Path, remarks: list[str]) -> dict[str, list[tuple[str, list[
         except (ValueError, TypeError, KeyError, RecursionError):
             unread += 1
     if unread:
-        remarks.append(f"{FOLDER}/{OUTLINES}: {unread} lines cannot be read, so some outlines are not drawn")
+        remarks.append(f"{PICTURES}/{OUTLINES}: {unread} lines cannot be read, so some outlines are not drawn")
     return found
 
 

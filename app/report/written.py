@@ -67,7 +67,9 @@ def ended(folder: Path) -> bool:
 
 
 def _silence(folder: Path) -> float:
-    """How long (s) nothing has been written into a run's folder."""
+    """How long (s) nothing has been written into a run's folder; endless where there is none."""
+    if not folder.is_dir():
+        return float("inf")
     return time.time() - max((file.stat().st_mtime for file in folder.iterdir() if file.suffix != ".html"), default=0.0)
 
 

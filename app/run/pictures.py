@@ -8,12 +8,10 @@ from typing import Any
 
 import cv2
 
+from regrasp.app.records.folders import OUTLINES, PICTURES
 from regrasp.interfaces.outline import Outline
 from regrasp.interfaces.wall_time import counts_as
 from regrasp.sim.world import World
-
-FOLDER = "pictures"
-OUTLINES = "outlines.jsonl"  # in that folder: a line for each thing found in a picture
 
 
 @dataclass(frozen=True)
@@ -36,7 +34,7 @@ class Pictures:
     def __init__(
         self, folder: Path | None, world: World[Any], parameters: PictureParameters = PictureParameters()
     ) -> None:
-        self._folder, self._world, self._parameters = folder and folder / FOLDER, world, parameters
+        self._folder, self._world, self._parameters = folder and folder / PICTURES, world, parameters
         self._event, self._urgent = "", False  # urgent: a failure or a warning, of which a picture is always kept
         self._taken: dict[str, tuple[int, float]] = {}  # of a camera: frame number, second
         self._bytes = 0

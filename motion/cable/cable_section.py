@@ -26,10 +26,8 @@ class PullingParameters:
     lifts: tuple[float, ...] = (0.25, 0.20, 0.15, 0.10, 0.05)  # m up; the first to which a way is free
     loose: float = 0.03  # m straight up first, with all the force that the drives have
     aside: tuple[float, ...] = (0.0, -0.08, 0.08)  # m in x and in y that it may be moved besides
-    # m, world: where a lifted end is brought that cannot be taken: x, y, and z of the tool
-    places_x: tuple[float, ...] = (0.22, 0.27, 0.32, 0.37)
-    places_y: tuple[float, ...] = (-0.24, -0.18, -0.12, -0.06, 0.0, 0.06, 0.12, 0.18, 0.24)
-    places_z: tuple[float, ...] = (0.22, 0.30, 0.38)
+    # m in x, y and z to which a lifted end may be brought on that cannot be taken
+    onward: tuple[float, ...] = (-0.24, -0.16, -0.08, 0.0, 0.08, 0.16, 0.24)
     speed: float = 0.15  # share of the joints' speed: the cable's pull grows slowly then
     room: float = 0.12  # m round and below such a place beyond which more does not count
     apart: float = 0.10  # m from where it was before

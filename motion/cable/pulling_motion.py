@@ -106,7 +106,7 @@ class PullingMotion(TakingMotion):
         knows where it hangs is taken to hang down.
         """
         values, known, now = self.parameters.pulling, self.known.cable, self.tool(arm).translation
-        grid = np.array([*product(values.places_x, values.places_y, values.places_z)])
+        grid = now + np.array([*product(values.onward, repeat=3)])
         near = np.linalg.norm(grid - known.anchor[0], axis=1) < known.length - (self._below - known.connector.length)
         fresh = np.linalg.norm(grid[:, None] - np.array(self._been)[None], axis=2).min(axis=1) > values.apart
         places = grid[near & fresh]

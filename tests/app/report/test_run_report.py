@@ -187,6 +187,7 @@ def test_bad_input_is_a_line_and_writes_nothing(copy: Path) -> None:
         ((copy, "-o", "empty"), "empty: is a folder; name a file"),
         (("empty",), "empty: holds no run"),
         (("nowhere",), "nowhere: does not exist"),
+        (("nowhere", "--follow"), "nowhere: does not exist"),
         ((copy, "--against", "empty"), "--against: is for campaigns"),
         ((copy, "--runs"), "--runs: is for campaigns"),
     ):

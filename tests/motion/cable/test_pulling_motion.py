@@ -80,7 +80,7 @@ def test_a_lifted_cable_is_brought_to_another_place_with_room_below(rig: Rig) ->
 def test_a_cable_that_can_be_brought_nowhere_is_a_named_cause(rig: Rig) -> None:
     rig.run(request := rig.motion.pull_cable(CONNECTOR))
     rig.motion.parameters = replace(
-        rig.motion.parameters, pulling=replace(rig.motion.parameters.pulling, places_x=(2.0,))
+        rig.motion.parameters, pulling=replace(rig.motion.parameters.pulling, onward=(2.0,))
     )
     with pytest.raises(PlanningError, match="no way leads") as failure:
         rig.run(rig.motion.bring_cable(request.answer, None))
