@@ -72,6 +72,8 @@ class CableMotionParameters(CarryMotionParameters):
     shallow: float = 0.008
     per_step: int = 12  # kinds of grasps of which it is asked in a tick whether they can stow it; choice: 50 ms
     stow_rolls: int = 12  # angles about the connector that are tried for that: every 30 degrees
+    # m from the end of the way on which a hand came in, within which it may go back on it; it draws a plug out by less
+    beside_way_in: float = 0.06
     # m straight back from where something was held; the first that is free; choice
     retreats: tuple[float, ...] = (0.10, 0.08, 0.06, 0.05, 0.04, 0.03)
     unplug: UnplugParameters = field(default_factory=UnplugParameters)
@@ -141,13 +143,15 @@ class TakingMotion(CarryMotion):
     def pick_plug(self, plug: RigidTransform, *, point_cloud: PointCloudSource | None = None) -> MotionRequest:
         """`pick` the connector where it is plugged in, world_from_connector: a panel is near.
 
-        Preferably so that the hand is free where it has drawn the plug out.
+        With a grasp with which the hand is free where it has drawn the plug out, if there is one.
         """
         finite_pose("the plug's pose", plug)
         room = self._room_to_draw_out(plug)
 
         def grasps() -> list[list[Grasp]]:
-            return [sorted(self._candidates(self.hand, plug, self.parameters.unplug.shallow), key=room)]
+            candidates = self._candidates(self.hand, plug, self.parameters.unplug.shallow)
+            rooms = [room(grasp) for grasp in candidates]
+            return [[grasp for grasp, n in zip(candidates, rooms, strict=True) if n == rank] for rank in range(3)]
 
         kin, axis = self.kinematics[self.hand], plug.rotation.apply([1.0, 0.0, 0.0])
 
@@ -243,8 +247,8 @@ class TakingMotion(CarryMotion):
     def _draw_back(self, arm: str) -> Generator[None, None, str]:
         """Steps that draw a hand straight back as far as is free. They return '', or why no distance was.
 
-        Where none is free, a hand that has just come in for a grasp goes back the way that it came. One that touches
-        something goes no further; what it felt is on the map then.
+        Where none is free, a hand that is still beside where it came in for a grasp goes back the way that it came. One
+        that touches something goes no further; what it felt is on the map then.
         """
         why = ""
         for way in self._ways_back(arm):
@@ -260,15 +264,22 @@ class TakingMotion(CarryMotion):
         return why
 
     def _ways_back(self, arm: str) -> Iterator[MotionRequest]:
-        """The motions straight back, the longest first, and the way on which the arm came in where it has just done."""
+        """The motions straight back, the longest first, and the way on which the arm came in where that is near."""
         for distance in self.parameters.retreats:
             back = self.tool(arm).rotation.apply([-distance, 0.0, 0.0])
             yield self._shift(arm, back, contact=self._guard.leaving)
-        way_in = self._ways_in.get(arm)
-        tolerance = self.parameters.execution.goal_tolerance
-        if way_in is not None and np.abs(way_in[-1] - self.joints(arm)).max() < tolerance:
+        way_in, kin, q = self._ways_in.get(arm), self.kinematics[arm], self.joints(arm)
+        if way_in is None:
+            return
+        end = kin.tool_matrix(way_in[-1])
+        to_it = straight_lines(kin, q, [end])
+        off = float(np.linalg.norm(end[:3, 3] - kin.tool_matrix(q)[:3, 3]))
+        if to_it is None or off > self.parameters.beside_way_in:
+            return
+        if np.abs(to_it[-1] - way_in[-1]).max() < self.parameters.execution.goal_tolerance:
             model, speed = self.start_model(arm, optimistic=True), self.parameters.approach_speed
-            yield self.execution.request(arm, self._follow(arm, way_in[::-1], speed, model, self._guard.pulling))
+            back = np.vstack([to_it, way_in[::-1]])
+            yield self.execution.request(arm, self._follow(arm, back, speed, model, self._guard.pulling))
 
     def _ease(self, arm: str, connector: RigidTransform) -> Generator[None, None, int | None]:
         """How easily an arm takes the loose connector, from 0 for best; None: not at all. See `hands_for`."""

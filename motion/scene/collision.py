@@ -125,9 +125,9 @@ def _clearances(q, base, joints, links, local, boxes, distance, lower, h):  # ty
 
 
 @nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
-def _along(path, slopes, base, joints, links, local, boxes, distance, lower, h):  # type: ignore[no-untyped-def]
+def _along(path, slopes, base, joints, links, local, boxes, others, distance, lower, h):  # type: ignore[no-untyped-def]
     """See `CollisionModel.along`."""
-    to_grid, to_boxes, ways = np.empty((3, path.shape[0], local.shape[0]))
+    to_grid, to_rigid, ways = np.empty((3, path.shape[0], local.shape[0]))
     for k in range(path.shape[0]):
         step = 0.5 * _DIFFERENCE * slopes[k]
         before = world_spheres(base, joints, path[k] - step, links, local)
@@ -135,12 +135,14 @@ def _along(path, slopes, base, joints, links, local, boxes, distance, lower, h):
         for n in range(local.shape[0]):
             middle = 0.5 * (before[n, :3] + after[n, :3])
             to_grid[k, n] = grid_distance(middle, distance, lower, h) - local[n, 3]
-            to_box = np.inf
+            nearest = np.inf
             for b in range(boxes.shape[0]):
-                to_box = min(to_box, box_distance(middle, boxes[b]))
-            to_boxes[k, n] = to_box - local[n, 3]
+                nearest = min(nearest, box_distance(middle, boxes[b]))
+            for m in range(others.shape[0]):
+                nearest = min(nearest, np.sqrt(square_distance(middle, others[m])) - others[m, 3])
+            to_rigid[k, n] = nearest - local[n, 3]
             ways[k, n] = np.sqrt(square_distance(before[n, :3], after[n])) / _DIFFERENCE
-    return to_grid, to_boxes, ways
+    return to_grid, to_rigid, ways
 
 
 @nb.njit(cache=True)  # type: ignore[untyped-decorator,unused-ignore]
@@ -311,14 +313,14 @@ class CollisionModel:
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """The distances of the arm's m `spheres` along a path (k, n) of the joints, and how far each sphere moves.
 
-        Returns the distances to a grid's surfaces and to the boxes, (k, m) m each, and the ways (k, m) m for a unit of
-        the parameter by which the path's derivatives are `slopes` (k, n).
+        Returns the distances to a grid's surfaces and to what is rigid, the boxes and the other arms, (k, m) m each,
+        and the ways (k, m) m for a unit of the parameter by which the path's derivatives are `slopes` (k, n).
         """
-        base, joints, _, links, local, _, boxes = self._arguments[:7]
+        base, joints, _, links, local, _, boxes, others = self._arguments[:8]
         rows = np.ascontiguousarray(path, float), np.ascontiguousarray(slopes, float)
         surfaces = np.ascontiguousarray(grid.distance), grid.lower, float(grid.h)
-        to_grid, to_boxes, ways = _along(*rows, base, joints, links, local, boxes, *surfaces)
-        return np.asarray(to_grid), np.asarray(to_boxes), np.asarray(ways)
+        to_grid, to_rigid, ways = _along(*rows, base, joints, links, local, boxes, others, *surfaces)
+        return np.asarray(to_grid), np.asarray(to_rigid), np.asarray(ways)
 
     @property
     def links(self) -> NDArray[np.int64]:

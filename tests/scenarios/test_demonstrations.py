@@ -157,7 +157,10 @@ class WatchedWorld(World[Any]):
         super().close()
 
 
-@pytest.mark.parametrize("state", ["unplug", "carry", "make_room", "regrasp"])
+LATE = ("make_room", "regrasp")  # as the other two, and it takes longer until they come
+
+
+@pytest.mark.parametrize("state", ["unplug", "carry", *(pytest.param(s, marks=pytest.mark.slow) for s in LATE)])
 def test_an_interrupt_in_the_middle_of_a_motion_leaves_the_arms_at_rest_0_3_s_later(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, state: str
 ) -> None:

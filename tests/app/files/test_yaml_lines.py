@@ -1,4 +1,5 @@
 import math
+from typing import Any
 
 import pytest
 import yaml
@@ -15,6 +16,15 @@ def findings(text: str) -> str:
         return str(Findings(parse(text, "f.yaml").findings))
     except Findings as error:
         return str(error)
+
+
+def read(text: str) -> str | tuple[Any, Any, int]:
+    """What the document holds, and how many findings it has, or why it is refused."""
+    try:
+        document = parse(text, "f.yaml")
+    except Findings as error:
+        return str(error)
+    return document.value, document.places, len(document.findings)
 
 
 def test_every_value_knows_the_line_of_its_key() -> None:
@@ -117,3 +127,21 @@ def test_values_without_a_pitfall_read_as_yaml_reads_them(value: object) -> None
 def test_many_values_without_an_alias_are_not_blamed_on_one() -> None:
     told = findings("a:\n" + "".join("  - [1, 2, 3, 4, 5, 6, 7, 8, 9]\n" for _ in range(2500)))
     assert "more than 20000 values; shorten the file, or split it" in told
+
+
+@given(
+    st.lists(
+        st.tuples(st.floats(0, 1), st.integers(0, 3), st.sampled_from(list(":-[]{},'\"#|>&*!%? \n\t1e.~"))), max_size=3
+    )
+)
+def test_what_is_right_reads_the_same_with_and_without_libyaml(edits: list[tuple[float, int, str]]) -> None:
+    text = "a: 1\nb: [x, 2.5, '3']\nc:\n- {d: 1e3, e: ~}\n- |\n  text\n# end\n"
+    for share, cut, token in edits:
+        at = int(share * len(text))
+        text = text[:at] + token + text[at + cut :]
+    with pytest.MonkeyPatch.context() as patch:
+        with_it = read(text)
+        patch.setattr(yaml, "CSafeLoader", yaml.SafeLoader)
+        without = read(text)
+    if not isinstance(without, str) and without[2] == 0:
+        assert with_it == without

@@ -250,11 +250,18 @@ def drawn_out(rig: Rig, plug: RigidTransform) -> tuple[float, float, Points]:
     return float(out), float(retreat), np.asarray(way - back * retreat + axis * out)
 
 
-@pytest.mark.parametrize(("socket", "out"), [("back_1", 0.05), ("back_4", 0.02)])
+@pytest.mark.parametrize(
+    ("socket", "rolls", "out"), [("back_1", None, 0.05), ("back_4", None, 0.05), ("back_4", (0.0,), 0.02)]
+)
 def test_a_plug_is_drawn_out_as_far_as_is_free_and_the_hand_goes_back_as_it_came(
-    rig: Rig, socket: str, out: float
+    rig: Rig, socket: str, rolls: tuple[float, ...] | None, out: float
 ) -> None:
-    """Behind the hand at back_4 another socket's block stands."""
+    """Behind a hand that takes hold at back_4 with the roll 0 another socket's block stands; with others it is free."""
+    if rolls:
+        pick = rig.motion.parameters.pick
+        rig.motion.parameters = replace(
+            rig.motion.parameters, pick=replace(pick, grasp=replace(pick.grasp, rolls=rolls))
+        )
     plug = rig.known.cable.socket(socket).world_from_plug(rig.known.cable.connector.length)
     rig.run(rig.motion.pick_plug(plug))
     drawn, retreat, rest = drawn_out(rig, plug)

@@ -42,7 +42,7 @@ def test_the_speed_grows_with_the_clearance(clearance: float) -> None:
     clearances = np.array([clearance, clearance + 0.01])
     for speeds, slow, distance in (
         (VALUES.at_surfaces, VALUES.slow, VALUES.touching),
-        (VALUES.at_boxes, VALUES.slowest_at_boxes, VALUES.box_error),
+        (VALUES.at_rigid, VALUES.slowest_at_rigid, VALUES.rigid_error),
     ):
         speed, further = speeds(clearances)
         assert slow <= speed <= further
@@ -61,17 +61,16 @@ def test_the_part_that_is_near_moves_at_the_speed_of_its_clearance() -> None:
     assert rate(model, beside(model, 0.01), 0.5 * TURN) == pytest.approx(2 * near)
 
 
-def test_a_known_box_is_met_more_slowly_than_a_seen_surface() -> None:
+@pytest.mark.parametrize("what", ["box", "other arm"])
+def test_a_known_box_and_another_arm_are_met_more_slowly_than_a_seen_surface(what: str) -> None:
     spheres = moving(CollisionModel(KIN, []))
-    wall, tip = (
-        (spheres[:, 0] + spheres[:, 3]).max() + VALUES.touching,
-        spheres[spheres[:, [0, 3]].sum(axis=1).argmax(), :3],
-    )
+    wall = (spheres[:, 0] + spheres[:, 3]).max() + VALUES.touching
+    tip = spheres[spheres[:, [0, 3]].sum(axis=1).argmax(), :3]
     box = Box(name="wall", center=(wall + 0.05, 0.0, tip[2]), size=(0.1, 2.0, 0.5))
-    model = CollisionModel(KIN, [box])
-    assert rate(model, beside(model, 0.5), TURN) * np.linalg.norm(tip[:2]) == pytest.approx(
-        VALUES.slow_at_boxes, rel=0.1
-    )
+    other = np.array([[wall + 0.05, tip[1], tip[2], 0.05]])
+    model = CollisionModel(KIN, [box]) if what == "box" else CollisionModel(KIN, [], other_arm=other)
+    speed = rate(model, beside(model, 0.5), TURN) * np.linalg.norm(tip[:2])
+    assert speed == pytest.approx(VALUES.slow_at_rigid, rel=0.1)
 
 
 def test_what_does_not_move_may_be_near() -> None:

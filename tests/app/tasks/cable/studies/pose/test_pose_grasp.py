@@ -17,7 +17,7 @@ def believed(scene: StudyScene, off: float = 0.0) -> RigidTransform:
     return pose_along((x, y, z + off), (ax, ay, az))
 
 
-@pytest.mark.parametrize("name", ["2", "4", "9"])
+@pytest.mark.parametrize("name", ["2", pytest.param("4", marks=pytest.mark.slow), "9"])
 def test_the_right_pose_is_grasped(name: str) -> None:
     with StudyScene(study_cell(overrides=SMALL), name, 0) as scene:
         assert grasp(scene, services_of(scene), believed(scene)) == ""
