@@ -67,6 +67,9 @@ class CableMotionParameters(CarryMotionParameters):
     # m of clearance in the straight way in, from which on an arm has room: one that has less leaves it to another
     # that has; choice, of the near margins
     roomy: float = 0.014
+    # m from where a socket or the clip holds a connector, within which one is taken for held; beside it, it is loose.
+    # Choice: what cameras find is off by less
+    held_within: float = 0.03
     # m by which a loose connector lies nearer to the finger tips than the pads' middle, where no deeper grasp is free:
     # the fingers end 12 mm past that middle; choice
     shallow: float = 0.008
@@ -228,6 +231,8 @@ class TakingMotion(CarryMotion):
             thickness = 2 * self.known.cable.connector.radius
             try:
                 gap = yield from self.execution.close_jaw(self.hand, thickness, gently)
+                if gap > thickness + self.parameters.execution.jaw.grip.wider:
+                    raise JawBlockedError(f"the jaw holds something else, too: it stands {1e3 * gap:.1f} mm open", gap)
             except GraspEmptyError as error:
                 self._missed.append(taken)
                 if isinstance(error, JawBlockedError):
@@ -402,9 +407,10 @@ class TakingMotion(CarryMotion):
 
     def _is_fixed(self, world_from_connector: RigidTransform) -> bool:
         """Whether the connector is where the clip or a socket holds it."""
-        places = [self.known.cable.clip.seat, *(socket.center for socket in self.known.cable.sockets)]
-        offs = np.linalg.norm(np.array(places) - world_from_connector.translation, axis=1)
-        return bool(offs.min() < self.parameters.pick.jaw_reach)
+        cable = self.known.cable
+        held = [cable.clip.world_from_seat, *(s.world_from_plug(cable.connector.length) for s in cable.sockets)]
+        offs = np.linalg.norm([pose.translation - world_from_connector.translation for pose in held], axis=1)
+        return bool(offs.min() < self.parameters.held_within)
 
     def _pick_connector(
         self,

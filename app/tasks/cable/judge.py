@@ -30,6 +30,7 @@ class JudgeParameters:
     hold_seconds: float = 0.5  # with both pads in touch: a hand that closes beside its middle may push it away again
     slide_distance: float = 0.003  # m in the jaw ...
     slide_seconds: float = 0.5  # ... within this time: a squeezed connector slid so slowly for 1 s, then slipped out
+    let_go_seconds: float = 0.5  # from a hand's word that it lets go until the connector has left the open jaw; choice
 
 
 class GripWatch:
@@ -114,12 +115,15 @@ class CableJudge(Judge[Expect]):
     def slips(self) -> tuple[Slip, ...]:
         """Each real loss, with the first notice after it and before the next one.
 
-        A loss begins when the connector slides in the jaw: the robot may notice this before the last pad lets go.
+        A loss begins when the connector slides in the jaw: the robot may notice this before the last pad lets go. One
+        that is let fall on purpose begins with the hand's word.
         """
+        said, late = [n.at for n in value_of(NOTICES) if n.by == "hand"], self._parameters.let_go_seconds
+        begins = [max((at for at in said if lost - late <= at <= lost), default=lost) for lost in self.losses]
         slips = []
-        for released, end in pairwise([*self.losses, float("inf")]):
-            notice = next((n for n in value_of(NOTICES) if released <= n.at < end), None)
-            slips.append(Slip(released, notice.at if notice else None, notice.by if notice else None))
+        for begin, end in pairwise([*begins, float("inf")]):
+            notice = next((n for n in value_of(NOTICES) if begin <= n.at < end), None)
+            slips.append(Slip(begin, notice.at if notice else None, notice.by if notice else None))
         return tuple(slips)
 
     def measured(self) -> dict[str, Any]:

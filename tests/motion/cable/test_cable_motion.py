@@ -179,6 +179,27 @@ def test_a_jaw_that_closes_on_nothing_says_so(rig: Rig) -> None:
     assert error.value.code is CauseCode.GRASP_EMPTY
 
 
+def test_a_jaw_that_closes_on_something_else_too_does_not_hold_the_connector(rig: Rig) -> None:
+    """At the clip a jaw closes firmly at once; here it has taken hold of the clip's rod besides."""
+    rig.arms["right"].at = READY
+    rig.grippers["right"].gap, rig.grippers["right"].inside = 0.05, 0.0349
+    clip = rig.known.cable.clip.world_from_seat
+    with pytest.raises(JawBlockedError, match=r"holds something else, too: it stands 34\.9 mm open"):
+        rig.run(rig.motion.grip(clip))
+
+
+@pytest.mark.parametrize(("off", "gently"), [(0.0, False), (0.02, False), (0.05, True)])
+def test_what_lies_beside_the_clip_is_gripped_gently_at_first(rig: Rig, off: float, gently: bool) -> None:
+    rig.arms["right"].at = READY
+    jaw = rig.grippers["right"]
+    jaw.gap, jaw.inside = 0.05, 0.0201
+    seat = rig.known.cable.clip.world_from_seat
+    rig.run(rig.motion.grip(RigidTransform.from_components(seat.translation - [0.0, 0.0, off], seat.rotation)))
+    forces = [force for _, _, force in jaw.told]
+    assert (forces[0] < 10.0) is gently
+    assert forces[-1] > 10.0
+
+
 def test_a_jaw_that_meets_something_beside_the_connector_does_not_squeeze_it_at_first(rig: Rig) -> None:
     rig.arms["right"].at = READY
     jaw = rig.grippers["right"]

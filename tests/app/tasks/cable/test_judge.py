@@ -196,6 +196,19 @@ def test_each_loss_has_the_first_notice_before_the_next() -> None:
     assert two.detected_by is None
 
 
+def test_what_the_hand_lets_fall_on_purpose_is_noticed_as_it_says_so() -> None:
+    """The open jaw touches the connector for a tick more."""
+    run = Run(Expect(slips=1, detection_delay=0.5))
+    run.go(1.0, fingers=2)
+    said = run.go(0.1, fingers=2)
+    run.notice(LossNotice(said, "hand"))
+    run.go(1.0, fingers=0)
+    [slip] = run.judge.slips()
+    assert (slip.released_at, slip.detected_at, slip.detected_by) == (said, said, "hand")
+    assert run.verdict("slips") == (True, 1)
+    assert run.verdict("detection_delay") == (True, 0.0)
+
+
 def test_slips_are_met_when_every_loss_was_noticed_and_there_were_enough() -> None:
     run = Run(Expect(slips=1))
     assert run.verdict("slips") == (False, 0)
