@@ -1,6 +1,7 @@
 """Leave the connector in the clip, and look whether it stays there."""
 
 from collections.abc import Generator
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
@@ -56,7 +57,7 @@ class LetGo(HandLeaf):
 class LookAtStow(LookLeaf):
     """Looks at the clip; FAILURE when the connector is not there, so that the tree can recover it.
 
-    The wrist camera looks when the rear one is not to be trusted.
+    The wrist camera looks when the rear one is not to be trusted, or sees the connector elsewhere, but only a part of it.
     """
 
     READS: ClassVar[Keys] = (NOTICES,)
@@ -82,6 +83,11 @@ class LookAtStow(LookLeaf):
         seen, trouble = looked.estimates, perception.trouble(self.overview)
         if trouble is not None:
             seen = yield from self._look_from_the_other(trouble)
+        elif seen and not (seen[-1].whole or self.seated(seen[-1]).detected):
+            # What is half hidden may seem to lie elsewhere.
+            with suppress(LeafFailed):
+                other = yield from self._look_from_the_other(f"the {self.overview} camera sees the connector in part")
+                seen = [estimate for estimate in other if estimate.whole] or seen
         if not seen:
             self._lost(f"no camera sees the connector at {self.PLACE}")
         else:

@@ -47,6 +47,24 @@ def test_an_end_that_is_not_there_is_noticed_once(stage: Stage, shows: object) -
     assert [cause.code for cause in stage.causes] == [CableCause.NOT_STOWED]
 
 
+@pytest.mark.parametrize(
+    ("wrist_sees", "status"), [(0.0, Status.SUCCESS), (0.10, Status.FAILURE), (None, Status.FAILURE)]
+)
+def test_an_end_that_is_seen_elsewhere_but_in_part_is_looked_at_with_the_other_camera(
+    stage: Stage, wrist_sees: float | None, status: Status
+) -> None:
+    seat = np.array(stage.known.cable.clip.seat)
+
+    def shows(camera: str, t: float) -> Seen:
+        if camera == "rear":
+            return seen(t, seat + [0.0, 0.0, 0.06], whole=False)
+        return unseen(t) if wrist_sees is None else seen(t, seat + [0.0, 0.0, wrist_sees], camera)
+
+    stage.perception.shows = shows
+    assert stage.run(stage.tree(LOOK), 20.0) is status
+    assert bool(stage.belief.notices) is (status is Status.FAILURE)
+
+
 def test_letting_go_opens_the_jaw_and_believes_nothing_held(stage: Stage) -> None:
     stage.belief.held = RigidTransform.identity()
     tree = stage.tree('<LetGo name="let_go"/>')
