@@ -57,7 +57,7 @@ class LetGo(HandLeaf):
 class LookAtStow(LookLeaf):
     """Looks at the clip; FAILURE when the connector is not there, so that the tree can recover it.
 
-    The wrist camera looks when the rear one is not to be trusted, or sees the connector elsewhere, but only a part of it.
+    The wrist camera looks when the rear one is not to be trusted, or sees a part of the connector elsewhere.
     """
 
     READS: ClassVar[Keys] = (NOTICES,)

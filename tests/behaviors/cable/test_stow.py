@@ -57,8 +57,8 @@ def test_an_end_that_is_seen_elsewhere_but_in_part_is_looked_at_with_the_other_c
 
     def shows(camera: str, t: float) -> Seen:
         if camera == "rear":
-            return seen(t, seat + [0.0, 0.0, 0.06], whole=False)
-        return unseen(t) if wrist_sees is None else seen(t, seat + [0.0, 0.0, wrist_sees], camera)
+            return seen(t, np.add(seat, [0.0, 0.0, 0.06]), whole=False)
+        return unseen(t) if wrist_sees is None else seen(t, np.add(seat, [0.0, 0.0, wrist_sees]), camera)
 
     stage.perception.shows = shows
     assert stage.run(stage.tree(LOOK), 20.0) is status
