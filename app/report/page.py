@@ -2,6 +2,7 @@
 
 import base64
 import hashlib
+import re
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ from regrasp.interfaces.quote import cut, printable
 
 HERE = Path(__file__).parent
 FILE = "report.html"  # a report in the folder that it shows
+_BEFORE_UNIT = re.compile(r"(?<=\d) (?=(?:N m|N|kg|rad|deg|degrees|px2?|[cm]?m|m?s|Hz)\b)|(?<=\d N) (?=m\b)")
 MAX_TEXT = 2000  # characters of one text; a longer one is cut in its middle
 
 
@@ -44,7 +46,7 @@ def _environment() -> Environment:
     made = Environment(
         loader=FileSystemLoader(HERE),
         autoescape=True,
-        finalize=shown_text,
+        finalize=lambda value: _unbroken(shown_text(value)),
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
@@ -63,6 +65,13 @@ def shown_text(value: Any) -> Any:
     if isinstance(value, Markup) or not isinstance(value, str):
         return value
     return cut(printable(value), MAX_TEXT)
+
+
+def _unbroken(value: Any) -> Any:
+    """A text in which no line breaks between a number and its unit."""
+    if isinstance(value, Markup) or not isinstance(value, str):
+        return value
+    return _BEFORE_UNIT.sub("\N{NO-BREAK SPACE}", value)
 
 
 def plain_texts(value: Any) -> Any:

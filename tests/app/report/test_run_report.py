@@ -46,7 +46,7 @@ def test_a_page_says_what_was_asked_what_came_out_and_why(rich: Path) -> None:
         "toy, seed 7",
         "Failure",
         "The part is to be fetched.",
-        "jaw_opens: seconds 1 s; when at 0.4 to 0.6 s",
+        "jaw_opens: seconds 1\N{NO-BREAK SPACE}s; when at 0.4 to 0.6\N{NO-BREAK SPACE}s",
         "1 of 2 expectations met",
         "regrasp run scenario.yaml --seed 7",
         "slip: the connector is lost",
