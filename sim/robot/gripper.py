@@ -242,7 +242,7 @@ class SimLinkageGripper(SimGripper):
     def true_gap(self) -> float:
         """See `SimGripper`."""
         states = p.getJointStates(self._body, self._drives, physicsClientId=self._client)
-        return self._linkage.opening(float(np.mean([state[0] for state in states])))
+        return self._linkage.opening(sum(state[0] for state in states) / len(states))
 
     def place_at(self, gap: float) -> None:
         """See `SimGripper`."""
