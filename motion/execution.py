@@ -190,7 +190,6 @@ class Execution:
         else:
             message = f"{trouble}, {self.parameters.attempts} times"
             if contact.elastic:
-                self._speed_share[arm] = share
                 self._held_back.add(arm)
                 raise StoppedShortError(message)
             raise self.give_up(arm, CauseCode.ARM_FAILED, message)

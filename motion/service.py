@@ -132,7 +132,8 @@ class Motion(PlanningScene):
                 ends = kin.turned_off_limits(ends, self.parameters.limit_margin)
                 goals = [end for end in ends if can_continue(kin, end, onward)]
                 if may_touch is not None:
-                    goals = [end for end in goals if self._free_onward(arm, end, onward, may_touch)] or goals
+                    near = self.model(arm, without=may_touch)
+                    goals = [end for end in goals if self._free_onward(near, end, onward)] or goals
                 try:
                     return self._plan(model, q, np.array(goals).reshape(-1, len(kin)), margin)
                 except PlanningError:
@@ -429,14 +430,11 @@ class Motion(PlanningScene):
         distance = float(np.linalg.norm(place - kin.base[:3, 3]))
         return f"{distance:.2f} m from its base, and its links measure {kin.reach:.2f} m"
 
-    def _free_onward(
-        self, arm: str, q: FloatArray, onward: Sequence[RigidTransform], may_touch: Collection[Box]
-    ) -> bool:
-        """Whether straight lines from joints (n,) to the poses `onward` (goal_from_tool) are free but for the boxes."""
-        kin = self.kinematics[arm]
+    def _free_onward(self, model: CollisionModel, q: FloatArray, onward: Sequence[RigidTransform]) -> bool:
+        """Whether straight lines from joints (n,) to the poses `onward` (goal_from_tool) are free in a model."""
+        kin = model.kinematics
         tool = kin.tool_matrix(q)
         path = straight_lines(kin, q, [multiply(tool, pose.as_matrix()) for pose in onward])
-        model = self.model(arm, without=may_touch)
         return path is not None and model.path_free(path, self.parameters.straight_margin)
 
     def _check_shift(self, model: CollisionModel, path: FloatArray, length: float) -> None:

@@ -306,7 +306,7 @@ class PrinterMotion(Motion):
         self, arm: str, joints: FloatArray, onward: Sequence[RigidTransform], may_touch: Collection[str]
     ) -> bool:
         """Whether lines from joints (n,) to the poses `onward` (tool_from_goal) are free but for these things."""
-        return self._free_onward(arm, joints, onward, self.things(may_touch))
+        return self._free_onward(self.model(arm, without=self.things(may_touch)), joints, onward)
 
     def take_part(self, arm: str, deeper: float) -> Request[float]:
         """Go straight on by `deeper` m, close the jaw on the part's section, and let the hand give way to it.
