@@ -166,7 +166,6 @@ class Execution:
         moved = self._watches[arm].moved_alone(self._arms[arm].reading())
         if moved is not None:
             raise self.give_up(arm, CauseCode.ARM_FAILED, moved)
-        share = self._speed_share[arm]
         for _ in range(self.parameters.attempts):
             of_limits, timing = speed * self._speed_share[arm], self.parameters.timing
             trajectory = time_path(path, self._limits[arm], of_limits, timing, separation)
@@ -183,7 +182,10 @@ class Execution:
                 break
             self.halt(arm)
             self._on_anomaly(trouble)
-            self._speed_share[arm] *= self.parameters.slowdown
+            if contact.elastic:
+                speed *= self.parameters.slowdown  # in this motion only: what held the arm back may have come free then
+            else:
+                self._speed_share[arm] *= self.parameters.slowdown
             path = remaining_waypoints(path, trajectory.sample(elapsed)[0])
             yield from self._pause(self.parameters.retry_pause)
             path = np.vstack([self._joints(arm), path])

@@ -99,6 +99,23 @@ def test_an_arm_that_pulls_something_elastic_and_falls_behind_is_blocked_but_in_
     assert not rig.motion.execution.held_back("right")
 
 
+def test_an_arm_that_fell_behind_once_is_slower_later_unless_it_pulled_something_elastic(known: CableKnown) -> None:
+    later = {}
+    for pulling in (True, False):
+        rig = Rig(known)
+        arm = rig.arms["right"]
+        arm.at, arm.stuck = READY, 0.0
+        task = rig.motion.sleep("right", pulling=pulling)
+        while not arm.stops:
+            task.poll()
+            rig.clock.t += 0.05
+        arm.stuck = 1.0
+        rig.run(task)
+        rig.run(rig.motion.move("right", READY[None]))
+        later[pulling] = arm.followed[-1][1].duration
+    assert later[False] == pytest.approx(2.0 * later[True], rel=0.1)
+
+
 def test_an_arm_goes_slowly_beside_what_was_seen_and_fast_elsewhere(rig: Rig) -> None:
     model = rig.motion.model("right", others=False)
     hand = model.spheres(READY)[-1, :3]
