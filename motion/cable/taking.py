@@ -146,15 +146,16 @@ class TakingMotion(CarryMotion):
     def pick_plug(self, plug: RigidTransform, *, point_cloud: PointCloudSource | None = None) -> MotionRequest:
         """`pick` the connector where it is plugged in, world_from_connector: a panel is near.
 
-        With a grasp with which the hand is free where it has drawn the plug out, if there is one.
+        Preferably so that the hand is free where it has drawn the plug out. It is drawn into what was seen only with a
+        grasp for which there is no other.
         """
         finite_pose("the plug's pose", plug)
-        room = self._room_to_draw_out(plug)
+        room, meets_seen = self._room_to_draw_out(plug), self._drawn_into_seen(plug)
 
         def grasps() -> list[list[Grasp]]:
-            candidates = self._candidates(self.hand, plug, self.parameters.unplug.shallow)
-            rooms = [room(grasp) for grasp in candidates]
-            return [[grasp for grasp, n in zip(candidates, rooms, strict=True) if n == rank] for rank in range(3)]
+            candidates = sorted(self._candidates(self.hand, plug, self.parameters.unplug.shallow), key=room)
+            into = [meets_seen(grasp) for grasp in candidates]
+            return [[one for one, is_so in zip(candidates, into, strict=True) if is_so is so] for so in (False, True)]
 
         kin, axis = self.kinematics[self.hand], plug.rotation.apply([1.0, 0.0, 0.0])
 
@@ -387,8 +388,7 @@ class TakingMotion(CarryMotion):
 
         0: it is free then, 1: it may be, 2: it meets something.
         """
-        kin, out = self.kinematics[self.hand], np.eye(4)
-        out[:3, 3] = -self.parameters.unplug.draw_outs[0] * plug.rotation.apply([1.0, 0.0, 0.0])
+        kin, out = self.kinematics[self.hand], self._drawn_out(plug)
         gap, margin = 2 * self.known.cable.connector.radius, self.parameters.clearances.tight_margin
         models = [self.model(self.hand, opening=gap, optimistic=optimistic) for optimistic in (False, True)]
 
@@ -398,6 +398,23 @@ class TakingMotion(CarryMotion):
             return next((n for n, is_free in enumerate(free) if is_free), len(models))
 
         return room
+
+    def _drawn_into_seen(self, plug: RigidTransform) -> Callable[[Grasp], bool]:
+        """Whether a hand that draws out the plug (world_from_connector) may meet a seen surface, by its grasp."""
+        kin, out, gap = self.kinematics[self.hand], self._drawn_out(plug), 2 * self.known.cable.connector.radius
+        seen = self.model(self.hand, opening=gap, optimistic=True, without=self._boxes)
+
+        def meets(grasp: Grasp) -> bool:
+            ends = kin.ik(out @ grasp.pose)
+            return bool(len(ends)) and not any(seen.free(q, self.parameters.separation.touching) for q in ends)
+
+        return meets
+
+    def _drawn_out(self, plug: RigidTransform) -> FloatArray:
+        """The displacement (4, 4) in the world by which the plug is drawn out at most."""
+        out = np.eye(4)
+        out[:3, 3] = -self.parameters.unplug.draw_outs[0] * plug.rotation.apply([1.0, 0.0, 0.0])
+        return out
 
     def _bracket_near(self, world_from_connector: RigidTransform) -> Collection[Box]:
         """The clip's bracket, which a hand may touch that takes the connector out of the clip, or no box elsewhere."""

@@ -164,9 +164,9 @@ class PlanningScene:
         spheres = np.column_stack([course, np.zeros(len(course))])
         return self._grid_of(_points_beyond(self._map(optimistic), spheres, radius), optimistic)
 
-    def _map(self, optimistic: bool) -> FloatArray:
+    def _map(self, optimistic: bool, felt: bool = True) -> FloatArray:
         guesses = [] if optimistic else [self._unseen]
-        return np.vstack([self._points, self._more, *guesses, *(felt for _, felt in self._felt)])
+        return np.vstack([self._points, self._more, *guesses, *(some for _, some in self._felt if felt)])
 
     def _grid_of(self, points: FloatArray, optimistic: bool) -> DistanceGrid:
         border = self._scene_parameters.grid_border
@@ -176,8 +176,14 @@ class PlanningScene:
         return DistanceGrid.from_points(points, lower, upper, self._spacing, least=not optimistic)
 
     @counts_as("planning")
-    def all_mapped(self) -> DistanceGrid | None:
-        """The least distances to all points: the shadow's, and those that may be an arm itself, here or asleep."""
+    def all_mapped(self, felt: bool = True) -> DistanceGrid | None:
+        """The least distances to all points: the shadow's, and those that may be an arm itself, here or asleep.
+
+        Without `felt`, not to where an arm has touched something.
+        """
+        if not felt and self._felt:
+            points = np.vstack([self._all_points, self._map(optimistic=False, felt=False)])
+            return self._grid_of(points, optimistic=False) if len(points) else None
         if self._all_mapped is None and len(points := np.vstack([self._all_points, self._map(optimistic=False)])):
             self._all_mapped = self._grid_of(points, optimistic=False)
         return self._all_mapped
