@@ -89,7 +89,12 @@ class Regrasp(HandLeaf):
         except PlanningError:
             yield from self.ask(motion.let_go_of_cable(arm))
             raise
-        yield from self.ask(motion.let_go_of_cable(arm))
+        try:
+            yield from self.ask(motion.let_go_of_cable(arm))
+        except PlanningError as error:
+            if error.code not in NO_WAY:
+                raise
+            self.say("stays beside the hand", arm=arm, why=str(error))  # which may clear the way as it goes on
 
     def _take_lifted(self, arm: str, no_grasp: PlanningError) -> LeafSteps:
         """Grip the connector whose cable an arm holds; where that fails the arm brings it elsewhere first.

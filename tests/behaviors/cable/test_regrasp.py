@@ -106,6 +106,28 @@ def test_what_no_arm_can_take_is_lifted_by_its_cable_and_taken_by_the_other_arm(
     assert value_of(HELD, None) is not None
 
 
+@pytest.mark.parametrize(
+    ("code", "status"), [(CauseCode.NO_COLLISION_FREE_GOAL, Status.SUCCESS), (CauseCode.ARM_FAILED, Status.FAILURE)]
+)
+def test_an_arm_that_cannot_leave_the_cable_stays_there_and_the_other_holds_the_connector(
+    stage: Stage, code: CauseCode, status: Status
+) -> None:
+    motion = hindered(stage, left=CauseCode.NO_COLLISION_FREE_GOAL, right=CauseCode.OUT_OF_REACH)
+    stage.perception.shows = lambda camera, stamp: seen(stamp, np.array([0.4, 0.0, 0.4]), camera)
+
+    def no_way(arm: str) -> Request[None]:
+        def steps() -> Generator[None, None, None]:
+            yield
+            raise PlanningError(code, "none of 1 goals keeps 5 mm: the best has 0 mm to other arm")
+
+        return Request(steps())
+
+    motion.let_go_of_cable = no_way  # type: ignore[method-assign]
+    assert stage.run(stage.tree(REGRASP), 60.0) is status
+    assert len(stage.log.of("stays beside the hand")) == (status is Status.SUCCESS)
+    assert value_of(HELD, None) is not None
+
+
 def test_what_is_not_seen_once_lifted_is_let_go(stage: Stage) -> None:
     motion = hindered(stage, left=CauseCode.NO_COLLISION_FREE_GOAL, right=CauseCode.NO_COLLISION_FREE_GOAL)
     assert stage.run(stage.tree(REGRASP), 60.0) is Status.FAILURE
