@@ -168,7 +168,7 @@ class Motion(PlanningScene):
                 self._on_anomaly(f"{error}: something elastic may hold it")
                 self.forget_felt()
                 # What is felt from now on is that thing: no touch of it makes the arm more careful at the next.
-                yield from self._move_steps(arm, goals, contact=self._guard.pulling, careful=False)
+                yield from self._move_steps(arm, goals, contact=self._guard.pulling, felt=False)
 
         return self.execution.request(arm, steps())
 
@@ -274,18 +274,18 @@ class Motion(PlanningScene):
         tight: bool = True,
         contact: ContactLimits | None = None,
         touches: int | None = None,
-        careful: bool = True,
+        felt: bool = True,
     ) -> Iterator[None]:
         """The steps of `move`.
 
         `contact` says what counts as a touch (default: of an arm that moves freely), `touches` how many end it, and
-        `careful` whether a place that was felt counts as near, as a seen one does.
+        `felt` whether a place that was felt counts as near, as a seen one does.
         """
 
         def steps(optimistic: bool) -> Iterator[None]:
             model = self.start_model(arm, optimistic=optimistic)
             path = self._plan(model, self.joints(arm), goals, margin, tight)
-            yield from self._follow(arm, path, self._pace(optimistic), model, contact, careful)
+            yield from self._follow(arm, path, self._pace(optimistic), model, contact, felt)
 
         yield from self._tries(arm, steps, touches)
 
@@ -374,16 +374,16 @@ class Motion(PlanningScene):
         speed: float,
         model: CollisionModel,
         contact: ContactLimits | None = None,
-        careful: bool = True,
+        felt: bool = True,
     ) -> Iterator[None]:
         """`Execution.follow`, slowly where the arm, as it is in `model`, comes near to what was seen or felt.
 
         Also near to space that no camera has seen, however the map was read for the path. An arm that pulls something
-        elastic goes no faster than `pulling_speed`. `careful`: see `_move_steps`.
+        elastic goes no faster than `pulling_speed`. `felt`: see `_move_steps`.
         """
         if contact is not None and contact.elastic:
             speed = min(speed, self.parameters.pulling_speed)
-        surfaces = self.all_mapped(felt=careful) or (None if careful else NO_SURFACES)
+        surfaces = self.all_mapped(felt) or (None if felt else NO_SURFACES)
         allowed = None if surfaces is None else SpeedBySeparation(model, surfaces, self.parameters.separation)
         yield from self.execution.follow(arm, path, speed, contact, allowed)
 
