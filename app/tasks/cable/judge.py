@@ -80,7 +80,7 @@ class CableJudge(Judge[Expect]):
         self._untouched, self._still = ConditionTimer(), ConditionTimer()  # after a hold
         self.grasps = 0  # how often the hand has grasped it
         self.losses: list[float] = []  # seconds
-        self.settled_pixels: int | None = None  # of the connector in the rear image when it had settled after a loss
+        self.settled_pixels: int | None = None  # of the connector in the rear image where it settled before it was found
         self.found_by: str | None = None  # the camera that found the connector first after its loss
 
     @counts_as("record")
@@ -97,9 +97,12 @@ class CableJudge(Judge[Expect]):
             if self._untouched.update(now, not self._truth.touched()) >= PhaseParameters.lost_seconds:
                 self.losses.append(self._unheld_at)
                 self._was_held, self._grip = False, GripWatch(self._parameters)
-        if self.losses and not self._was_held and self.settled_pixels is None:
+        if self.losses and not self._was_held:
             slow = self._truth.connector_speed() <= PhaseParameters.still_speed
-            if self._still.update(now, slow) >= PhaseParameters.still_seconds:
+            still_seconds = self._still.update(now, slow)
+            if not slow and self.found_by is None:  # it fell on from where it lay first
+                self.settled_pixels = None
+            elif self.settled_pixels is None and still_seconds >= PhaseParameters.still_seconds:
                 self.settled_pixels = self._truth.connector_pixels(self._cable.overview)
 
     def _watch_hold(self, now: float) -> None:
