@@ -4,6 +4,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.arguments import positive, rows
@@ -67,6 +68,7 @@ class PlanningScene:
         self._grids: dict[bool, DistanceGrid | None] = {}  # optimistic or not; made when asked for
         self._all_mapped: DistanceGrid | None = None  # made when asked for
         self._points = self._unseen = self._more = self._all_points = NO_POINTS
+        self._certain: NDArray[np.int64] = np.empty(0, np.int64)  # the voxels among them that were seen without an arm
         self._felt: list[tuple[float, FloatArray]] = []  # when, and points (n, 3) m
         self._spacing = 0.01  # m, until the first voxels come
 
@@ -82,7 +84,8 @@ class PlanningScene:
 
         `unseen` (m, 3) m are voxels that no camera has seen, behind seen surfaces: an arm enters them only where it
         finds no other way. In the `shadow` (k, 3) m, further behind, it moves slowly, as beside a surface. Points where
-        an arm is now, or sleeps, do not count: what was seen there was an arm. Nor do points that no arm reaches.
+        an arm sleeps do not count, nor those where one is now unless they were there before it came: what was seen
+        there was an arm. Nor do points that no arm reaches.
         Raises ValueError for points that are not finite and a spacing that is not above 0.
         """
         margin = self._scene_parameters.arm_margin
@@ -93,10 +96,17 @@ class PlanningScene:
         now = max((arm.reading().stamp for arm in self.arms.values()), default=0.0)
         self._felt = [(at, felt) for at, felt in self._felt if at > now - self._scene_parameters.felt_time]
         for spec in self.known.arms:
-            for q in (self.joints(spec.name), np.array(spec.sleep)):
-                spheres = self.model(spec.name, others=False).spheres(q)
-                self._points = _points_beyond(self._points, spheres, margin)
-                self._unseen = _points_beyond(self._unseen, spheres, margin)
+            asleep = self.model(spec.name, others=False).spheres(np.array(spec.sleep))
+            self._points = _points_beyond(self._points, asleep, margin)
+            self._unseen = _points_beyond(self._unseen, asleep, margin)
+        alone = self._points
+        for spec in self.known.arms:
+            body = self.model(spec.name, others=False).spheres(self.joints(spec.name))
+            alone = _points_beyond(alone, body, margin)
+            self._unseen = _points_beyond(self._unseen, body, margin)
+        keys = _voxel_keys(self._points, spacing)
+        self._certain = np.union1d(np.intersect1d(keys, self._certain), _voxel_keys(alone, spacing))
+        self._points = self._points[np.isin(keys, self._certain)]
         self._forget_grids()
 
     @counts_as("planning")
@@ -311,6 +321,13 @@ def _larger(box: Box, by: float) -> Box:
     """The box, `by` m larger on each side."""
     x, y, z = (edge + 2 * by for edge in box.size)
     return box.model_copy(update={"size": (x, y, z)})
+
+
+def _voxel_keys(points: FloatArray, edge: float) -> NDArray[np.int64]:
+    """A number (n,) for each of the voxels in which points (n, 3) lie, of this `edge` m."""
+    most = 1 << 20  # voxels from the origin along an axis
+    i, j, k = (np.floor(points / edge).astype(np.int64) + most).T
+    return np.asarray((i << 42) | (j << 21) | k)
 
 
 def _points_beyond(points: FloatArray, spheres: FloatArray, margin: float) -> FloatArray:
