@@ -46,10 +46,12 @@ class UrdfJoint:
 
     def moved(self, value: float) -> FloatArray:
         """parent_from_child (4, 4) with the joint at `value` rad or m."""
+        if self.kind == "fixed" or value == 0.0:  # most of the joints of a gripper
+            return self.parent_from_child.copy()
         motion = np.eye(4)
         if self.kind == "prismatic":
             motion[:3, 3] = value * self.axis
-        elif self.kind != "fixed":
+        else:
             motion[:3, :3] = rotation_about(self.axis, value)
         return np.asarray(self.parent_from_child @ motion)
 

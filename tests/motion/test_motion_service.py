@@ -285,6 +285,23 @@ def test_points_where_an_arm_is_or_sleeps_are_no_obstacles(rig: Rig) -> None:
     assert rig.motion.sees(eye, far[None])
 
 
+def test_what_was_seen_before_an_arm_came_stays_an_obstacle_beside_it(rig: Rig) -> None:
+    *hand, radius = rig.motion.model("right").spheres(READY)[-1]
+    beside = cube(np.add(hand, [0.0, 0.0, radius + 0.02]), 0.02)
+    rig.arms["right"].at = READY
+    rig.motion.set_obstacles(beside, 0.01)
+    alone = rig.motion.model("right", others=False).clearance(READY)
+    assert rig.motion.model("right").clearance(READY) == pytest.approx(alone)  # what is seen there is the hand
+    rig.arms["right"].at = ASIDE
+    rig.motion.set_obstacles(beside, 0.01)
+    rig.arms["right"].at = READY
+    rig.motion.set_obstacles(beside, 0.01)
+    assert rig.motion.model("right").clearance(READY) < min(alone, 0.01)
+    rig.motion.set_obstacles(np.empty((0, 3)), 0.01)  # it has moved away
+    rig.motion.set_obstacles(beside, 0.01)
+    assert rig.motion.model("right").clearance(READY) == pytest.approx(alone)
+
+
 def test_space_that_no_camera_saw_is_entered_slowly_and_only_where_there_is_no_other_way(rig: Rig) -> None:
     rig.arms["right"].at = ASIDE
     rig.run(rig.motion.move("right", READY[None]))
