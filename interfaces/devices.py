@@ -25,6 +25,10 @@ class Guard(Protocol):
         """Whether the arm must stop now."""
         ...
 
+    def greatest_efforts(self) -> FloatArray | None:
+        """What the drives may use at most until the next reading, (n,) N m or N; None: all that they can."""
+        ...
+
 
 class Arm(Protocol):
     """An arm with position-controlled joints."""

@@ -508,7 +508,8 @@ class Motion(PlanningScene):
         clearances, pick = clearances or self.parameters.clearances, self.parameters.pick
         gap, q = self.parameters.execution.jaw.open_gap, self.joints(arm)
         spared = ((), without) if without else ((),)
-        errors = (self.parameters.arm_error, 0.0)[: 1 + optimistic]
+        most = self.parameters.arm_error
+        errors = (most, 0.5 * most, 0.0) if optimistic else (most,)
         for grown, boxes in product(errors, spared):
             near = self.model(arm, without=boxes, opening=gap, optimistic=optimistic, grown=grown)
             try:

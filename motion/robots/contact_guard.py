@@ -29,6 +29,9 @@ class ContactLimits:
     back_off: bool = True  # after a touch the arm goes back the way that it came; not where it would take a thing along
     elastic: bool = False  # something elastic may hold the arm back: one that falls behind is blocked, not broken
     far: float | None = None  # the share where nothing is near that could be touched; None: the same
+    # of the joints' greatest efforts, what the drives may use beyond what the motion itself asks for; None: all. In a
+    # physics step a rigid thing is pressed with all that they may use.
+    most: float | None = None
 
 
 @dataclass(frozen=True)
@@ -38,7 +41,7 @@ class ContactGuardParameters:
     # A block in the way of 20 motions (seeds 100 to 119): 0.08, 0.10 and 0.12 press it with 12, 16 and 15 N at most
     # and all come to their goals; the places are found 34, 27 and 27 mm beside in the median. With an adaptation of
     # 0.25 s, and the greatest effort instead of their length, a slow forearm pressed foam with 25 N (scene 7302).
-    free: ContactLimits = ContactLimits(0.10, adaptation=1.0)
+    free: ContactLimits = ContactLimits(0.10, adaptation=1.0, most=0.15)
     # The end of a cable that keeps to its natural shapes changes the efforts by 0.12 of the wrist's and 0.04 of each of
     # the other joints', sometimes by more; a slow hand presses foam for half a second before that is felt; choice.
     carrying: ContactLimits = ContactLimits(0.16, adaptation=1.0, far=0.5)
@@ -98,10 +101,12 @@ class ContactGuard:
     ) -> None:
         self._dynamics, self._gravity, self._adaptation = dynamics, gravity, limits.adaptation
         self._limits, self._pull, self._pull_near = limits.share * torques, limits.pull, limits.pull_near
+        self._torques, self._most = torques, limits.most
         self._times_far = 1.0 if limits.far is None or near is None else limits.far / limits.share
         self._near = near
         self._last: JointReading | None = None
         self._usual: FloatArray | None = None
+        self._wanted: FloatArray | None = None  # efforts (n,) that the motion asked for at the last reading
         self.touch: Touch | None = None
 
     def __call__(self, reading: JointReading) -> bool:
@@ -112,7 +117,7 @@ class ContactGuard:
         interval = reading.stamp - last.stamp
         accelerations = (reading.velocities - last.velocities) / interval
         wanted = self._dynamics.efforts(reading.positions, reading.velocities, accelerations, self._gravity)
-        outside = wanted - reading.efforts
+        self._wanted, outside = wanted, wanted - reading.efforts
         if self._usual is None:
             self._usual = outside
         change = outside - self._usual
@@ -122,6 +127,12 @@ class ContactGuard:
             return True
         self._usual = self._usual + min(interval / self._adaptation, 1.0) * change
         return False
+
+    def greatest_efforts(self) -> FloatArray | None:
+        """See `regrasp.interfaces.devices.Guard`."""
+        if self._most is None or self._wanted is None:
+            return None
+        return np.asarray(np.minimum(np.abs(self._wanted) + self._most * self._torques, self._torques))
 
     def _felt(self, q: FloatArray, shares: FloatArray) -> FloatArray | None:
         """What is left of the efforts (n,), in shares of their limits, without a pull, if it is a touch."""

@@ -187,16 +187,18 @@ class SimArm:
             t = self.now() + self._dt - self._started
             q, v = self._trajectory.sample(t)
             over = t >= self._trajectory.duration
+            efforts = None if self._guard is None else self._guard.greatest_efforts()
             if _move_target(self._target, self._speeds, q, v, over, self._chain.speeds * self._dt, self._dt):
-                self._trajectory = None
-            self._drive(self._target, self._speeds)
+                self._trajectory = efforts = None
+            self._drive(self._target, self._speeds, efforts)
         elif self._late_joints and self._late(self._target).any():
             self._drive(self._target, np.zeros(len(self._target)))
         if self._steps * self._dt >= self.gripper.due:
             self.gripper.sample()
         self._steps += 1
 
-    def _drive(self, q: FloatArray, v: FloatArray) -> None:
+    def _drive(self, q: FloatArray, v: FloatArray, efforts: FloatArray | None = None) -> None:
+        """Tell the servos where to go, and how fast; with at most these `efforts` (n,), None: all that they can."""
         reach = self._speed_share * self._chain.speeds * self._dt
         self._late_joints = _servo_command(
             self._servo, q, v, reach, self.offsets, self._signs, self._target, self._command
@@ -211,7 +213,7 @@ class SimArm:
             targetVelocities=velocities,
             positionGains=position_gains,
             velocityGains=velocity_gains,
-            forces=torques,
+            forces=torques if efforts is None else efforts.tolist(),
             physicsClientId=self.client,
         )
 
