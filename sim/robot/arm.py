@@ -182,7 +182,9 @@ class SimArm:
             reading = self.reading()
             if self._guard(reading):
                 self._trajectory = None
-                self._drive(reading.positions - self._encoder_slip, np.zeros(len(reading.positions)))
+                # The encoders' step may lie behind a wall: with all its efforts the arm would press it to get there.
+                efforts = self._guard.greatest_efforts()
+                self._drive(reading.positions - self._encoder_slip, np.zeros(len(reading.positions)), efforts)
         if self._trajectory is not None:
             t = self.now() + self._dt - self._started
             q, v = self._trajectory.sample(t)

@@ -80,7 +80,7 @@ class CableJudge(Judge[Expect]):
         self._untouched, self._still = ConditionTimer(), ConditionTimer()  # after a hold
         self.grasps = 0  # how often the hand has grasped it
         self.losses: list[float] = []  # seconds
-        self.settled_pixels: int | None = None  # of the connector in the rear image where it settled before it was found
+        self.settled_pixels: int | None = None  # of the connector in the rear image, where it lay before it was found
         self.found_by: str | None = None  # the camera that found the connector first after its loss
 
     @counts_as("record")

@@ -13,7 +13,8 @@ def test_the_distance_of_boxes_is_one_less_their_overlap_plus_that_of_their_midd
     middles, edges = rng.normal(size=(2, 100, 2)), np.exp(rng.normal(size=(2, 100, 2)))
     low, high = middles - edges / 2, middles + edges / 2
     boxes, others = (
-        torch.from_numpy(np.hstack(b).T[None, None, :, :, None].copy()) for b in zip(middles, np.log(edges), strict=True)
+        torch.from_numpy(np.hstack(b).T[None, None, :, :, None].copy())
+        for b in zip(middles, np.log(edges), strict=True)
     )
     found = box_distance(boxes, others).numpy().ravel()
     for i, distance in enumerate(found):

@@ -15,7 +15,7 @@ from regrasp.interfaces.reading import JointReading
 from regrasp.interfaces.robot.robot import Robot
 from regrasp.interfaces.scene import EARTH_GRAVITY
 from regrasp.motion.planning.timing import JointLimits, time_path
-from regrasp.motion.robots.contact_guard import ContactGuard, ContactGuardParameters
+from regrasp.motion.robots.contact_guard import ContactGuard, ContactGuardParameters, ContactLimits
 from regrasp.motion.robots.contact_place import contact_place
 from regrasp.motion.robots.dynamics import ArmDynamics
 from regrasp.motion.robots.kinematics import ArmKinematics
@@ -99,12 +99,14 @@ class Bench:
         self.arm.place(q)
         self.step(48)
 
-    def follow(self, goal: FloatArray, body: int | None = None) -> tuple[ContactGuard, float]:
-        """Move there at full speed: the guard, and the greatest force (N) on a body."""
+    def follow(
+        self, goal: FloatArray, body: int | None = None, speed: float = 1.0, limits: ContactLimits = FREE
+    ) -> tuple[ContactGuard, float]:
+        """Move there at a share of full speed: the guard, and the greatest force (N) on a body."""
         chain = self.kin.chain
         path = np.array([self.arm.reading().positions, goal])
-        guard = ContactGuard(self.dynamics, self.arm.gravity(), chain.torques, FREE)
-        self.arm.follow(time_path(path, JointLimits(chain.speeds, chain.accelerations)), guard)
+        guard = ContactGuard(self.dynamics, self.arm.gravity(), chain.torques, limits)
+        self.arm.follow(time_path(path, JointLimits(chain.speeds, chain.accelerations), speed), guard)
         peak = 0.0
         while self.arm.is_moving():
             self.step()
@@ -133,8 +135,11 @@ def test_a_free_motion_is_no_touch(
     bench.place(bench.kin.robot.asleep)
     np.testing.assert_allclose(bench.arm.gravity(), [0.0, 0.0, -gravity])
     for goal in np.random.default_rng(3).uniform(-1.2, 1.2, (4, len(bench.kin))):
-        guard, _ = bench.follow(np.clip(goal, bench.kin.lower, bench.kin.upper))
+        goal = np.clip(goal, bench.kin.lower, bench.kin.upper)
+        guard, _ = bench.follow(goal)
         assert guard.touch is None
+        bench.step(48)
+        assert bench.arm.reading().positions == pytest.approx(goal, abs=0.01)  # no drive was held too weak
 
 
 @pytest.mark.parametrize("gravity", [0.0, EARTH_GRAVITY], ids=["zero", "earth"])
@@ -161,6 +166,25 @@ def test_an_arm_that_meets_foam_at_full_speed_stops_below_15_newtons_and_tells_w
     outside = np.maximum(np.abs(place - center) - half, 0.0)
     assert np.linalg.norm(outside) < 0.05
     assert inward @ [0.0, -1.0, 0.0] > 0.7  # the arm swept that way
+
+
+@pytest.mark.parametrize("gravity", [0.0, EARTH_GRAVITY], ids=["zero", "earth"])
+def test_a_slow_arm_presses_a_wall_with_less_than_30_newtons(cell: CableCell, client: int, gravity: float) -> None:
+    start, goal = np.array([0.3, 0.2, 0.2, 0.0, 0.2, 0.0]), np.array([-0.3, 0.2, 0.2, 0.0, 0.2, 0.0])
+    peaks = []
+    for limits in (FREE, replace(FREE, most=None)):
+        bench = Bench(cell, client, VX300S, UPRIGHT, gravity)
+        bench.place(start)
+        shape = p.createCollisionShape(p.GEOM_BOX, halfExtents=[0.04] * 3, physicsClientId=client)
+        center = bench.kin.tool(0.5 * (start + goal)).translation
+        wall = p.createMultiBody(0, shape, -1, center.tolist(), physicsClientId=client)
+        guard, peak = bench.follow(goal, wall, 0.05, limits)
+        assert guard.touch is not None
+        peaks.append(peak)
+        p.removeBody(wall, physicsClientId=client)
+        p.removeBody(bench.arm.body, physicsClientId=client)
+    assert 0.0 < peaks[0] < 30.0
+    assert peaks[0] < 0.6 * peaks[1]
 
 
 def test_a_guard_that_presses_lets_through_what_a_free_one_does_not(cell: CableCell, client: int) -> None:
