@@ -30,6 +30,7 @@ class ArmParameters:
     braking_samples: int = 12  # of the trajectory that brakes
     position_gain: float = 0.3  # PyBullet's position control, share of the error that is corrected in a step
     velocity_gain: float = 1.0
+    slow: float = 0.05  # rad/s or m/s of each joint, from which on an arm that a guard stopped holds softly; choice
 
 
 class SimArm:
@@ -69,6 +70,7 @@ class SimArm:
         self._gains = [parameters.position_gain] * count, [parameters.velocity_gain] * count, chain.torques.tolist()
         self._trajectory: Trajectory | None = None
         self._guard: Guard | None = None
+        self._hold: FloatArray | None = None  # where the guard stopped the arm, rad, until it is slow
         self._started = 0.0
         self._servo: FloatArray = np.array(spec.sleep, float)  # where the servos stand, rad
         self._target = self._servo.copy()  # where they were told to go, rad
@@ -115,7 +117,7 @@ class SimArm:
 
     def follow(self, trajectory: Trajectory, guard: Guard | None = None) -> None:
         """See `regrasp.interfaces.devices.Arm`."""
-        self._trajectory, self._started, self._guard = trajectory, self.now(), guard
+        self._trajectory, self._started, self._guard, self._hold = trajectory, self.now(), guard, None
 
     def stop(self) -> None:
         """See `regrasp.interfaces.devices.Arm`: all joints come to rest together."""
@@ -182,9 +184,10 @@ class SimArm:
             reading = self.reading()
             if self._guard(reading):
                 self._trajectory = None
-                # The encoders' step may lie behind a wall: with all its efforts the arm would press it to get there.
-                efforts = self._guard.greatest_efforts()
-                self._drive(reading.positions - self._encoder_slip, np.zeros(len(reading.positions)), efforts)
+                self._hold = reading.positions - self._encoder_slip
+                self._hold_softly(reading)
+        elif self._hold is not None and self._trajectory is None:
+            self._hold_softly(self.reading())
         if self._trajectory is not None:
             t = self.now() + self._dt - self._started
             q, v = self._trajectory.sample(t)
@@ -198,6 +201,18 @@ class SimArm:
         if self._steps * self._dt >= self.gripper.due:
             self.gripper.sample()
         self._steps += 1
+
+    def _hold_softly(self, reading: JointReading) -> None:
+        """Brake where the guard stopped the arm, and once it is slow hold with no more than the guard allows.
+
+        The place may lie behind a wall by a step of the encoders: with all its efforts the arm would press it.
+        """
+        assert self._guard is not None
+        assert self._hold is not None
+        slow = bool(np.max(np.abs(reading.velocities)) < self._parameters.slow)
+        self._drive(self._hold, np.zeros(len(self._hold)), self._guard.greatest_efforts() if slow else None)
+        if slow:
+            self._hold = None
 
     def _drive(self, q: FloatArray, v: FloatArray, efforts: FloatArray | None = None) -> None:
         """Tell the servos where to go, and how fast; with at most these `efforts` (n,), None: all that they can."""
