@@ -29,8 +29,6 @@ from regrasp.sim.render.visuals import Visuals, segmentation_id
 from regrasp.sim.robot.arm import SimArm
 from regrasp.sim.robot.model import pad_links
 
-_PART: tuple[PartClass, ...] = ("obj", "targ")  # what may be hidden
-
 
 @dataclass(frozen=True)
 class PartSceneParameters:
@@ -59,15 +57,15 @@ class PartShot:
         rgb: (H, W, 3) uint8.
         depth: (H, W) float32 m, without noise.
         masks: Of each class the pixels (H, W) that show it.
-        occlusion: Of part and section the share of its own pixels that something else occludes; empty if the part is
-            absent, or if this is not measured.
+        occlusion: Share of the part's pixels, with its section's, that something occludes; NaN if it is absent or not
+            measured.
         camera: The camera.
     """
 
     rgb: NDArray[np.uint8]
     depth: NDArray[np.float32]
     masks: dict[PartClass, NDArray[np.bool_]]
-    occlusion: dict[PartClass, float]
+    occlusion: float
     camera: CameraSpec
 
 
@@ -131,16 +129,14 @@ class PartScene:
         light = self._light.draw(rng)
         image = self._renderer.render(poses, camera, self.camera.intrinsics, light)
         masks = {name: np.isin(image.ids, self._ids[name]) for name in CLASSES}
-        occlusion: dict[PartClass, float] = {}
+        occlusion = float("nan")
         if present and measured:
             alone = poses.copy()
             others = ~np.isin(self._visuals.ids, [*self._ids["obj"], *self._ids["targ"]])
             alone[others, :, 3] = OUT_OF_SIGHT.translation
-            ids = self._renderer.render(alone, camera, self.camera.intrinsics, light).ids
-            for name in _PART:
-                whole, seen = (np.count_nonzero(mask) for mask in (np.isin(ids, self._ids[name]), masks[name]))
-                if whole:
-                    occlusion[name] = 1.0 - seen / whole
+            whole = np.count_nonzero(self._renderer.render(alone, camera, self.camera.intrinsics, light).ids >= 0)
+            seen = np.count_nonzero(masks["obj"] | masks["targ"])
+            occlusion = 1.0 - seen / whole if whole else float("nan")
         return PartShot(painted(image, self._walls, rng), image.depth, masks, occlusion, self.camera)
 
     def _block(self, box: Box, rng: np.random.Generator) -> int:

@@ -20,7 +20,6 @@ class TrainingParameters:
     learning_rate: float = 4e-3  # at its peak; choice: usual for AdamW on a small network; not tuned
     restart_factor: float = 0.25  # of the learning rate, for a network that was trained before; choice
     weight_decay: float = 1e-4  # of AdamW; choice: usual
-    overlap_weight: float = 0.0  # of the overlap of the boxes in the loss, beside their absolute errors; see `loss`
     check_every: int = 6000  # steps; choice: a check takes as long as some 300 of them
     batches_ahead: int = 3  # made while the network learns; choice
     # bfloat16 takes two thirds of the time where the processor has instructions for it, and far longer elsewhere.
@@ -60,7 +59,7 @@ def train(
     for step, (images, wanted) in enumerate(_batches(draw, draws, steps, parameters.batches_ahead), 1):
         with torch.autocast("cpu", torch.bfloat16, enabled=parameters.bfloat16):
             maps = network(images)
-        error = loss(maps.float(), wanted, parameters.overlap_weight)
+        error = loss(maps.float(), wanted)
         optimizer.zero_grad()
         error.backward()
         optimizer.step()
@@ -73,19 +72,17 @@ def train(
                 keep(network, score)
 
 
-def loss(maps: torch.Tensor, wanted: torch.Tensor, overlap_weight: float = 0.0) -> torch.Tensor:
+def loss(maps: torch.Tensor, wanted: torch.Tensor) -> torch.Tensor:
     r"""The loss of CenterNet (Zhou et al. 2019), of maps (n, classes * (1 + k), h, w) of `Network`.
 
     `wanted` (n, classes, 3 + k, h, w) holds for each class the likelihood's target t, its k values, v and w:
 
     .. math:: L = -\frac{1}{N} \sum_x w_x
         \begin{cases} (1 - p_x)^2 \log p_x & t_x = 1 \\ (1 - t_x)^4 p_x^2 \log (1 - p_x) & t_x < 1 \end{cases}
-        + \frac{\sum_x v_x (\lVert y_x - \hat y_x \rVert_1 + \lambda d_x)}{\sum_x v_x}
+        + \frac{\sum_x v_x \lVert y_x - \hat y_x \rVert_1}{\sum_x v_x}
 
-    over cells x: a focal loss of the likelihood p against its target t, weighted by w, N the number of things; the
-    absolute errors of the values y, weighted by v; and `overlap_weight` :math:`\lambda` times the distance d of the
-    predicted box from the true one, see `box_distance`. An error of a few pixels costs a thin box most of its overlap,
-    but hardly shows in the absolute errors.
+    over cells x: a focal loss of the likelihood p against its target t, weighted by w, N the number of things; and the
+    absolute errors of the values y, weighted by v.
     """
     classes = wanted.shape[1]
     values = maps[:, classes:].unflatten(1, (classes, -1))
@@ -97,31 +94,8 @@ def loss(maps: torch.Tensor, wanted: torch.Tensor, overlap_weight: float = 0.0) 
     )
     peak = (truth == 1).float()
     focal = peak * (1 - heat) ** 2 * heat.log() + (1 - peak) * (1 - truth) ** 4 * heat**2 * (1 - heat).log()
-    error = ((values - wanted[:, :, 1:-2]).abs() * valid[:, :, None]).sum()
-    if overlap_weight:
-        error = error + overlap_weight * (box_distance(values[:, :, :4], wanted[:, :, 1:5]) * valid).sum()
-    return -(focal * weight).sum() / peak.sum().clamp(min=1) + error / valid.sum().clamp(min=1)
-
-
-def box_distance(boxes: torch.Tensor, others: torch.Tensor) -> torch.Tensor:
-    r"""The distance-IoU loss (Zheng et al. 2020) of boxes (n, classes, 4, h, w), (n, classes, h, w).
-
-    A box is the middle's offset from the cell and the logarithm of its edges, in cells, as in `wanted_maps`.
-
-    .. math:: d = 1 - \mathrm{IoU} + \rho^2 / c^2
-
-    with the distance :math:`\rho` of the middles and the diagonal c of the smallest box that holds both. It is 0 for
-    equal boxes and at most 2.
-    """
-    middles, halves = zip(*((b[:, :, :2], b[:, :, 2:].clamp(-6, 6).exp() / 2) for b in (boxes, others)), strict=True)
-    low, high = (
-        [m - e for m, e in zip(middles, halves, strict=True)],
-        [m + e for m, e in zip(middles, halves, strict=True)],
-    )
-    common = (torch.minimum(*high) - torch.maximum(*low)).clamp(min=0).prod(dim=2)
-    union = sum(4 * e.prod(dim=2) for e in halves) - common
-    diagonal = (torch.maximum(*high) - torch.minimum(*low)).square().sum(dim=2)
-    return 1 - common / union + (middles[0] - middles[1]).square().sum(dim=2) / diagonal
+    error = (values - wanted[:, :, 1:-2]).abs() * valid[:, :, None]
+    return -(focal * weight).sum() / peak.sum().clamp(min=1) + error.sum() / valid.sum().clamp(min=1)
 
 
 def _batches(

@@ -31,7 +31,7 @@ class ScoreParameters:
 
     min_overlap: float = 0.5  # intersection over union from which a box is right: that of AP50
     min_visible_area: int = 100  # px of the camera's picture; choice: a sixth of the section at 0.7 m
-    max_occlusion: float = 0.7  # share of part or section that may be hidden; choice
+    max_occlusion: float = 0.7  # share of the part that may be hidden; choice
     shots_per_scene: int = 6  # choice
     absent_every: int = 4  # one picture of so many shows no part; choice
 
@@ -69,7 +69,7 @@ def scored(detector: PartDetector, shot: PartShot, parameters: ScoreParameters =
     truths: dict[PartClass, Truth] = {}
     for name in CLASSES:
         mask = shot.masks[name]
-        hidden = shot.occlusion.get(name, 0.0) > parameters.max_occlusion
+        hidden = name in ("obj", "targ") and shot.occlusion > parameters.max_occlusion
         if mask.any() and (hidden or np.count_nonzero(mask) < parameters.min_visible_area):
             continue
         truths[name] = true_box(mask)

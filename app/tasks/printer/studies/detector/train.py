@@ -16,8 +16,7 @@ from regrasp.app.tasks.printer.studies.detector.score import MIN_RECORDED_SCORE,
 from regrasp.interfaces.printer.actions import CLASSES
 from regrasp.perception.printer.detector import BOX_MAPS, NETWORK_INPUT, NETWORK_SHAPE, decode, network_input
 
-# Of a section or finger that is mostly hidden a thin box is in sight.
-TRAINING = TrainingParameters(check_every=1000, overlap_weight=2.0)
+TRAINING = TrainingParameters(check_every=1000)
 NETWORK = NetworkParameters(inputs=12, classes=len(CLASSES), values=BOX_MAPS)
 
 
