@@ -21,6 +21,7 @@ _LEAVES: tuple[type[WithServices], ...] = (
     door.GripHandle,
     door.LookAtHandle,
     desk.LookAtPlace,
+    desk.WatchPart,
     door.RailToHandle,
     door.ReachHandle,
     door.SlideDoor,

@@ -1,4 +1,4 @@
-"""Whether there is room on the desk for what the hand holds."""
+"""What the hand's camera sees on the desk: room for what the hand holds, and the part that it let go."""
 
 import math
 from collections.abc import Generator
@@ -12,6 +12,7 @@ from regrasp.interfaces.printer.cause import PrinterCause
 
 if TYPE_CHECKING:
     from regrasp.interfaces.cell import Box
+    from regrasp.interfaces.printer.cell import PrinterKnown
 
 
 class LookAtPlace(PrinterLeaf):
@@ -23,7 +24,6 @@ class LookAtPlace(PrinterLeaf):
 
     least_points = 300  # that must show the place; choice: a free one has 1000
     least_above = 20  # of them that make a thing; choice: a cube of 3 cm has 150
-    rim = 0.02  # m of the tray's edges that do not count: its walls, 1 cm thick, by camera and arm 5 mm off; choice
 
     INPUT_PORTS: ClassVar[dict[str, Any]] = {
         "place": LeafPort(data_type=str, names="place", description="clamp or tray"),
@@ -67,15 +67,80 @@ class LookAtPlace(PrinterLeaf):
         from regrasp.interfaces.cell import Box  # late: a tree's check needs no scipy
 
         printer = self.services.known.printer
+        if name == "tray":
+            return tray_room(self.services.known)
         tall = printer.part.size[2] + printer.plate.size[2]
-        if name == "clamp":
-            x, y, z = printer.clamp.center
-            return Box(
-                name=name,
-                center=(x, y, z + 0.5 * (tall - printer.plate.size[2])),
-                size=(*printer.plate.size[:2], tall),
-            )
-        tray = next(box for box in self.services.known.boxes if box.name == "tray")
-        (x, y, z), (length, width, thickness) = tray.center, tray.size
-        size = (length - 2.0 * self.rim, width - 2.0 * self.rim, tall)
-        return Box(name=name, center=(x, y, z + 0.5 * (thickness + tall)), size=size)
+        x, y, z = printer.clamp.center
+        return Box(
+            name=name, center=(x, y, z + 0.5 * (tall - printer.plate.size[2])), size=(*printer.plate.size[:2], tall)
+        )
+
+
+def tray_room(known: "PrinterKnown", rim: float = 0.02) -> "Box":
+    """The room in the tray that the part shall take up.
+
+    `rim` m of the tray's edges do not count: its walls, 1 cm thick, by a camera and an arm that are 5 mm off.
+    """
+    from regrasp.interfaces.cell import Box  # late: a tree's check needs no scipy
+
+    tray = next(box for box in known.boxes if box.name == "tray")
+    (x, y, z), (length, width, thickness) = tray.center, tray.size
+    tall = known.printer.part.size[2] + known.printer.plate.size[2]
+    size = (length - 2.0 * rim, width - 2.0 * rim, tall)
+    return Box(name="tray", center=(x, y, z + 0.5 * (thickness + tall)), size=size)
+
+
+class WatchPart(PrinterLeaf):
+    """Watches the part that the hand has let go over the tray; fails if it drifts, or is not there.
+
+    A part that has fallen over may hide its section; then something must rise from the tray's floor.
+    """
+
+    settle = 1.0  # s that the camera's place on the hand takes to be measured; choice: then a part at rest seems to
+    # move with 0.02 mm/s, before with 0.4
+    most_drift = 0.0005  # m/s; choice: closing the door takes 30 s, in which a faster one leaves the tray
+    least_estimates = 5  # of its place; choice
+    least_above = 60  # points of a part that has fallen over; choice
+
+    INPUT_PORTS: ClassVar[dict[str, Any]] = {
+        "seconds": LeafPort(
+            data_type=float, required=False, default_value=2.5, above=1.5, description="simulated seconds of looking"
+        )
+    }
+
+    def steps(self) -> LeafSteps:
+        """See the class."""
+        from regrasp.perception.printer.part_track import line_through  # late: a tree's check needs no numpy
+
+        services, begin, seen = self.services, self.services.clock.now(), {}
+        tracker = services.perception.part_tracker(
+            services.motion.tool_at, lambda: services.gripper.state().gap, begin, self.say
+        )
+        while services.clock.now() < begin + self.get_input("seconds"):
+            estimate = tracker.update()
+            if estimate is not None and estimate.stamp > begin + self.settle:
+                seen[estimate.stamp] = estimate
+            yield None
+        if tracker.trouble is not None:
+            raise LeafFailed(CauseCode.CAMERA_FAILED, f"the part in the tray was not seen: {tracker.trouble}")
+        if len(seen) < self.least_estimates:
+            self._something_there(begin, tracker.why)
+            return
+        place, velocity = line_through([*seen.values()])
+        speed = sum(v * v for v in velocity) ** 0.5
+        self.say("watched the part", place=[round(x, 4) for x in place], speed=round(speed, 5))
+        room = tray_room(services.known, rim=0.0)
+        if any(abs(x - c) > 0.5 * size for x, c, size in zip(place, room.center, room.size, strict=True)):
+            at = ", ".join(f"{x:.3f}" for x in place)
+            raise LeafFailed(PrinterCause.PART_ADRIFT, f"the part's section is at ({at}) m, which is not in the tray")
+        if speed > self.most_drift:
+            raise LeafFailed(PrinterCause.PART_ADRIFT, f"the part drifts in the tray with {1e3 * speed:.1f} mm/s")
+
+    def _something_there(self, since: float, why: str) -> None:
+        """Raise LeafFailed if nothing rises from the tray's floor."""
+        view = self.services.perception.see_place(
+            self.services.known.printer.camera, since, tray_room(self.services.known)
+        )
+        self.say("watched the tray", points=view and view.points, above=view and view.above)
+        if view is None or view.above < self.least_above:
+            raise LeafFailed(PrinterCause.TARGET_NOT_SEEN, f"the part in the tray was not seen: {why}")

@@ -1,6 +1,6 @@
 """Follows the printed part's gripping section with the hand's camera, whether it stands or drifts."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -150,3 +150,14 @@ class PartTracker:
             float(np.sqrt(self._covariance[0, 0])),
             float(np.sqrt(self._yaw_variance)),
         )
+
+
+def line_through(estimates: Sequence[TargetEstimate]) -> tuple[list[float], list[float]]:
+    """Place (3,) m and velocity (3,) m/s of a target that moves evenly, by estimates of it at two times or more.
+
+    Least squares through all places; the place is that at the last estimate's time.
+    """
+    stamps = np.array([estimate.stamp for estimate in estimates])
+    places = np.array([estimate.pose[:3, 3] for estimate in estimates])
+    velocity, place = np.polyfit(stamps - stamps[-1], places, 1)
+    return place.tolist(), velocity.tolist()

@@ -54,6 +54,7 @@ SLOW = {
         "cable_snags",
         "camera_freezes",
         "camera_dark_for_good",
+        "part_drifts",
         "part_slips",
         "plate_sticks",
         "plate_sticks_for_good",

@@ -11,8 +11,9 @@ from regrasp.app.files.resources import shipped
 from regrasp.app.scenario.cell_file import load_cell
 from regrasp.app.tasks.printer.studies.hand_placed import HandPlaced
 from regrasp.interfaces.printer.cell import PrinterCell
+from regrasp.interfaces.printer.target import TargetEstimate
 from regrasp.perception.printer.hand_view import HandView, Pads
-from regrasp.perception.printer.part_track import PartTracker
+from regrasp.perception.printer.part_track import PartTracker, line_through
 from regrasp.perception.printer.section_view import NoSection, SectionSighting, SectionView
 
 
@@ -179,3 +180,15 @@ def test_a_part_that_goes_fast_is_known_to_go_fast(hand: HandPlaced) -> None:
         assert seen is not None
         speeds.append(float(np.linalg.norm(seen.velocity)))
     assert max(speeds) == pytest.approx(0.3, abs=0.08)
+
+
+def test_a_line_through_estimates_gives_place_and_velocity() -> None:
+    noise = np.random.default_rng(1).normal(0.0, 1e-4, (30, 3))
+    estimates = []
+    for stamp, off in zip(np.arange(30) / 20.0, noise, strict=True):
+        pose = np.eye(4)
+        pose[:3, 3] = np.add([0.1, 0.2, 0.3 + 0.002 * stamp], off)
+        estimates.append(TargetEstimate(float(stamp), pose, np.zeros(3), 1e-3, 1e-2))
+    place, velocity = line_through(estimates)
+    assert place == pytest.approx([0.1, 0.2, 0.3029], abs=2e-4)
+    assert velocity == pytest.approx([0.0, 0.0, 0.002], abs=2e-4)
