@@ -91,9 +91,10 @@ def tray_room(known: "PrinterKnown", rim: float = 0.02) -> "Box":
 
 
 class WatchPart(PrinterLeaf):
-    """Watches the part that the hand has let go over the tray; fails if it drifts, or is not there.
+    """Watches the part that the hand has let go over the tray; fails if it floats away, or is not there.
 
-    A part that has fallen over may hide its section; then something must rise from the tray's floor.
+    Where there is gravity a part that lies in the tray stays there. One that has fallen over may hide its section; then
+    something must rise from the tray's floor.
     """
 
     settle = 1.0  # s that the camera's place on the hand takes to be measured; choice: then a part at rest seems to
@@ -133,7 +134,7 @@ class WatchPart(PrinterLeaf):
         if any(abs(x - c) > 0.5 * size for x, c, size in zip(place, room.center, room.size, strict=True)):
             at = ", ".join(f"{x:.3f}" for x in place)
             raise LeafFailed(PrinterCause.PART_ADRIFT, f"the part's section is at ({at}) m, which is not in the tray")
-        if speed > self.most_drift:
+        if speed > self.most_drift and services.motion.floats(self.hand):
             raise LeafFailed(PrinterCause.PART_ADRIFT, f"the part drifts in the tray with {1e3 * speed:.1f} mm/s")
 
     def _something_there(self, since: float, why: str) -> None:

@@ -137,6 +137,10 @@ class PrinterMotionService(MotionService, Protocol):
         """Close the jaw on the section between the pads; the part then counts as held. The answer is the gap (m)."""
         ...
 
+    def floats(self, arm: str) -> bool:
+        """Whether what the hand lets go floats: there is no gravity."""
+        ...
+
     def release_part(self, arm: str, gap: float) -> Request[None]:
         """Open the jaw softly to `gap` m; what the hand held then counts as lying where it is."""
         ...

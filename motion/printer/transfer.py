@@ -137,6 +137,10 @@ class TransferMotion(PrinterMotion):
 
         return self._together(arm, steps())
 
+    def floats(self, arm: str) -> bool:
+        """Whether what the hand lets go floats: there is no gravity."""
+        return float(np.linalg.norm(self.arms[arm].gravity())) < self.parameters.no_gravity
+
     def release_part(self, arm: str, gap: float) -> Request[None]:
         """Open the jaw to `gap` m; what it held then counts as lying where it is.
 
@@ -147,7 +151,7 @@ class TransferMotion(PrinterMotion):
         not_negative("the gap", gap)
 
         def steps() -> Iterator[None]:
-            if float(np.linalg.norm(self.arms[arm].gravity())) < values.no_gravity:
+            if self.floats(arm):
                 yield from self.execution.press_jaw(arm, values.soft_force)
                 for wider in values.opening_steps:
                     yield from self.execution.set_jaw(arm, min(thickness + wider, gap))

@@ -11,6 +11,7 @@ from regrasp.interfaces.robot import urdf
 from regrasp.interfaces.robot.parallel_jaw import ParallelJaw
 from regrasp.interfaces.robot.parts import Gripper, Pads, ParallelGripper
 from regrasp.interfaces.robot.robot import Robot
+from regrasp.sim.robot.merge import merge_fixed_links
 
 CAMERA_SIZE = (0.025, 0.090, 0.025)  # m; body of the D435i
 CAMERA_COLOR: Color = (0.75, 0.75, 0.75)
@@ -36,6 +37,9 @@ def robot_urdf(robot: Robot, camera_offset: tuple[float, float, float] | None) -
         _add_pads(root, robot.gripper.pads, robot.parallel_jaw)
     if camera_offset is not None:
         _add_camera(root, robot, camera_offset)
+    # what the world asks for by its name, and what takes its colour from its link
+    named = {robot.tool.link, *pad_links(robot.gripper), *robot.untouchable, "camera_body"}
+    merge_fixed_links(root, named if robot.mount is None else {*named, robot.mount.link})
     ET.indent(root)
     return ET.tostring(root, encoding="unicode")
 
