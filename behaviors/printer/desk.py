@@ -100,6 +100,9 @@ class WatchPart(PrinterLeaf):
     settle = 1.0  # s that the camera's place on the hand takes to be measured; choice: then a part at rest seems to
     # move with 0.02 mm/s, before with 0.4
     most_drift = 0.0005  # m/s; choice: closing the door takes 30 s, in which a faster one leaves the tray
+    slack = (
+        0.02  # m that a section may seem higher or lower: camera and arm are up to 8 mm off, and a part may be tilted
+    )
     least_estimates = 5  # of its place; choice
     least_above = 60  # points of a part that has fallen over; choice
 
@@ -131,7 +134,8 @@ class WatchPart(PrinterLeaf):
         speed = sum(v * v for v in velocity) ** 0.5
         self.say("watched the part", place=[round(x, 4) for x in place], speed=round(speed, 5))
         room = tray_room(services.known, rim=0.0)
-        if any(abs(x - c) > 0.5 * size for x, c, size in zip(place, room.center, room.size, strict=True)):
+        sizes = *room.size[:2], room.size[2] + 2.0 * self.slack
+        if any(abs(x - c) > 0.5 * size for x, c, size in zip(place, room.center, sizes, strict=True)):
             at = ", ".join(f"{x:.3f}" for x in place)
             raise LeafFailed(PrinterCause.PART_ADRIFT, f"the part's section is at ({at}) m, which is not in the tray")
         if speed > self.most_drift and services.motion.floats(self.hand):
