@@ -1,6 +1,7 @@
 """Loads a robot into PyBullet."""
 
 import tempfile
+import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +9,7 @@ import pybullet as p
 from scipy.spatial.transform import RigidTransform
 
 from regrasp.interfaces.robot.robot import Robot
+from regrasp.sim.robot.convex import split_concave
 from regrasp.sim.robot.model import robot_urdf
 
 
@@ -23,8 +25,9 @@ def load_robot_body(
     if not np.array_equal(root_from_base, np.eye(4)):
         root = world_from_base * RigidTransform.from_matrix(root_from_base).inv()
     with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "robot.urdf"
-        path.write_text(robot_urdf(robot, camera_offset), encoding="utf-8")
+        path, urdf = Path(folder) / "robot.urdf", ET.fromstring(robot_urdf(robot, camera_offset))
+        split_concave(urdf, Path(folder))
+        path.write_text(ET.tostring(urdf, encoding="unicode"), encoding="utf-8")
         body = p.loadURDF(
             str(path),
             root.translation.tolist(),

@@ -1,0 +1,62 @@
+"""Collision meshes that are concave are cut into convex pieces for PyBullet."""
+
+import xml.etree.ElementTree as ET
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+
+from regrasp.sim.robot.convex import convex_pieces, split_concave
+
+MESH = '<geometry><mesh filename="{}" scale="{}" /></geometry>'
+URDF = f'<robot name="one"><link name="body"><collision>{MESH}</collision></link></robot>'
+
+
+@pytest.fixture
+def angle(tmp_path: Path) -> Path:
+    """An L of two bars of 0.2 x 0.04 x 0.04 m: one along z, and one from its foot along x."""
+    bars = [
+        trimesh.creation.box((0.04, 0.04, 0.2), trimesh.transformations.translation_matrix((0.0, 0.0, 0.1))),
+        trimesh.creation.box((0.16, 0.04, 0.04), trimesh.transformations.translation_matrix((0.10, 0.0, 0.02))),
+    ]
+    path = tmp_path / "angle.obj"
+    trimesh.util.concatenate(bars).export(path)
+    return path
+
+
+def outside(piece: trimesh.Trimesh, points: Any) -> Any:
+    """How far (n,) m points are out of a convex mesh, by the planes of its faces; below 0 within."""
+    off = np.asarray(points)[:, None] - piece.triangles[None, :, 0]
+    return np.einsum("nfi,fi->nf", off, piece.face_normals).max(axis=1)
+
+
+def test_the_pieces_of_an_angle_leave_its_inside_free(angle: Path) -> None:
+    pieces = convex_pieces(str(angle), (1.0, 1.0, 1.0))
+    whole = trimesh.load(angle, force="mesh")
+    assert len(pieces) > 1
+    assert sum(piece.volume for piece in pieces) < 0.75 * whole.convex_hull.volume
+    assert min(outside(piece, [[0.12, 0.0, 0.08]])[0] for piece in pieces) > 0.03
+    covered = np.min([outside(piece, whole.vertices) for piece in pieces], axis=0)
+    assert covered.max() < 1e-9  # no corner of the mesh is left out
+
+
+def test_a_convex_mesh_stays_one_piece_and_its_file(tmp_path: Path) -> None:
+    path = tmp_path / "ball.obj"
+    trimesh.creation.icosphere(radius=0.1).export(path)
+    assert len(convex_pieces(str(path), (1.0, 1.0, 2.0))) == 1
+    text = URDF.format(path, "1 1 1")
+    root = ET.fromstring(text)
+    split_concave(root, tmp_path)
+    assert ET.tostring(root, encoding="unicode") == text
+
+
+def test_a_concave_mesh_is_replaced_by_a_file_of_its_pieces_in_its_scale(angle: Path, tmp_path: Path) -> None:
+    root = ET.fromstring(URDF.format(angle, "2 2 2"))
+    split_concave(root, tmp_path)
+    mesh = root.find("link/collision/geometry/mesh")
+    assert mesh is not None
+    assert mesh.get("scale") == "1.0 1.0 1.0"
+    made = trimesh.load(str(mesh.get("filename")), force="mesh")
+    assert np.ptp(made.vertices, axis=0) == pytest.approx([0.4, 0.08, 0.4])
