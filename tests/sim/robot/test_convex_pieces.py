@@ -1,6 +1,7 @@
 """Collision meshes that are concave are cut into convex pieces for PyBullet."""
 
 import xml.etree.ElementTree as ET
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -8,6 +9,10 @@ import numpy as np
 import pytest
 import trimesh
 
+from regrasp.app.files.resources import shipped
+from regrasp.app.scenario.cell_file import load_cell
+from regrasp.interfaces.robot.robot import Robot
+from regrasp.interfaces.robot.urdf import pose_of
 from regrasp.sim.robot.convex import convex_pieces, split_concave
 
 MESH = '<geometry><mesh filename="{}" scale="{}" /></geometry>'
@@ -60,3 +65,38 @@ def test_a_concave_mesh_is_replaced_by_a_file_of_its_pieces_in_its_scale(angle: 
     assert mesh.get("scale") == "1.0 1.0 1.0"
     made = trimesh.load(str(mesh.get("filename")), force="mesh")
     assert np.ptp(made.vertices, axis=0) == pytest.approx([0.4, 0.08, 0.4])
+
+
+@pytest.mark.parametrize(("cell", "arm"), [("thesis", "left"), ("habitat", "arm")])
+def test_planning_knows_of_all_that_an_arm_touches_with(cell: str, arm: str) -> None:
+    """The corners of what PyBullet collides with lie in the spheres that planning takes for the arm, to 7 mm."""
+    robot = load_cell(shipped("cell")[cell]).known.arm(arm).robot
+    tree = robot.tree
+    spheres = np.vstack([[(*tree.frame(link) @ (x, y, z, 1.0), r)] for link, (x, y, z, r) in every_sphere(robot)])
+    for link in robot.element().findall("link"):
+        name = str(link.get("name"))
+        if name in robot.spheres and name not in robot.still:
+            for points in (tree.frame(name) @ corners for corners in corners_of(link)):
+                off = np.linalg.norm(points[:3].T[:, None] - spheres[:, :3], axis=2) - spheres[:, 4]
+                assert off.min(axis=1).max() < 0.007, name
+
+
+def every_sphere(robot: Robot) -> Iterator[tuple[str, Any]]:
+    for link, spheres in robot.spheres.items():
+        yield from ((link, sphere) for sphere in spheres)
+
+
+def corners_of(link: ET.Element) -> Iterator[Any]:
+    """The corners (4, n) of a link's convex pieces, in its frame; the last row is 1."""
+    for collision in link.findall("collision"):
+        mesh, origin = collision.find("geometry/mesh"), collision.find("origin")
+        if mesh is None:
+            continue
+        pose = np.eye(4)
+        if origin is not None:
+            x, y, z = map(float, origin.get("xyz", "0 0 0").split())
+            roll, pitch, yaw = map(float, origin.get("rpy", "0 0 0").split())
+            pose = pose_of((x, y, z), (roll, pitch, yaw))
+        a, b, c = map(float, mesh.get("scale", "1 1 1").split())
+        for piece in convex_pieces(str(mesh.get("filename")), (a, b, c)):
+            yield pose @ np.column_stack([piece.vertices, np.ones(len(piece.vertices))]).T
