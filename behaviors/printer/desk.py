@@ -100,9 +100,7 @@ class WatchPart(PrinterLeaf):
     settle = 1.0  # s that the camera's place on the hand takes to be measured; choice: then a part at rest seems to
     # move with 0.02 mm/s, before with 0.4
     most_drift = 0.0005  # m/s; choice: closing the door takes 30 s, in which a faster one leaves the tray
-    slack = (
-        0.02  # m that a section may seem higher or lower: camera and arm are up to 8 mm off, and a part may be tilted
-    )
+    slack = 0.02  # m that a section may seem higher or lower: camera and arm are up to 8 mm off, and it may be tilted
     least_estimates = 5  # of its place; choice
     least_above = 60  # points of a part that has fallen over; choice
 

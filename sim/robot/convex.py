@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
+from scipy.spatial import QhullError
 
 from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.robot import urdf
@@ -44,15 +45,29 @@ def split_concave(root: ET.Element, folder: Path, parameters: ConvexPieceParamet
 def convex_pieces(
     file: str, scale: tuple[float, float, float], parameters: ConvexPieceParameters = ConvexPieceParameters()
 ) -> tuple[trimesh.Trimesh, ...]:
-    """The hulls of the slabs of a mesh, cut across its longest axis; neighbours that are as good as convex are one."""
-    mesh = trimesh.load(file, force="mesh")
+    """The hulls of the slabs of a mesh, cut across its longest axis; neighbours that are as good as convex are one.
+
+    None of a sheet, and where trimesh cannot read the file: then the mesh stays what PyBullet takes it for.
+    """
+    try:
+        return tuple(_pieces(trimesh.load(file, force="mesh"), scale, parameters))
+    except (ImportError, ValueError, QhullError):
+        return ()
+
+
+def _pieces(
+    mesh: trimesh.Trimesh, scale: tuple[float, float, float], parameters: ConvexPieceParameters
+) -> list[trimesh.Trimesh]:
     vertices = np.asarray(mesh.vertices) * np.array(scale)
     edges = np.asarray(mesh.edges_unique)
-    along = int(np.argmax(np.ptp(vertices, axis=0)))
+    spans = np.ptp(vertices, axis=0)
+    if spans.min() < 1e-6 * spans.max():
+        return []  # a sheet
+    along = int(np.argmax(spans))
     low, high = vertices[:, along].min(), vertices[:, along].max()
     cuts = np.linspace(low, high, max(round((high - low) / parameters.slab), 1) + 1)
     slabs = [_slab(vertices, edges, along, a, b) for a, b in pairwise(cuts)]
-    pieces = [trimesh.convex.convex_hull(slab) for slab in slabs]
+    pieces = [trimesh.convex.convex_hull(slab) for slab in slabs if len(slab)]  # a mesh may have a gap
     i = 0
     while i + 1 < len(pieces):
         both = trimesh.convex.convex_hull(np.vstack([piece.vertices for piece in pieces[i : i + 2]]))
@@ -60,7 +75,7 @@ def convex_pieces(
             pieces[i : i + 2] = [both]
         else:
             i += 1
-    return tuple(pieces)
+    return pieces
 
 
 def _slab(vertices: FloatArray, edges: FloatArray, along: int, low: float, high: float) -> FloatArray:

@@ -40,7 +40,7 @@ def _add_mass(link: ET.Element, other: ET.Element, link_from_other: FloatArray) 
     """
     parts = _mass(link, np.eye(4)), _mass(other, link_from_other)
     mass = parts[0][0] + parts[1][0]
-    center = (parts[0][0] * parts[0][1] + parts[1][0] * parts[1][1]) / mass
+    center = (parts[0][0] * parts[0][1] + parts[1][0] * parts[1][1]) / mass if mass > 0.0 else parts[0][1]
     about = np.zeros((3, 3))
     for m, c, inertia in parts:
         off = c - center

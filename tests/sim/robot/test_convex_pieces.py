@@ -57,6 +57,25 @@ def test_a_convex_mesh_stays_one_piece_and_its_file(tmp_path: Path) -> None:
     assert ET.tostring(root, encoding="unicode") == text
 
 
+def test_parts_with_a_gap_between_are_a_piece_each(tmp_path: Path) -> None:
+    ends = [
+        trimesh.creation.box((0.04, 0.04, 0.04), trimesh.transformations.translation_matrix((x, 0.0, 0.0)))
+        for x in (0.0, 0.3)
+    ]
+    path = tmp_path / "ends.obj"
+    trimesh.util.concatenate(ends).export(path)
+    pieces = convex_pieces(str(path), (1.0, 1.0, 1.0))
+    assert [piece.volume for piece in pieces] == pytest.approx([0.04**3, 0.04**3])
+
+
+def test_a_sheet_and_a_file_that_is_no_mesh_are_left_as_they_are(tmp_path: Path) -> None:
+    sheet, other = tmp_path / "sheet.obj", tmp_path / "other.obj"
+    sheet.write_text("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 1 3 4\n")
+    other.write_text("nothing")
+    for path in (sheet, other, tmp_path / "scene.dae"):
+        assert convex_pieces(str(path), (1.0, 1.0, 1.0)) == ()
+
+
 def test_a_concave_mesh_is_replaced_by_a_file_of_its_pieces_in_its_scale(angle: Path, tmp_path: Path) -> None:
     root = ET.fromstring(URDF.format(angle, "2 2 2"))
     split_concave(root, tmp_path)

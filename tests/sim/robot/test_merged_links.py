@@ -55,3 +55,11 @@ def test_a_link_that_is_asked_for_by_name_is_kept() -> None:
     root = ET.fromstring(BAR)
     merge_fixed_links(root, keep={"far"})
     assert [link.get("name") for link in root.findall("link")] == ["near", "far", "hand"]
+
+
+def test_links_without_mass_are_merged_too() -> None:
+    root = ET.fromstring(BAR.replace('<mass value="1"/>', '<mass value="0"/>'))
+    merge_fixed_links(root, keep=())
+    origin = root.find("link/inertial/origin")
+    assert origin is not None
+    assert [float(x) for x in origin.get("xyz", "").split()] == pytest.approx([0.1, 0.0, 0.0])
