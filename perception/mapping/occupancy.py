@@ -73,8 +73,8 @@ class Occupancy:
         """The region is in the world frame. `known` boxes and the `spared` do not count."""
         size, lower, upper = region.voxel, np.array(region.lower), np.array(region.upper)
         counts = np.ceil((upper - lower) / size - 1e-9).astype(int)
-        grid = np.moveaxis(np.indices(tuple(counts)), 0, -1).reshape(-1, 3)
-        centers = lower + (grid + 0.5) * size
+        along = [low + (np.arange(count) + 0.5) * size for low, count in zip(lower, counts, strict=True)]
+        centers = np.stack(np.meshgrid(*along, indexing="ij"), axis=-1).reshape(-1, 3)
         self.voxel_size = size
         self._known, self._parameters = known, parameters
         self._centers = np.ascontiguousarray(centers[~near_boxes(centers, known, parameters.known_margin)])

@@ -58,11 +58,15 @@ def convex_pieces(
 def _pieces(
     mesh: trimesh.Trimesh, scale: tuple[float, float, float], parameters: ConvexPieceParameters
 ) -> list[trimesh.Trimesh]:
+    mesh.merge_vertices(merge_tex=True, merge_norm=True)
     vertices = np.asarray(mesh.vertices) * np.array(scale)
     edges = np.asarray(mesh.edges_unique)
     spans = np.ptp(vertices, axis=0)
     if spans.min() < 1e-6 * spans.max():
         return []  # a sheet
+    hull = trimesh.convex.convex_hull(vertices)
+    if mesh.is_watertight and hull.volume <= parameters.alike * mesh.volume * abs(np.prod(scale)):
+        return [hull]
     along = int(np.argmax(spans))
     low, high = vertices[:, along].min(), vertices[:, along].max()
     cuts = np.linspace(low, high, max(round((high - low) / parameters.slab), 1) + 1)
