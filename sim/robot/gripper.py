@@ -30,9 +30,9 @@ class GripperParameters:
     # kg m2 of each bar of a linkage, for the drive's inertia as its gearing reflects it. Choice: with the bars' own, a
     # millionth, PyBullet's solver lets the fingers give by 0.1 rad at 40 N.
     linkage_inertia: float = 5e-4
-    # Times its speed that a linkage's drive is told while it is blocked: it presses with its force then, whatever its speed
-    # is, but in an iteration PyBullet's solver gives it the momentum of that speed at most. With 45 iterations a part that
-    # is pressed with 40 N sinks in by 1.3 mm in 0.8 s at its own speed, and by 0.2 mm at three times that.
+    # Times its speed that a linkage's drive is told while it is blocked. It presses with its force then, whatever its
+    # speed is; but an iteration of PyBullet's solver gives it the momentum of that speed at most. With 45 iterations a
+    # part pressed with 40 N sinks in by 1.3 mm in 0.8 s at its own speed, and by 0.2 mm at three times that.
     blocked_speed: float = 3.0
     slow: float = 0.2  # of its speed, below which a jaw that closes is blocked; choice
     blocked_samples: int = 5  # of the encoder, in which it is slow: then it is blocked; choice
