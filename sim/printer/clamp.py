@@ -20,8 +20,8 @@ class SimClamp:
     ) -> None:
         """The gear bears `gear_force` N: choice, far more than the jaws press with.
 
-        Each jaw weighs `jaw_mass` kg, with the inertia of its screw. Choice: an iteration of PyBullet's solver gives a jaw
-        the momentum of its speed at most. Jaws of 0.2 kg need 70 iterations until they press with their force.
+        Each jaw weighs `jaw_mass` kg, with the inertia of its screw. Choice: an iteration of PyBullet's solver gives a
+        jaw the momentum of its speed at most. Jaws of 0.2 kg need 70 iterations until they press with their force.
         """
         self._client, self._hidden = client, hidden
         clamp, plate = known.clamp, known.plate
