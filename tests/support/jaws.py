@@ -6,7 +6,6 @@ import numpy as np
 import pybullet as p
 import pytest
 
-from regrasp.interfaces.cable.cell import CableCell
 from regrasp.interfaces.cell import ArmSpec, Cell, KnownCell
 from regrasp.interfaces.hidden_world import GripperSpec
 from regrasp.interfaces.robot.robot import Robot
@@ -17,7 +16,7 @@ GAP = 0.001  # m that a jaw may miss a gap by
 THICKNESS = 0.03  # m of what is held
 
 
-def lone_arm(cell: CableCell, client: int, robot: Robot, sleep: Sequence[float]) -> SimArm:
+def lone_arm(cell: Cell, client: int, robot: Robot, sleep: Sequence[float]) -> SimArm:
     """The robot at the origin, asleep, with its own gripper."""
     spec = ArmSpec(name="one", robot=robot, base=(0.0, 0.0, 0.0), sleep=tuple(sleep))
     known = KnownCell(boxes=(), arms=(spec,), cameras=(), latencies=cell.known.latencies)

@@ -7,16 +7,19 @@ from jaws import THICKNESS, check_gaps, check_hold, lone_arm, run
 from robots import UR5E
 from scipy.spatial.transform import Rotation
 
+from regrasp.app.files.resources import shipped
+from regrasp.app.scenario.cell_file import load_cell
 from regrasp.interfaces.cable.cell import CableCell
 from regrasp.sim.robot.arm import SimArm
 
 STROKE = 0.085  # m, the maker's
 MASS = 0.2  # kg
+ASLEEP = (0.0, -1.57, 1.57, 0.0, 1.57, 0.0)
 
 
 @pytest.fixture
 def arm(cell: CableCell, client: int) -> SimArm:
-    return lone_arm(cell, client, UR5E, (0.0, -1.57, 1.57, 0.0, 1.57, 0.0))
+    return lone_arm(cell, client, UR5E, ASLEEP)
 
 
 def test_it_opens_to_the_makers_stroke_and_reads_what_it_is(arm: SimArm) -> None:
@@ -44,3 +47,36 @@ def test_it_presses_with_the_force_that_it_is_told_and_holds_a_block_by_friction
     else:
         solid = p.createCollisionShape(p.GEOM_CYLINDER, radius=half, height=0.04, physicsClientId=client)
     check_hold(arm, solid, MASS, force, opening=0.07)
+
+
+def block_in_jaw(arm: SimArm, force: float, seconds: float) -> int:
+    """A block of 0.1 kg that the jaw has pressed with `force` N for so long."""
+    half, client = THICKNESS / 2, arm.client
+    arm.gripper.open(0.07)
+    run(arm, 2.0)
+    tool = arm.tool_pose()
+    solid = p.createCollisionShape(p.GEOM_BOX, halfExtents=[0.02, half, 0.02], physicsClientId=client)
+    at, turn = tool.translation.tolist(), tool.rotation.as_quat().tolist()
+    body = int(p.createMultiBody(0.1, solid, -1, at, turn, physicsClientId=client))
+    arm.gripper.close(force)
+    run(arm, seconds)
+    return body
+
+
+def test_what_it_presses_hardly_sinks_in_with_the_solver_of_the_printers_cell(client: int) -> None:
+    printer = load_cell(shipped("cell")["habitat"])
+    p.setTimeStep(1.0 / printer.hidden.step_rate, physicsClientId=client)
+    p.setPhysicsEngineParameter(numSolverIterations=printer.hidden.solver_iterations, physicsClientId=client)
+    arm = lone_arm(printer, client, UR5E, ASLEEP)
+    block_in_jaw(arm, 40.0, 3.0)
+    assert arm.gripper.true_gap() == pytest.approx(THICKNESS, abs=6e-4)
+
+
+def test_a_jaw_that_loses_what_it_held_closes_with_its_own_speed(arm: SimArm) -> None:
+    """It is told more speed while it is blocked, and until its encoder shows that it moves."""
+    body = block_in_jaw(arm, 40.0, 1.5)
+    p.removeBody(body, physicsClientId=arm.client)
+    run(arm, 0.05)
+    before = arm.gripper.true_gap()
+    run(arm, 0.05)
+    assert (before - arm.gripper.true_gap()) / 0.05 == pytest.approx(2 * arm.robot.gripper.speed, rel=0.05)
