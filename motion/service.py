@@ -155,7 +155,7 @@ class Motion(PlanningScene):
         """Bring an arm to its sleep pose, out of the cameras' and the other arms' way.
 
         `pulling`: it may have caught on something elastic. Where it feels a touch each time, it goes on as if it had,
-        slowly, and pulls that along.
+        slowly, and pulls that along; where it still feels one each time, it pulls as hard as at a plug in its socket.
         """
         goals = np.array([self.known.arm(arm).sleep])
         if not pulling:
@@ -168,7 +168,12 @@ class Motion(PlanningScene):
                 self._on_anomaly(f"{error}: something elastic may hold it")
                 self.forget_felt()
                 # What is felt from now on is that thing: no touch of it makes the arm more careful at the next.
-                yield from self._move_steps(arm, goals, contact=self._guard.pulling, felt=False)
+                try:
+                    yield from self._move_steps(arm, goals, contact=self._guard.pulling, felt=False)
+                except TouchError as held:
+                    self._on_anomaly(f"{held}: the arm pulls harder")
+                    self.forget_felt()
+                    yield from self._move_steps(arm, goals, contact=self._guard.drawing, felt=False)
 
         return self.execution.request(arm, steps())
 

@@ -99,6 +99,19 @@ def test_an_arm_that_pulls_something_elastic_and_falls_behind_is_blocked_but_in_
     assert not rig.motion.execution.held_back("right")
 
 
+def test_an_arm_that_touches_each_time_it_goes_to_sleep_pulls_harder(rig: Rig) -> None:
+    arm = rig.arms["right"]
+    arm.at = READY
+
+    def harder() -> bool:
+        return any("pulls harder" in remark for remark in rig.remarks)
+
+    arm.bumps += [lambda q: not harder() and float(np.abs(q - READY).max()) > 0.05] * 100
+    rig.run(rig.motion.sleep("right", pulling=True))
+    assert harder()
+    assert rig.motion.joints("right") == pytest.approx(rig.known.arm("right").sleep)
+
+
 def test_an_arm_that_fell_behind_once_is_slower_later_unless_it_pulled_something_elastic(known: CableKnown) -> None:
     later = {}
     for pulling in (True, False):
