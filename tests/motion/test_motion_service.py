@@ -103,12 +103,16 @@ def test_an_arm_that_touches_each_time_it_goes_to_sleep_pulls_harder(rig: Rig) -
     arm = rig.arms["right"]
     arm.at = READY
 
-    def harder() -> bool:
-        return any("pulls harder" in remark for remark in rig.remarks)
+    before = [0.0]  # how far (rad) it was from where it began at the last reading
 
-    arm.bumps += [lambda q: not harder() and float(np.abs(q - READY).max()) > 0.05] * 100
+    def held(q: Points) -> bool:
+        """Whether it goes further away from where it began, and pulls no harder yet."""
+        last, before[0] = before[0], float(np.abs(q - READY).max())
+        return before[0] > max(last, 0.05) and not any("pulls harder" in remark for remark in rig.remarks)
+
+    arm.bumps += [held] * 100
     rig.run(rig.motion.sleep("right", pulling=True))
-    assert harder()
+    assert any("pulls harder" in remark for remark in rig.remarks)
     assert rig.motion.joints("right") == pytest.approx(rig.known.arm("right").sleep)
 
 
