@@ -57,7 +57,7 @@ class LetGo(HandLeaf):
 class LookAtStow(LookLeaf):
     """Looks at the clip; FAILURE when the connector is not there, so that the tree can recover it.
 
-    The wrist camera looks when the rear one is not to be trusted, or sees a part of the connector elsewhere.
+    The wrist camera looks when the rear one is not to be trusted, sees no connector, or a part of it elsewhere.
     """
 
     READS: ClassVar[Keys] = (NOTICES,)
@@ -83,11 +83,12 @@ class LookAtStow(LookLeaf):
         seen, trouble = looked.estimates, perception.trouble(self.overview)
         if trouble is not None:
             seen = yield from self._look_from_the_other(trouble)
-        elif seen and not (seen[-1].whole or self.seated(seen[-1]).detected):
-            # What is half hidden may seem to lie elsewhere.
+        elif not seen or not (seen[-1].whole or self.seated(seen[-1]).detected):
+            # What is half hidden may seem to lie elsewhere, and what is hidden is not seen at all.
+            what = "the connector in part" if seen else "no connector"
             with suppress(LeafFailed):
-                other = yield from self._look_from_the_other(f"the {self.overview} camera sees the connector in part")
-                seen = [estimate for estimate in other if estimate.whole] or seen
+                other = yield from self._look_from_the_other(f"the {self.overview} camera sees {what}")
+                seen = [estimate for estimate in other if estimate.whole] or seen or other
         if not seen:
             self._lost(f"no camera sees the connector at {self.PLACE}")
         else:

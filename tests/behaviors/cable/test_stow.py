@@ -47,18 +47,18 @@ def test_an_end_that_is_not_there_is_noticed_once(stage: Stage, shows: object) -
     assert [cause.code for cause in stage.causes] == [CableCause.NOT_STOWED]
 
 
+@pytest.mark.parametrize("rear_sees", [0.06, None])
 @pytest.mark.parametrize(
     ("wrist_sees", "status"), [(0.0, Status.SUCCESS), (0.10, Status.FAILURE), (None, Status.FAILURE)]
 )
-def test_an_end_that_is_seen_elsewhere_but_in_part_is_looked_at_with_the_other_camera(
-    stage: Stage, wrist_sees: float | None, status: Status
+def test_an_end_that_is_seen_in_part_elsewhere_or_not_at_all_is_looked_at_with_the_other_camera(
+    stage: Stage, rear_sees: float | None, wrist_sees: float | None, status: Status
 ) -> None:
     seat = np.array(stage.known.cable.clip.seat)
 
     def shows(camera: str, t: float) -> Seen:
-        if camera == "rear":
-            return seen(t, np.add(seat, [0.0, 0.0, 0.06]), whole=False)
-        return unseen(t) if wrist_sees is None else seen(t, np.add(seat, [0.0, 0.0, wrist_sees]), camera)
+        above = rear_sees if camera == "rear" else wrist_sees
+        return unseen(t) if above is None else seen(t, np.add(seat, [0.0, 0.0, above]), camera, whole=camera != "rear")
 
     stage.perception.shows = shows
     assert stage.run(stage.tree(LOOK), 20.0) is status
