@@ -18,11 +18,12 @@ from regrasp.interfaces.printer.cell import PrinterKnown
 from regrasp.interfaces.printer.target import TargetTracker
 from regrasp.interfaces.quote import arm_words, near_words, nearest, quoted
 from regrasp.interfaces.request import Request
-from regrasp.motion.failure import NO_WAY, GraspEmptyError, PlanningError, TouchError
+from regrasp.motion.failure import NO_WAY, GraspEmptyError, PlanningError, StoppedShortError, TouchError
 from regrasp.motion.grasping.gap_test import GripWatch
 from regrasp.motion.printer.held_box import HeldBox
 from regrasp.motion.printer.servoing import Servo, ServoParameters
 from regrasp.motion.request import MotionRequest
+from regrasp.motion.robots.contact_guard import ContactLimits
 from regrasp.motion.robots.tool_force import tool_force
 from regrasp.motion.scene.collision import CollisionModel
 from regrasp.motion.service import Motion, MotionParameters
@@ -244,6 +245,30 @@ class PrinterMotion(Motion):
             if standoff:
                 displacement = goal.translation - self.tool(arm).translation
                 yield from self._done(self.shift(arm, displacement, without=spared))
+
+        return self._together(arm, steps())
+
+    def _shift(
+        self,
+        arm: str,
+        displacement: Sequence[float] | FloatArray,
+        checked: bool = True,
+        without: Collection[Box] = (),
+        held: FloatArray | None = None,
+        contact: ContactLimits | None = None,
+    ) -> MotionRequest:
+        """See `Motion`. A place that was felt and bars the line is forgotten: it is known to centimetres only."""
+
+        def shift() -> MotionRequest:
+            return super(PrinterMotion, self)._shift(arm, displacement, checked, without, held, contact)
+
+        def steps() -> Iterator[None]:
+            try:
+                yield from self._done(shift())
+            except PlanningError as error:
+                if isinstance(error, (TouchError, StoppedShortError)) or not self.forget_felt():
+                    raise
+                yield from self._done(shift())
 
         return self._together(arm, steps())
 

@@ -27,15 +27,10 @@ class GripperParameters:
     gear_force: float = 500.0  # N or N m, limit of the constraints that couple the fingers
     gear_error_reduction: float = 0.3  # share of the coupling's error that is corrected in a step
     linkage_error_reduction: float = 0.9  # the same of a linkage
-    # kg m2 of each bar of a linkage, for the drive's inertia as its gearing reflects it. Choice: with the bars' own, a
-    # millionth, PyBullet's solver lets the fingers give by 0.1 rad at 40 N.
-    linkage_inertia: float = 5e-4
-    # Times its speed that a linkage's drive is told while it is blocked. It presses with its force then, whatever its
-    # speed is; but an iteration of PyBullet's solver gives it the momentum of that speed at most. With 45 iterations a
-    # part pressed with 40 N sinks in by 1.3 mm in 0.8 s at its own speed, and by 0.2 mm at three times that.
-    blocked_speed: float = 3.0
-    slow: float = 0.2  # of its speed, below which a jaw that closes is blocked; choice
-    blocked_samples: int = 5  # of the encoder, in which it is slow: then it is blocked; choice
+    # kg m2 of each bar of a linkage, for the drive's inertia as its gearing reflects it; choice. An iteration of PyBullet's
+    # solver gives the drive the momentum of its speed at most: with a tenth of this the fingers give by millimetres at
+    # 40 N. With half of it a pad whose contact PyBullet loses for one step jumps by 2 mm, with this by 0.6.
+    linkage_inertia: float = 1e-3
     redriven: float = 1e-4  # m that a jaw moves before the torque of its drive is set anew
 
 
@@ -251,12 +246,6 @@ class SimLinkageGripper(SimGripper):
         states = p.getJointStates(self._body, self._drives, physicsClientId=self._client)
         return self._linkage.opening(sum(state[0] for state in states) / len(states))
 
-    def close(self, force: float) -> None:
-        """See `regrasp.interfaces.devices.Gripper`."""
-        if self._force is None:
-            self._slow_samples, self._blocked = 0, False
-        super().close(force)
-
     def place_at(self, gap: float) -> None:
         """See `SimGripper`."""
         for name, position in self._linkage.positions(gap).items():
@@ -264,16 +253,9 @@ class SimLinkageGripper(SimGripper):
 
     def sample(self) -> None:
         """See `SimGripper`; the torque for the present force depends on how far the jaw is open."""
-        before = self._gap
         super().sample()
-        if self._force is None or self._stuck or self._forced_open:
-            return
-        values = self._parameters
-        slow = values.slow * 2 * self._robot.gripper.speed / self._errors.finger_rate  # m in a sample
-        self._slow_samples = self._slow_samples + 1 if abs(self._gap - before) < slow else 0
-        blocked = self._slow_samples >= values.blocked_samples
-        if blocked != self._blocked or abs(self._gap - self._driven_gap) > values.redriven:
-            self._blocked = blocked
+        pressing = self._force is not None and not self._stuck and not self._forced_open
+        if pressing and abs(self._gap - self._driven_gap) > self._parameters.redriven:
             self._drive()
 
     @property
@@ -283,7 +265,7 @@ class SimLinkageGripper(SimGripper):
     def _build(self) -> None:
         gripper, joints = self._robot.gripper, self._place.joints
         assert isinstance(gripper, LinkageGripper)
-        self._slow_samples, self._blocked, self._driven_gap = 0, False, np.inf
+        self._driven_gap = np.inf
         tree, followers = self._robot.tree, self._linkage.followers
         # One joint a side is driven: the first on the way to its pad.
         sides = [next(joint.name for joint in tree.way_to(pad) if joint.name in followers) for pad in gripper.pads]
@@ -302,8 +284,6 @@ class SimLinkageGripper(SimGripper):
 
     def _drive_at(self, speed: float, force: float) -> None:
         slope, self._driven_gap = self._slope(), self._gap
-        if speed < 0.0 and self._blocked:
-            speed *= self._parameters.blocked_speed
         for joint in self._drives:
             p.setJointMotorControl2(
                 self._body,

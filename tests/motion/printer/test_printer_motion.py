@@ -15,6 +15,7 @@ from regrasp.interfaces.printer.cell import PrinterCell
 from regrasp.interfaces.request import Request
 from regrasp.motion.failure import PlanningError
 from regrasp.motion.printer.service import PrinterMotion
+from regrasp.motion.robots.contact_guard import Touch
 from regrasp.sim.printer.objects import PrinterObjects
 from regrasp.sim.world import World
 
@@ -65,6 +66,20 @@ def test_the_arm_keeps_clear_of_the_door_where_it_stands(rig: Rig) -> None:
     assert motion.model(ARM).nearest(q)[1] != "door_handle"
     motion.believe_door(0.43)
     assert motion.model(ARM).nearest(q)[1] == "door_handle"
+
+
+def test_a_place_that_was_felt_and_bars_a_straight_line_is_forgotten(rig: Rig) -> None:
+    """A guard may have mistaken a jerk for a touch. If something is there, it is felt again."""
+    motion, down = rig.motion, np.array([0.0, 0.0, -0.1])
+    rig.run(motion.shift(ARM, down))
+    below = motion.joints(ARM)
+    rig.run(motion.shift(ARM, -down))
+    efforts = np.array([0.0, 0.0, 0.0, 5.0, 0.0, 0.0, 0.0])
+    motion.feel(ARM, Touch(rig.world.now(), below, 10.0 * (below - motion.joints(ARM)), efforts))
+    before = motion.tool(ARM).translation
+    rig.run(motion.shift(ARM, down))
+    assert motion.tool(ARM).translation - before == pytest.approx(down, abs=3e-3)
+    assert not motion.forget_felt()
 
 
 def test_a_hand_that_takes_the_handle_gives_way_to_it_and_the_door_goes_along(rig: Rig) -> None:
