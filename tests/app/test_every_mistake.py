@@ -193,7 +193,7 @@ def test_without_mistakes_there_is_no_finding(folder: Path) -> None:
     assert with_mistakes(folder, []) == []
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.lists(st.sampled_from(MISTAKES), min_size=1, max_size=12, unique_by=lambda m: m.right))
 def test_each_mistake_is_one_finding_beside_any_others(folder: Path, mistakes: list[Mistake]) -> None:
     hidden = [wrong for m in mistakes for wrong in HIDDEN_BY.get(m.wrong, [])]

@@ -48,7 +48,7 @@ WORDS = {
 }
 
 
-@settings(max_examples=60)
+@settings(max_examples=30)
 @given(text=trees() | trees(KEYED), seeds=st.lists(st.integers(0, 2**32), min_size=3, max_size=3))
 def test_no_run_shows_what_a_finding_says_cannot_be(
     tmp_path_factory: pytest.TempPathFactory, text: str, seeds: list[int]

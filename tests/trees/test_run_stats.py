@@ -40,7 +40,7 @@ def ticked(root: py_trees.behaviour.Behaviour, ticks: int) -> tuple[Attempts, li
     return attempts, [(line["t"], line["path"], line["status"]) for line in lines]
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(text=trees())
 def test_the_ticks_of_any_tree_tell_its_attempts_and_one_count_of_visits(text: str) -> None:
     with tempfile.TemporaryDirectory() as folder:

@@ -1,5 +1,6 @@
 """The training of the detectors' networks, in torch."""
 
+import sys
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -9,6 +10,9 @@ import numpy as np
 import torch
 
 from regrasp.app.studies.detector.network import Network, Weights, load_weights
+
+# torch's optimizers load Triton, which nothing here uses. Loaded after Mesa's OpenGL it crashes the process.
+sys.modules.setdefault("triton", None)  # type: ignore[arg-type]
 
 Batch = tuple[torch.Tensor, torch.Tensor]  # inputs, and what is wanted of the network
 

@@ -189,7 +189,7 @@ def test_a_task_of_other_sources_is_refused() -> None:
 
 def test_killed_at_random_moments_every_run_is_there_once(tmp_path: Path) -> None:
     """Kills of the campaign or of one of its processes, as many as KILLS says; then one that may end."""
-    kills = int(os.environ.get("KILLS", "5"))
+    kills = int(os.environ.get("KILLS", "3"))
     draw, count, pids = random.Random(5), 7 * kills + 10, tmp_path / "pids"
     command = [sys.executable, str(PROGRAM), str(tmp_path / "c"), str(count), str(pids)]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}

@@ -278,7 +278,7 @@ _TOKENS = st.sampled_from(
 )  # fmt: skip
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     edits=st.lists(
         st.tuples(st.floats(0, 1), st.integers(0, 12), _TOKENS | st.text(max_size=5)), min_size=1, max_size=4
@@ -309,7 +309,7 @@ _PATHS = """gravity obstacles obstacles.0 obstacles.0.size obstacles.0.position.
 tree cell.known cell.known.cable.clip cell.known.cameras.0.mount cell.known.cable.sockets.0.axis cell.known.boxes.0"""
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(path=st.sampled_from(_PATHS.split()), value=_values)
 @example(path="cell.known.cable.sockets.0.axis", value=[1.0, 0, 0])
 @example(path="cell.known.cable.sockets.0.axis", value=[0, 0, -1.0])

@@ -1,3 +1,4 @@
+import functools
 import json
 from collections.abc import Iterator
 from importlib.resources import files
@@ -101,6 +102,7 @@ def test_the_reference_that_ships_is_what_the_command_prints(task: str, name: st
     assert CliRunner().invoke(app, ["scenarios", "schema", "--task", task, "--markdown"]).stdout == shipped
 
 
+@functools.cache
 def with_jsonschema(task: Task = TASK) -> Any:
     """A validator of the published schema, from a library that only this test would need."""
     return pytest.importorskip("jsonschema").Draft202012Validator(json_schema(task))
