@@ -106,11 +106,13 @@ class Servo:
             if plan is not None:
                 self._online.advance(now - planned)
                 self._joints, self._speeds = plan.sample(now - planned)
+            aim = self._aim(goal, tool())
             try:
-                samples = self._online.replan(self._aim(goal, tool()), seen.velocity)
-            except ValueError as error:
-                raise PlanningError(CauseCode.PLANNING_FAILED, str(error)) from error
-            plan, planned = self._trajectory(samples), now
+                plan = self._way(aim, seen.velocity)
+            except PlanningError:
+                # The velocity of a target that was just seen is known badly: it may lead on into something.
+                plan = self._way(aim, np.zeros(3))
+            planned = now
             yield plan
 
     def _goal(self, seen: TargetEstimate, now: float) -> FloatArray:
@@ -132,6 +134,13 @@ class Servo:
         aim = goal.copy()
         aim[:3, 3] -= min(values.funnel * beside, values.most_before) * goal[:3, 0]
         return aim
+
+    def _way(self, aim: FloatArray, drift: FloatArray) -> Trajectory:
+        """To a pose (4, 4) that drifts with (3,) m/s; raises PlanningError where the arm cannot go there."""
+        try:
+            return self._trajectory(self._online.replan(aim, drift))
+        except ValueError as error:
+            raise PlanningError(CauseCode.PLANNING_FAILED, str(error)) from error
 
     def _trajectory(self, samples: ToolSamples) -> Trajectory:
         """The joints along the tool's way. Raises PlanningError where the arm cannot follow or would meet something."""

@@ -13,6 +13,7 @@ from regrasp.behaviors.printer.approach import approach_steps
 from regrasp.interfaces.cause import CauseCode
 from regrasp.interfaces.printer.cause import PrinterCause
 from regrasp.interfaces.printer.cell import PrinterCell
+from regrasp.interfaces.printer.target import TargetEstimate
 from regrasp.interfaces.request import Request, RequestError
 from regrasp.motion.printer.servoing import ServoParameters
 
@@ -73,6 +74,29 @@ def test_a_way_that_is_closed_is_not_gone() -> None:
             served(hand)
         assert error.value.code == CauseCode.MOTION_BLOCKED
         assert not hand.world.contact_peaks
+
+
+class _Seen:
+    """A target that stands at a pose (4, 4) and is taken at first to fall."""
+
+    why, trouble = "", None
+
+    def __init__(self, hand: HandPlaced, pose: np.ndarray) -> None:
+        self._hand, self._pose, self._pictures = hand, pose, 0
+
+    def update(self) -> TargetEstimate:
+        self._pictures += 1
+        velocity = np.array([0.0, 0.0, -0.09 if self._pictures < 5 else 0.0])
+        return TargetEstimate(self._hand.world.now(), self._pose, velocity, 1e-4, 1e-3)
+
+
+def test_a_velocity_that_is_known_badly_at_first_does_not_bar_the_way() -> None:
+    """Where the target would be by its velocity the arm does not come."""
+    with placed() as hand:
+        motion: Any = hand.services.motion
+        before = RigidTransform.from_translation([0.12, 0.0, 0.0]) * hand.goal
+        finish(hand, motion.servo(hand.name, _Seen(hand, before.as_matrix()), 0.0))
+        assert motion.tool(hand.name).translation == pytest.approx(before.translation, abs=2e-3)
 
 
 def test_a_hand_that_does_not_come_to_rest_gives_up() -> None:
