@@ -85,8 +85,11 @@ class MoveHeld(PrinterLeaf):
     """Brings what the gripper holds straight on by `dx`, `dy`, `dz` m; it may touch the clamp and the tray."""
 
     INPUT_PORTS: ClassVar[dict[str, Any]] = {
-        name: LeafPort(data_type=float, required=False, default_value=0.0, description=f"m along {name[1]}")
-        for name in ("dx", "dy", "dz")
+        name: LeafPort(data_type=float, required=False, default_value=0.0, description=words)
+        for name, words in (
+            *((f"d{axis}", f"m along {axis}") for axis in "xyz"),
+            ("dz_floating", "m more along z where there is no gravity"),
+        )
     }
 
     def steps(self) -> LeafSteps:
@@ -94,6 +97,8 @@ class MoveHeld(PrinterLeaf):
         import numpy as np  # late: a tree's check needs no numpy
 
         way = np.array([self.get_input(name) for name in ("dx", "dy", "dz")])
+        if self.services.motion.floats(self.hand):
+            way[2] += self.get_input("dz_floating")
         yield self.with_arm(self.services.motion.move_held(self.hand, way, _CLAMP + _TRAY))
 
 
