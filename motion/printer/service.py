@@ -24,7 +24,7 @@ from regrasp.motion.printer.held_box import HeldBox
 from regrasp.motion.printer.servoing import Servo, ServoParameters
 from regrasp.motion.request import MotionRequest
 from regrasp.motion.robots.contact_guard import ContactLimits
-from regrasp.motion.robots.tool_force import tool_force
+from regrasp.motion.robots.tool_force import tool_force, tool_wrench
 from regrasp.motion.scene.collision import CollisionModel
 from regrasp.motion.service import Motion, MotionParameters
 
@@ -50,11 +50,13 @@ class PrinterMotionParameters(MotionParameters):
     give: float = 2e-5  # m that it gives way for each N across, and ...
     most_give: float = 0.001  # m at most at once; choice: the arm is off by 2 mm
     gives: int = 10  # times at most
+    relieved_moment: float = 0.08  # N m about the upright axis that may be left; choice: a bond bears 0.6
+    turn_give: float = 0.002  # rad that a hand turns at once; choice: pads stand up to half a degree askew
     give_time: float = 0.1  # s until the efforts are read again
     first_force: float = 8.0  # N a finger at first: the finger that comes first pushes a part whose bond bears a twist
     # of 0.6 N m, 25 mm off its axis; choice
     # N a finger. With 16 N the pads slide off the section of a plate that sticks with 15 N. With 26 N, pads half a
-    # degree askew twist a bond that bears 0.6 N m by 0.35 N m at most (seeds 701 to 726).
+    # degree askew twist a bond that bears 0.6 N m by 0.35 N m at most (seeds 701 to 726), until the hand gives way.
     part_force: float = 25.0
     twist_force: float = 40.0  # N a finger: pads 22 mm deep turn with 0.9 N m at most, and the bond bears 0.6; choice
     no_gravity: float = 0.5  # m/s2 below which what is let go floats
@@ -349,6 +351,7 @@ class PrinterMotion(Motion):
             way = self.tool(arm).rotation.apply([deeper, 0.0, 0.0])
             yield from self._done(self.shift(arm, way, without=self.things(PART_AND_BED)))
             yield from self._grip(arm, thickness, self.parameters.part_force)
+            yield from self._turn_way(arm)
             return self.grippers[arm].reading().gap
 
         return self._together(arm, steps())
@@ -414,9 +417,34 @@ class PrinterMotion(Motion):
                 break
             way = float(np.clip(values.give * force, -values.most_give, values.most_give))
             yield from self._done(self.shift(arm, [0.0, way, 0.0], checked=False))
-            end = self._clock.now() + values.give_time
-            while self._clock.now() < end - 1e-9:
-                yield
+            yield from self._wait(values.give_time)
+
+    def _turn_way(self, arm: str) -> Iterator[None]:
+        """Steps that turn the hand about the upright axis until hardly any moment is left.
+
+        Pads that are askew press with their edges, and twist the bond under what they hold.
+        """
+        values = self.parameters
+        for _ in range(values.gives):
+            tool = self.tool(arm)
+            moment = self._moment_about(arm, tool.translation)
+            if abs(moment) < values.relieved_moment:
+                break
+            turn = Rotation.from_rotvec([0.0, 0.0, np.copysign(values.turn_give, moment)])
+            goal = RigidTransform.from_components(tool.translation, turn * tool.rotation)
+            yield from self._done(self.straight(arm, goal, pressing=True))
+            yield from self._wait(values.give_time)
+
+    def _wait(self, seconds: float) -> Iterator[None]:
+        """Steps of so many seconds."""
+        end = self._clock.now() + seconds
+        while self._clock.now() < end - 1e-9:
+            yield
+
+    def _moment_about(self, arm: str, point: FloatArray) -> float:
+        """The moment (N m) about the upright axis through a point (3,) m on the hand of an arm that hardly moves."""
+        joints, efforts = self._outside_efforts(arm)
+        return float(tool_wrench(self.kinematics[arm], joints, efforts, point)[5])
 
     def _force_across(self, arm: str) -> float:
         """The force (N) along y on the hand of an arm at rest, by its drives' efforts."""

@@ -18,7 +18,6 @@ from regrasp.motion.planning.straight import straight_lines
 from regrasp.motion.printer.held_box import HeldBox
 from regrasp.motion.printer.service import TO_THE_PRINTER, PrinterMotion
 from regrasp.motion.request import MotionRequest
-from regrasp.motion.robots.tool_force import tool_wrench
 
 
 class TransferMotion(PrinterMotion):
@@ -197,11 +196,6 @@ class TransferMotion(PrinterMotion):
             raise PlanningError(CauseCode.OUT_OF_REACH, "the arm cannot turn the part so far")
         speed = self.parameters.approach_speed
         yield from self._follow(arm, path, speed, self.model(arm), self._guard.pressing)
-
-    def _moment_about(self, arm: str, point: FloatArray) -> float:
-        """The moment (N m) about the upright axis through a point (3,) m on the hand of an arm that hardly moves."""
-        joints, efforts = self._outside_efforts(arm)
-        return float(tool_wrench(self.kinematics[arm], joints, efforts, point)[5])
 
     def _held_thing(self, arm: str, name: str) -> HeldBox:
         held = {thing.box.name: thing for thing in self._held.get(arm, [])}
