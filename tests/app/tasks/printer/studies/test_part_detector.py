@@ -127,6 +127,6 @@ def test_a_tiny_training_leaves_a_network_and_its_figures_and_the_seed_decides(t
     assert [r.exit_code for r in results] == [0, 0], results[0].output
     assert 1000 < (outs[0] / "part_detector.onnx").stat().st_size < 2_000_000
     assert json.loads((outs[0] / "evaluation.json").read_text())["pictures"] == 4
-    assert sys.modules["triton"] is None  # loaded after Mesa's OpenGL it crashes the process
+    assert sys.modules.get("triton") is None  # loaded after Mesa's OpenGL it crashes the process
     for name in ("part_detector.onnx", "evaluation.json"):
         assert (outs[0] / name).read_bytes() == (outs[1] / name).read_bytes()
