@@ -23,7 +23,6 @@ from regrasp.motion.grasping.gap_test import GripWatch
 from regrasp.motion.printer.held_box import HeldBox
 from regrasp.motion.printer.servoing import Servo, ServoParameters
 from regrasp.motion.request import MotionRequest
-from regrasp.motion.robots.contact_guard import ContactLimits
 from regrasp.motion.robots.tool_force import tool_force, tool_wrench
 from regrasp.motion.scene.collision import CollisionModel
 from regrasp.motion.service import Motion, MotionParameters
@@ -251,25 +250,18 @@ class PrinterMotion(Motion):
 
         return self._together(arm, steps())
 
-    def _shift(
-        self,
-        arm: str,
-        displacement: Sequence[float] | FloatArray,
-        checked: bool = True,
-        without: Collection[Box] = (),
-        held: FloatArray | None = None,
-        contact: ContactLimits | None = None,
-    ) -> MotionRequest:
+    def _shift(self, arm: str, *args: Any, **options: Any) -> MotionRequest:
         """See `Motion`. A place that was felt and bars the line is forgotten: it is known to centimetres only."""
 
         def shift() -> MotionRequest:
-            return super(PrinterMotion, self)._shift(arm, displacement, checked, without, held, contact)
+            return super(PrinterMotion, self)._shift(arm, *args, **options)
 
         def steps() -> Iterator[None]:
             try:
                 yield from self._done(shift())
             except PlanningError as error:
-                if isinstance(error, (TouchError, StoppedShortError)) or not self.forget_felt():
+                barred = error.code is CauseCode.MOTION_BLOCKED
+                if not barred or isinstance(error, (TouchError, StoppedShortError)) or not self.forget_felt():
                     raise
                 yield from self._done(shift())
 
