@@ -35,6 +35,10 @@ class Action(Model):
         dict[Word, Change],
         Field(default_factory=dict, description="By cause: what is the case after it has failed for that."),
     ]
+    tries: Annotated[
+        int | None,
+        Field(default=None, ge=1, description="The task has failed when this fails so often in a row, for one cause."),
+    ]
 
 
 class Method(Model):

@@ -110,7 +110,7 @@ def _revolve(profile: FloatArray, normals: FloatArray, parameters: MeshParameter
 
 @lru_cache(maxsize=64)  # both arms' files; smoothing them takes most of the time to make a renderer
 def _from_file(file: str, scale: tuple[float, float, float], parameters: MeshParameters) -> NDArray[np.float32]:
-    mesh = trimesh.load(file, force="mesh")
+    mesh = trimesh.load(file, force="mesh", skip_materials=True)
     vertices, faces = _merge(np.asarray(mesh.vertices) * np.array(scale), np.asarray(mesh.faces), parameters.merge_cell)
     merged = trimesh.Trimesh(vertices, faces, process=False)
     face_normals = np.asarray(merged.face_normals)

@@ -50,7 +50,7 @@ def convex_pieces(
     None of a sheet, and where trimesh cannot read the file: then the mesh stays what PyBullet takes it for.
     """
     try:
-        return tuple(_pieces(trimesh.load(file, force="mesh"), scale, parameters))
+        return tuple(_pieces(trimesh.load(file, force="mesh", skip_materials=True), scale, parameters))
     except (ImportError, ValueError, QhullError):
         return ()
 

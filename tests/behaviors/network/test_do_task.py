@@ -69,6 +69,20 @@ def test_it_plans_again_a_bounded_number_of_times(tree: Path) -> None:
     assert entered(run) == {"job/fetch": 4, "job/turn/it": 0}
 
 
+@pytest.mark.parametrize(
+    ("fetch", "turn", "entered_turn"),
+    [("success", "failure", 2), ("success", "failure, success", 2), ("failure, success", "failure", 2)],
+)
+def test_an_action_that_fails_in_a_row_as_often_as_its_tries_ends_the_task(
+    tree: Path, fetch: str, turn: str, entered_turn: int
+) -> None:
+    lamp = tree.with_name("lamp.yaml")
+    lamp.write_text(lamp.read_text().replace("gives: {lamp: lit}", "gives: {lamp: lit}, tries: 2"))
+    run = ScriptedTree(tree, {"job/fetch": fetch, "job/turn/it": turn})
+    assert run.run() == (run.status.SUCCESS if "success" in turn else run.status.FAILURE)
+    assert entered(run) == {"job/fetch": len(fetch.split(",")), "job/turn/it": entered_turn}
+
+
 def test_where_the_robot_sees_that_the_plan_is_void_it_plans_again(tree: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     run = ScriptedTree(tree)
     (job,) = (node for node in run.tree.root.iterate() if node.name == "job")
