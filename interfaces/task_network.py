@@ -37,7 +37,7 @@ class Action(Model):
     ]
     tries: Annotated[
         int | None,
-        Field(default=None, ge=1, description="The task has failed when this fails so often in a row, for one cause."),
+        Field(default=None, ge=1, description="The task fails when this has failed so often, for one cause."),
     ]
 
 

@@ -20,7 +20,7 @@ class DoTask(WithServices, PortsMixin, Composite):
     It keeps a state: what each action gives, corrected by what the robot sees. When an action fails, or the state
     contradicts what the next one needs, it plans again from that state, at most `replans` times. It succeeds when
     nothing is left to do. It fails when there is no plan, or no new one, or when an action has failed for one cause as
-    often in a row as its `tries` allow; with the cause of the action that failed.
+    often as its `tries` allow and never succeeded between; with the cause of the action that failed.
     """
 
     INPUT_PORTS: ClassVar[dict[str, Any]] = {
@@ -57,7 +57,7 @@ class DoTask(WithServices, PortsMixin, Composite):
         self._todo: list[str] = []
         self._why, self._plans = "the task begins", 0
         self._failed: Cause | None = None  # of the action that failed last
-        self._failures: list[tuple[str, str]] = []  # actions that failed in a row, each with its cause's code
+        self._failures: list[tuple[str, str]] = []  # actions since their last success, each with its cause's code
         self.current_child = None
 
     def _action_of(self, child: Behaviour) -> str:
@@ -83,9 +83,10 @@ class DoTask(WithServices, PortsMixin, Composite):
 
     def _plan(self) -> Status | None:
         """Make a new plan; a status if there is none, or the last action has failed too often."""
-        tries = self.network.actions[self._failures[0][0]].tries if self._failures else None
-        if tries is not None and len(self._failures) >= tries:
-            return self._give_up(CauseCode.TOO_MANY_TRIES, f"tried {tries} times; {self._why}")
+        if self._failures:
+            last, tries = self._failures[-1], self.network.actions[self._failures[-1][0]].tries
+            if tries is not None and self._failures.count(last) >= tries:
+                return self._give_up(CauseCode.TOO_MANY_TRIES, f"tried {tries} times; {self._why}")
         if self._plans > self.get_input("replans"):
             return self._give_up(CauseCode.TOO_MANY_TRIES, f"planned {self._plans} times; {self._why}")
         try:
@@ -114,12 +115,12 @@ class DoTask(WithServices, PortsMixin, Composite):
             self.state |= action.gives
             self._todo.pop(0)
             self._failed = None
-            self._failures = []
+            self._failures = [failure for failure in self._failures if failure[0] != name]
             return
         causes: tuple[Cause, ...] = self.read(CAUSES)
         self._failed = causes[-1] if causes else None
         code = "" if self._failed is None else str(self._failed.code)
-        self._failures = [f for f in self._failures if f == (name, code)] + [(name, code)]
+        self._failures.append((name, code))
         self.state |= action.failed.get(code, {})
         self._why = f"{name} failed with {code}" if code else f"{name} failed"
 

@@ -54,9 +54,11 @@ class PrinterMotionParameters(MotionParameters):
     give_time: float = 0.1  # s until the efforts are read again
     first_force: float = 8.0  # N a finger at first: the finger that comes first pushes a part whose bond bears a twist
     # of 0.6 N m, 25 mm off its axis; choice
-    # N a finger. With 16 N the pads slide off the section of a plate that sticks with 15 N. With 25 N, pads that slide
-    # off the section of one that does not come twist the part off it (seeds 736, 750); with 21 N they do not.
-    part_force: float = 21.0
+    part_force: float = 21.0  # N a finger; with 16 N the pads slide off the section of a plate that sticks with 15 N
+    # A plate that does not come out: pads that slide off its part's section twist the part off it (seeds 7, 736, 750).
+    # One that comes is drawn with 3 N; the pads bear 17 N.
+    stuck_force: float = 10.0  # N that a plate resists with ...
+    stuck_after: float = 0.004  # m that the hand has gone; choice: a catch lets go after 2 mm
     twist_force: float = 40.0  # N a finger: pads 22 mm deep turn with 0.9 N m at most, and the bond bears 0.6; choice
     no_gravity: float = 0.5  # m/s2 below which what is let go floats
     # N a finger before the hand lets go of what floats. With 3 N askew pads pushed it off with 0.7 mm/s (seed 882).
@@ -404,7 +406,7 @@ class PrinterMotion(Motion):
         """Steps along y until hardly anything presses on the hand across."""
         values = self.parameters
         for _ in range(values.gives):
-            force = self._force_across(arm)
+            force = float(self._force_on(arm)[1])
             if abs(force) < values.relieved:
                 break
             way = float(np.clip(values.give * force, -values.most_give, values.most_give))
@@ -438,11 +440,11 @@ class PrinterMotion(Motion):
         joints, efforts = self._outside_efforts(arm)
         return float(tool_wrench(self.kinematics[arm], joints, efforts, point)[5])
 
-    def _force_across(self, arm: str) -> float:
-        """The force (N) along y on the hand of an arm at rest, by its drives' efforts."""
+    def _force_on(self, arm: str) -> FloatArray:
+        """The force (3,) N on the hand of an arm that hardly moves, world, by its drives' efforts."""
         joints, efforts = self._outside_efforts(arm)
         kin = self.kinematics[arm]
-        return float(tool_force(kin, joints, efforts, kin.tool_matrix(joints)[:3, 3])[1])
+        return tool_force(kin, joints, efforts, kin.tool_matrix(joints)[:3, 3])
 
     def _outside_efforts(self, arm: str) -> tuple[FloatArray, FloatArray]:
         """The joints (n,) of an arm at rest, and its drives' efforts (n,) less those that it needs by itself."""
@@ -499,7 +501,7 @@ class PrinterMotion(Motion):
 
         A door that does not give way forces them apart, and presses on the hand.
         """
-        if (force := abs(self._force_across(arm))) > self.parameters.blocked:
+        if (force := abs(float(self._force_on(arm)[1]))) > self.parameters.blocked:
             why = f"the door goes no further: it presses on the hand with {force:.0f} N, {gap}"
             return PlanningError(CauseCode.MOTION_BLOCKED, why)
         return GraspEmptyError(f"the hand lost the handle: {gap}")

@@ -69,7 +69,9 @@ class TransferMotion(PrinterMotion):
     def draw_out(self, arm: str, distance: float) -> Request[None]:
         """Draw the part that the hand holds straight back, with its plate, by `distance` m.
 
-        Part and plate then count as held. Fails with GRASP_EMPTY when the hand loses them, and as `shift` does.
+        Part and plate then count as held. Fails with PLATE_STUCK when the plate resists with more than `stuck_force`,
+        with GRASP_EMPTY when the hand loses them, and as `shift` does. In the first two cases all counts as where it
+        was in the printer, and in the first the jaw lets go.
         """
         way = self.tool(arm).rotation.apply([-positive("the distance", distance), 0.0, 0.0])
         spared = self.things(["plate_bed"])
@@ -78,14 +80,33 @@ class TransferMotion(PrinterMotion):
             stood, section = [*self._fixed], self._section
             if not self._held.get(arm):  # else it goes on where it was stopped
                 self.believe_held(arm, ("plate", "part", "section"))
+            request = self._shift(arm, way, without=spared, contact=self._guard.drawing)
             try:
-                yield from self._holding(arm, self._shift(arm, way, without=spared, contact=self._guard.drawing))
-            except GraspEmptyError:  # the plate was stuck, so all is still in the printer
-                self._held[arm], self._fixed, self._section = [], stood, section
-                self.believe_door(self.door_opening)
+                yield from self._unless_stuck(arm, request, way / distance)
+            except PlanningError as error:
+                if error.code == PrinterCause.PLATE_STUCK or isinstance(error, GraspEmptyError):
+                    self._held[arm], self._fixed, self._section = [], stood, section
+                    self.believe_door(self.door_opening)
                 raise
 
         return self._together(arm, steps())
+
+    def _unless_stuck(self, arm: str, request: MotionRequest, direction: FloatArray) -> Iterator[None]:
+        """Pull the plate out in a direction (3,) by a request; raises PLATE_STUCK if it does not come."""
+        values, begin = self.parameters, self.tool(arm).translation
+        for _ in self._holding(arm, request):
+            gone, pull = (self.tool(arm).translation - begin) @ direction, -self._force_on(arm) @ direction
+            if gone > values.stuck_after and pull > values.stuck_force:
+                request.cancel()
+                break
+            yield
+        else:
+            return
+        while self.arms[arm].is_moving():
+            yield
+        yield from self.execution.set_jaw(arm, self.known.printer.part.section.size[1] + values.opening_steps[-1])
+        why = f"the plate does not come: it resists with {pull:.0f} N after {1e3 * gone:.0f} mm"
+        raise PlanningError(PrinterCause.PLATE_STUCK, why)
 
     def carry(
         self, arm: str, goal: RigidTransform, onward: Collection[RigidTransform] = (), may_touch: Collection[str] = ()

@@ -88,6 +88,16 @@ def test_the_whole_job_is_done_as_it_was_planned(gravity: str, tmp_path: Path) -
     assert f"planned: because=the task begins, actions={plan}" in " ".join(told.split())
 
 
+def test_a_plate_that_does_not_come_out_is_left_in_the_printer_with_its_part(tmp_path: Path) -> None:
+    """Pads that were drawn on slid off the section, and twisted the part off its plate (seed 7)."""
+    scenario = load_scenario("faults/plate_sticks_for_good")
+    result = regrasp.run(scenario, seed=7, out=tmp_path / "run")
+    assert result.succeeded, [str(e) for e in result.expectations]
+    pulls = [line for line in (tmp_path / "run/events.jsonl").open() if '"plate_stuck"' in line and "draw_out" in line]
+    assert len([line for line in pulls if '"of"' not in line]) == 2
+    assert result.measured["part_held"] is False
+
+
 def test_a_part_that_does_not_come_off_its_plate_is_left_there(tmp_path: Path) -> None:
     strong = [f"cell.hidden.printer.bond.{way}=500" for way in ("twist", "shear", "tilt", "normal")]
     scenario = load_scenario("printer_part", ["gravity=zero", "cell=habitat_open", "inputs.replans=1", *strong])

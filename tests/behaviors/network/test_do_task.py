@@ -73,7 +73,7 @@ def test_it_plans_again_a_bounded_number_of_times(tree: Path) -> None:
     ("fetch", "turn", "entered_turn"),
     [("success", "failure", 2), ("success", "failure, success", 2), ("failure, success", "failure", 2)],
 )
-def test_an_action_that_fails_in_a_row_as_often_as_its_tries_ends_the_task(
+def test_an_action_that_fails_as_often_as_its_tries_ends_the_task(
     tree: Path, fetch: str, turn: str, entered_turn: int
 ) -> None:
     lamp = tree.with_name("lamp.yaml")
@@ -81,6 +81,19 @@ def test_an_action_that_fails_in_a_row_as_often_as_its_tries_ends_the_task(
     run = ScriptedTree(tree, {"job/fetch": fetch, "job/turn/it": turn})
     assert run.run() == (run.status.SUCCESS if "success" in turn else run.status.FAILURE)
     assert entered(run) == {"job/fetch": len(fetch.split(",")), "job/turn/it": entered_turn}
+
+
+def test_what_other_actions_do_in_between_gives_an_action_no_more_tries(
+    tree: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lamp = tree.with_name("lamp.yaml")
+    lamp.write_text(lamp.read_text().replace("gives: {lamp: lit}", "gives: {lamp: lit}, tries: 2"))
+    run = ScriptedTree(tree, {"job/turn/it": "failure"})
+    (job,) = (node for node in run.tree.root.iterate() if node.name == "job")
+    # The key is gone whenever the switch was tried, and is fetched again.
+    monkeypatch.setattr(job.services, "seen", lambda _: {"key": "away"} if job._why.startswith("turn") else {})
+    assert run.run() == run.status.FAILURE
+    assert entered(run) == {"job/fetch": 2, "job/turn/it": 2}
 
 
 def test_where_the_robot_sees_that_the_plan_is_void_it_plans_again(tree: Path, monkeypatch: pytest.MonkeyPatch) -> None:
