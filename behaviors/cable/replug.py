@@ -1,4 +1,4 @@
-"""Plug the connector into a socket by force feeling, leave it there, and look whether it stays."""
+"""Plug the connector into a socket by force sensing, leave it there, and look whether it stays."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -55,7 +55,7 @@ class CarryToSocket(HandLeaf):
 
 
 class Replug(LookInHand):
-    """Looks how the connector lies in the hand, and pushes it into the `socket` before it by force feeling.
+    """Looks how the connector lies in the hand, and pushes it into the `socket` before it by force sensing.
 
     Where it meets the socket's face it tries beside that. It is in when a gentle pull does not move it; the jaw is
     still closed then.

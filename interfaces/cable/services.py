@@ -122,7 +122,7 @@ class CableMotionService(MotionService, Protocol):
         ...
 
     def plug_in(self, held: "RigidTransform", name: str) -> Request[PluggedIn]:
-        """Push the held connector into the socket before it, by force feeling, until a gentle pull does not move it."""
+        """Push the held connector into the socket before it, by force sensing, until a gentle pull does not move it."""
         ...
 
     def leave_socket(self, name: str) -> Request[None]:

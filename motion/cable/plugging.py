@@ -1,4 +1,4 @@
-"""How a hand finds a socket's mouth by force feeling, and pushes the plug that it holds into it."""
+"""How a hand finds a socket's mouth by force sensing, and pushes the plug that it holds into it."""
 
 from collections import deque
 from collections.abc import Callable, Generator, Iterator

@@ -55,7 +55,7 @@ class SocketMotion(CableMotion):
         return self._together(self.hand, steps())
 
     def plug_in(self, held: RigidTransform, name: str) -> Request[PluggedIn]:
-        """Push the held connector (tool_from_connector) into the socket before it, by force feeling; see `Plugging`.
+        """Push the held connector (tool_from_connector) into the socket before it, by force sensing; see `Plugging`.
 
         It fails with NOT_PLUGGED where no try goes in.
         """
