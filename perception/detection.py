@@ -66,6 +66,14 @@ def peaks(
     return rows[kept], columns[kept], scores[kept], [tuple(box) for box in boxes[kept].tolist()]
 
 
+def clipped(box: PixelBox, shape: tuple[int, ...]) -> PixelBox:
+    """What of a box lies in a picture of `shape` (H, W) px, whose pixel u covers u - 0.5 to u + 0.5."""
+    low, (v_most, u_most) = -0.5, (edge - 0.5 for edge in shape)
+    u0, u1 = (min(max(u, low), u_most) for u in box[::2])
+    v0, v1 = (min(max(v, low), v_most) for v in box[1::2])
+    return u0, v0, u1, v1
+
+
 def corners(box: PixelBox) -> FloatArray:
     """The box's corners (4, 2) px, in their order round it."""
     u0, v0, u1, v1 = box

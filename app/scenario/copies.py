@@ -24,4 +24,5 @@ def copies(scenario: Scenario, seed: int) -> dict[str, str]:
 
 
 def _yaml(values: Any) -> str:
-    return yaml.safe_dump(values, sort_keys=False, allow_unicode=True, width=120)
+    dumper = getattr(yaml, "CSafeDumper", yaml.SafeDumper)  # without libyaml it takes ten times as long
+    return str(yaml.dump(values, Dumper=dumper, sort_keys=False, allow_unicode=True, width=120))

@@ -1,7 +1,7 @@
 """Training pictures of the printed part at the network's resolution, with their true boxes, and changes of them."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
@@ -14,10 +14,8 @@ from regrasp.interfaces.arrays import FloatArray
 from regrasp.interfaces.printer.actions import CLASSES
 from regrasp.interfaces.printer.cell import PrinterCell
 from regrasp.perception.detection import letterboxed
-from regrasp.perception.printer.detector import NETWORK_SHAPE
-from regrasp.sim.printer.random_scene import PartScene
-
-LEFT_AND_RIGHT = CLASSES.index("lgrip"), CLASSES.index("rgrip")
+from regrasp.perception.printer.detector import MIRRORED, NETWORK_SHAPE
+from regrasp.sim.printer.random_scene import PartScene, PartSceneParameters
 
 
 @dataclass(frozen=True)
@@ -27,6 +25,10 @@ class PictureParameters:
     shots_per_scene: int = 12  # to make a scene costs as much as to draw six pictures
     absent_every: int = 6  # one picture of so many shows look-alikes, but no part
     min_visible_area: int = 80  # px of the camera's picture; of less nothing is learned
+    # Something hides more of the part than in the pictures of an evaluation: half hidden parts are the hard ones.
+    scene: PartSceneParameters = field(
+        default_factory=lambda: PartSceneParameters(occluded_share=0.75, shown_share=0.45)
+    )
     mirrored_share: float = 0.5
     zoom: tuple[float, float] = (0.75, 1.35)
     shift: float = 0.15  # of the picture's edges, to each side
@@ -65,7 +67,7 @@ def make_pictures(
         np.zeros((count, len(CLASSES)), np.bool_),
     )
     for first in range(0, count, parameters.shots_per_scene):
-        scene = PartScene(cell, np.random.default_rng([seed, first]))
+        scene = PartScene(cell, np.random.default_rng([seed, first]), parameters=parameters.scene)
         for i in range(first, min(first + parameters.shots_per_scene, count)):
             shot = scene.shot(present=(i + 1) % parameters.absent_every != 0)
             out.images[i], scale = letterboxed(shot.rgb, NETWORK_SHAPE)
@@ -94,10 +96,7 @@ def changed(
     image = cv2.warpAffine(pictures.images[i], matrix, (width, height), flags=cv2.INTER_LINEAR)
     ends = pictures.boxes[i].reshape(-1, 2, 2) * scale + offset
     boxes = np.hstack([ends.min(axis=1), ends.max(axis=1)])
-    order = list(range(len(CLASSES)))
-    if mirrored:
-        left, right = LEFT_AND_RIGHT
-        order[left], order[right] = right, left
+    order = MIRRORED if mirrored else range(len(CLASSES))
     maps = [
         wanted_maps(_inside(boxes[k], bool(pictures.counts[i, k]), parameters.min_box_share), NETWORK_SHAPE)
         for k in order

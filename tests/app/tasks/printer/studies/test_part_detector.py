@@ -19,7 +19,7 @@ from regrasp.app.tasks.printer.studies.detector.score import held_out_shots, par
 from regrasp.interfaces.printer.actions import CLASSES
 from regrasp.interfaces.printer.cell import PrinterCell
 from regrasp.perception.pose.detector import shipped_network
-from regrasp.perception.printer.detector import NETWORK_SHAPE, PartDetector, decode
+from regrasp.perception.printer.detector import CELLS, NETWORK_SHAPE, PartDetector, decode, mirrored
 
 
 @pytest.fixture(scope="module")
@@ -34,9 +34,29 @@ def pictures(cell: PrinterCell) -> PartPictures:
 
 def test_the_shipped_network_finds_part_and_fingers_in_another_chamber(cell: PrinterCell) -> None:
     detector = PartDetector()
-    figures = part_detector_figures([scored(detector, shot) for shot in held_out_shots(cell, 77, 30)])
+    pictures = [scored(detector, shot) for shot in held_out_shots(cell, 77, 30)]
+    figures = part_detector_figures(pictures)
     assert figures["map50"] > 0.85  # of 400 such pictures it has 0.97
     assert all(each["recall"][1] >= 15 for each in figures["classes"].values())
+    boxes = np.array([detection.box for picture in pictures for detection in picture.detections])
+    intrinsics = cell.known.camera("hand").intrinsics
+    assert boxes.min() == -0.5  # a thing that the picture's edge cuts, and none beyond it
+    assert np.all(boxes <= np.array([intrinsics.width, intrinsics.height] * 2) - 0.5)
+
+
+@pytest.mark.parametrize("class_number", range(len(CLASSES)))
+def test_maps_of_the_mirror_image_tell_the_mirrored_box(class_number: int) -> None:
+    maps = np.zeros((len(CLASSES) * 5, *CELLS), np.float32)
+    box = 80.0, 40.0, 120.0, 64.0
+    wanted = wanted_maps([(box, True, ())], NETWORK_SHAPE)
+    maps[class_number] = wanted[0]
+    maps[len(CLASSES) + 4 * class_number :][:4] = wanted[1:5]
+    (found,) = decode(mirrored(maps), 1.0, 0.9)
+    other = {"lgrip": "rgrip", "rgrip": "lgrip"}.get(CLASSES[class_number], CLASSES[class_number])
+    assert found.name == other
+    width = NETWORK_SHAPE[1]
+    assert np.array(found.box) + 0.5 == pytest.approx([width - box[2], box[1], width - box[0], box[3]], abs=1e-3)
+    assert np.array_equal(mirrored(mirrored(maps)), maps)
 
 
 def test_pictures_depend_on_the_seed_alone(cell: PrinterCell, pictures: PartPictures) -> None:
