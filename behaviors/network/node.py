@@ -20,7 +20,7 @@ class DoTask(WithServices, PortsMixin, Composite):
     It keeps a state: what each action gives, corrected by what the robot sees. When an action fails, or the state
     contradicts what the next one needs, it plans again from that state, at most `replans` times. It succeeds when
     nothing is left to do. It fails when there is no plan, or no new one, or when an action has failed for one cause as
-    often as its `tries` allow and never succeeded between; with the cause of the action that failed.
+    often as its `tries` allow, without a success in between; with the cause of the action that failed.
     """
 
     INPUT_PORTS: ClassVar[dict[str, Any]] = {

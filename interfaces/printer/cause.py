@@ -10,8 +10,8 @@ class PrinterCause(StrEnum):
     CLAMP_EMPTY = "clamp_empty"  # the clamp closed on nothing
     HANDLE_NOT_FOUND = "handle_not_found"  # no camera showed the handle of the door
     PART_ADRIFT = "part_adrift"  # the part drifts out of the tray, or is not in it
-    PLATE_STUCK = "plate_stuck"  # part and plate were pulled, and the plate did not come out of the printer
     PLACE_OCCUPIED = "place_occupied"  # something stands where the robot wants to put what it holds
+    PLATE_STUCK = "plate_stuck"  # part and plate were pulled, and the plate did not come out of the printer
     PREEMPTED = "preempted"  # another goal took the device
     TARGET_NOT_SEEN = "target_not_seen"  # no picture showed the part, or its gripping section
     TARGET_TOO_FAST = "target_too_fast"  # the part moves faster than the hand follows

@@ -62,7 +62,7 @@ def train(
         keep(network, best)
     optimizer = torch.optim.AdamW(network.parameters(), rate, weight_decay=parameters.weight_decay)
     schedule = torch.optim.lr_scheduler.OneCycleLR(optimizer, rate, total_steps=steps)
-    # The mean of the last weights finds more than the last ones (Polyak and Juditsky 1992).
+    # What is kept is a mean of the weights, after Polyak and Juditsky 1992: the last ones change from step to step.
     average = AveragedModel(network, multi_avg_fn=get_ema_multi_avg_fn(parameters.averaging), use_buffers=True)
     for step, (images, wanted) in enumerate(_batches(draw, draws, steps, parameters.batches_ahead), 1):
         with torch.autocast("cpu", torch.bfloat16, enabled=parameters.bfloat16):
