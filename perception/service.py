@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping
 from copy import deepcopy
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -73,9 +74,14 @@ class Perception:
         self._known, self._cameras, self._clock = known, cameras, clock
         self.pose_of, self._arm_spheres = pose_of, arm_spheres
         self._health = {name: CameraHealth(name, parameters.health) for name in cameras}
-        region = parameters.region if known.mapped is None else known.mapped
-        self.occupancy = Occupancy(region, known.solids(), self._spared(), parameters.occupancy)
+        self._region = parameters.region if known.mapped is None else known.mapped
+        self._mapped = False  # whether a frame was taken into the map
         self._outlines: dict[str, Outline] = {}  # by camera
+
+    @cached_property
+    def occupancy(self) -> Occupancy:
+        """The map, made when it is first used: that takes a third of a second, and not every tree maps."""
+        return Occupancy(self._region, self._known.solids(), self._spared(), self.parameters.occupancy)
 
     @property
     def fixed_cameras(self) -> tuple[str, ...]:
@@ -122,7 +128,7 @@ class Perception:
         """Map what every fixed camera sees; the number of full voxels."""
         for camera in self.fixed_cameras:
             self.map_obstacles(camera)
-        return len(self.occupancy.occupied_points())
+        return len(self.occupancy.occupied_points()) if self._mapped else 0
 
     @counts_as("perception")
     def map_obstacles(self, camera: str) -> int:
@@ -137,6 +143,7 @@ class Perception:
             scaled = replace(frame, depth=frame.depth * np.float32(registered.scale))
             pose, arms = registered.world_from_camera, self._arm_spheres()
             self.occupancy.integrate(scaled, pose, arms, guess_behind=camera in self.fixed_cameras)
+            self._mapped = True
         return len(self.occupancy.occupied_points())
 
     @counts_as("perception")
@@ -159,6 +166,9 @@ class Perception:
 
     def obstacles(self) -> Obstacles:
         """The mapped obstacles."""
+        if not self._mapped:
+            none = np.empty((0, 3))
+            return Obstacles(none, self._region.voxel, none, none)
         seen = self.occupancy.occupied_points(Voxel.INSIDE)
         return Obstacles(
             seen, self.occupancy.voxel_size, self.occupancy.unseen_points(), self.occupancy.shadow_points()

@@ -70,8 +70,9 @@ def overlap_findings(
     parameters: CellLayoutParameters = CellLayoutParameters(),
 ) -> Iterator[Finding]:
     """Arms and cameras in these parts of the cell."""
+    asleep = [sleeping_arm_cubes(arm) for arm in known.arms]
     for part in parts:
-        for name, depth in _inside(known, part):
+        for name, depth in _inside(known, part, asleep):
             if depth > parameters.overlap:
                 yield reaches(document, part, depth, name)
     for name, place in fixed_cameras(known):
@@ -107,14 +108,18 @@ def _between_the_arms(known: KnownCell) -> float:
     return max(deepest, default=0.0)
 
 
-def _inside(known: KnownCell, part: Part) -> Iterator[tuple[str, float]]:
-    """The arms that a part may stand in, with the depth (m) that it reaches into each."""
-    for arm, base in zip(known.arms, arm_bases(known), strict=True):
+def _inside(
+    known: KnownCell, part: Part, asleep: Sequence[tuple[FloatArray, FloatArray]]
+) -> Iterator[tuple[str, float]]:
+    """The arms that a part may stand in, with the depth (m) that it reaches into each.
+
+    `asleep` are the cubes of `sleeping_arm_cubes` for each arm.
+    """
+    for arm, base, (centers, halves) in zip(known.arms, arm_bases(known), asleep, strict=True):
         if part.path == base.path:
             continue
         if part.path[1] != "arms":
             yield base.name, _base_depth(part, base)
-        centers, halves = sleeping_arm_cubes(arm)
         yield f"the {arm.name} arm asleep", float(cube_depths(part.halves, part.center - centers, halves).max())
 
 

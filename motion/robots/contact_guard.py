@@ -137,8 +137,11 @@ class ContactGuard:
     def _felt(self, q: FloatArray, shares: FloatArray) -> FloatArray | None:
         """What is left of the efforts (n,), in shares of their limits, without a pull, if it is a touch."""
         felt = self._without_pull(q, shares, np.inf)
-        if felt @ felt > self._times_far**2:
+        square = felt @ felt
+        if square > self._times_far**2:
             return felt
+        if self._pull is None and square <= 1.0:
+            return None
         felt = self._without_pull(q, shares, self._pull_near)
         return felt if felt @ felt > 1.0 and (self._near is None or self._near(q)) else None
 

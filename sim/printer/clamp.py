@@ -10,24 +10,33 @@ from regrasp.sim.bodies import box_shapes
 class SimClamp:
     """Two jaws on slides along y, which a gear lets go in by the same way (a self-centring vise); they begin open.
 
-    Nothing but the jaws' force and friction holds the plate. `jaws` are their links.
+    Nothing but the jaws' force and friction holds the plate. `jaws` are their links. Once closed, they and the `plate`,
+    a body, sleep while they rest: the engine does not simulate them until another body touches one.
     """
 
     jaws = (0, 1)  # the first closes towards +y, the second towards -y
 
     def __init__(
-        self, client: int, known: KnownPrinter, hidden: HiddenPrinter, gear_force: float = 2000.0, jaw_mass: float = 1.0
+        self,
+        client: int,
+        known: KnownPrinter,
+        hidden: HiddenPrinter,
+        plate: int,
+        gear_force: float = 2000.0,
+        jaw_mass: float = 1.0,
+        rest: float = 1e-4,
     ) -> None:
         """The gear bears `gear_force` N: choice, far more than the jaws press with.
 
         Each jaw weighs `jaw_mass` kg, with the inertia of its screw. Choice: an iteration of PyBullet's solver gives a
         jaw the momentum of its speed at most. Jaws of 0.2 kg need 70 iterations until they press with their force.
+        What moves by less than `rest` m/s and rad/s for 2 s falls asleep; choice: what is clamped, and nothing faster.
         """
-        self._client, self._hidden = client, hidden
-        clamp, plate = known.clamp, known.plate
+        self._client, self._hidden, self._plate, self._rest = client, hidden, plate, rest
+        clamp, width, height = known.clamp, known.plate.size[1], known.plate.size[2]
         size = clamp.jaw_size
-        out = 0.5 * (plate.size[1] + size[1]) + clamp.stroke
-        up = 0.5 * (plate.size[2] - size[2]) + clamp.above
+        out = 0.5 * (width + size[1]) + clamp.stroke
+        up = 0.5 * (height - size[2]) + clamp.above
         jaw = Box(name="jaw", center=(0.0, 0.0, 0.0), size=size, color=clamp.color)
         shapes = [box_shapes(client, jaw) for _ in self.jaws]
         level = [0.0, 0.0, 0.0, 1.0]
@@ -48,7 +57,7 @@ class SimClamp:
                 physicsClientId=client,
             )
         )
-        most = clamp.stroke + 0.25 * plate.size[1]  # where nothing lies between them
+        most = clamp.stroke + 0.25 * width  # where nothing lies between them
         for link in self.jaws:
             p.changeDynamics(
                 self.body,
@@ -76,10 +85,12 @@ class SimClamp:
     def close(self) -> None:
         """Close the jaws, and press with their force from now on."""
         self._drive(0.02, self._hidden.clamp_force)
+        self._may_sleep(True)
 
     def open(self) -> None:
         """Open the jaws."""
         self._drive(-0.02, self._hidden.clamp_force)
+        self._may_sleep(False)
 
     def travel(self) -> tuple[float, float]:
         """How far, m, each jaw has gone in from where it is open."""
@@ -95,4 +106,17 @@ class SimClamp:
         for link in self.jaws:
             p.setJointMotorControl2(
                 self.body, link, p.VELOCITY_CONTROL, targetVelocity=speed, force=force, physicsClientId=self._client
+            )
+
+    def _may_sleep(self, may: bool) -> None:
+        """Let jaws and plate sleep, or keep them awake, from now on; either wakes them (a new motor speed does not)."""
+        states = p.ACTIVATION_STATE_WAKE_UP, p.ACTIVATION_STATE_ENABLE_SLEEPING, p.ACTIVATION_STATE_DISABLE_SLEEPING
+        wake, enable, disable = states
+        for body, link in ((self._plate, -1), *((self.body, link) for link in (-1, *self.jaws))):
+            p.changeDynamics(
+                body,
+                link,
+                activationState=wake | (enable if may else disable),
+                sleepThreshold=self._rest**2,
+                physicsClientId=self._client,
             )

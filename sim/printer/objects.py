@@ -39,7 +39,7 @@ class PrinterObjects(TaskObjects):
         """See `TaskObjects`."""
         known, hidden = self.cell.known.printer, self.cell.hidden.printer
         self.part = SimPart(engine, known, hidden)
-        self.clamp = SimClamp(engine.client, known, hidden)
+        self.clamp = SimClamp(engine.client, known, hidden, self.part.plate)
         self.door = SimDoor(engine.client, known.door, hidden)
 
     def door_closed(self, slack: float = 0.01) -> bool:

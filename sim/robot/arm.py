@@ -95,11 +95,10 @@ class SimArm:
     def reading(self) -> JointReading:
         """Quantised encoder positions, which are less than the truth by the offsets; velocities; servo torques."""
         states = p.getJointStates(self.body, self.joints, physicsClientId=self.client)
-        true, velocities, _, efforts = zip(*states, strict=True)
-        positions = self._signs * np.array(true) - self.offsets + self._encoder_slip
-        step = self.robot.calibration.encoder_step
-        quantised = np.rint(positions / step) * step
-        return JointReading(self.now(), quantised, self._signs * np.array(velocities), self._signs * np.array(efforts))
+        values = np.array([s[k] for k in (0, 1, 3) for s in states]).reshape(3, -1)
+        _read(values, self._signs, self.offsets, self._encoder_slip, self.robot.calibration.encoder_step)
+        positions, velocities, efforts = values
+        return JointReading(self.now(), positions, velocities, efforts)
 
     def gravity(self) -> FloatArray:
         """See `regrasp.interfaces.devices.Arm`."""
@@ -262,6 +261,18 @@ class SimArm:
         """Tool position (3,) m in the world with the joints set to `q` (n,) rad."""
         self._reset_joints(q)
         return self.tool_pose().translation
+
+
+@numba.njit(cache=True)
+def _read(values: FloatArray, signs: FloatArray, offsets: FloatArray, slip: FloatArray, step: float) -> None:
+    """Make of PyBullet's positions, velocities and efforts, the rows of `values` (3, n), what the encoders read.
+
+    A position is less than the truth by `offsets` (n,), more by `slip` (n,), and a whole number of steps.
+    """
+    for i in range(len(signs)):
+        values[0, i] = np.rint((signs[i] * values[0, i] - offsets[i] + slip[i]) / step) * step
+        values[1, i] *= signs[i]
+        values[2, i] *= signs[i]
 
 
 @numba.njit(cache=True)

@@ -189,7 +189,7 @@ def test_the_clamp_holds_a_plate_by_friction_alone(
     """Two faces of friction: F = 2 mu N."""
     hidden, client = cell.hidden.printer, engine.client
     part.catch.release()
-    clamp = SimClamp(client, cell.known.printer, hidden)
+    clamp = SimClamp(client, cell.known.printer, hidden, part.plate)
     way = np.array(cell.known.printer.clamp.center) - part.pose(part.plate).translation
     for body in (part.plate, part.part):
         at = (part.pose(body).translation + way).tolist()
@@ -205,8 +205,8 @@ def test_the_clamp_holds_a_plate_by_friction_alone(
     assert (went < 1e-3) == stays  # m
 
 
-def test_an_open_clamp_leaves_the_plate_alone(cell: PrinterCell, engine: Engine) -> None:
-    clamp = SimClamp(engine.client, cell.known.printer, cell.hidden.printer)
+def test_an_open_clamp_leaves_the_plate_alone(cell: PrinterCell, engine: Engine, part: SimPart) -> None:
+    clamp = SimClamp(engine.client, cell.known.printer, cell.hidden.printer, part.plate)
     spec, plate = cell.known.printer.clamp, cell.known.printer.plate
     for jaw, side in zip(clamp.jaws, (1.0, -1.0), strict=True):
         at = p.getLinkState(clamp.body, jaw, physicsClientId=engine.client)[0]
@@ -219,7 +219,10 @@ def test_the_clamp_brings_a_plate_to_its_middle_and_holds_it_there(
 ) -> None:
     part.catch.release()
     part.bond.release()
-    clamp, middle = SimClamp(engine.client, cell.known.printer, cell.hidden.printer), cell.known.printer.clamp.center
+    clamp, middle = (
+        SimClamp(engine.client, cell.known.printer, cell.hidden.printer, part.plate),
+        cell.known.printer.clamp.center,
+    )
     beside = [middle[0], middle[1] + 0.006, middle[2]]
     p.resetBasePositionAndOrientation(part.plate, beside, [0, 0, 0, 1], physicsClientId=engine.client)
     p.resetBasePositionAndOrientation(part.part, [0, 0, 3], [0, 0, 0, 1], physicsClientId=engine.client)
@@ -228,3 +231,51 @@ def test_the_clamp_brings_a_plate_to_its_middle_and_holds_it_there(
         engine.step()
     assert part.pose(part.plate).translation == pytest.approx(middle, abs=5e-4)
     assert clamp.presses(part.plate)
+
+
+@pytest.fixture
+def clamped(cell: PrinterCell, engine: Engine, part: SimPart) -> SimClamp:
+    """The clamp, closed on the plate with the part on it, long enough to come to rest."""
+    part.catch.release()
+    clamp = SimClamp(engine.client, cell.known.printer, cell.hidden.printer, part.plate)
+    way = np.array(cell.known.printer.clamp.center) - part.pose(part.plate).translation
+    for body in (part.plate, part.part):
+        at = (part.pose(body).translation + way).tolist()
+        p.resetBasePositionAndOrientation(body, at, [0, 0, 0, 1], physicsClientId=engine.client)
+    for _ in range(3 * engine.step_rate):  # open, and at rest
+        engine.step()
+    clamp.close()
+    loaded(engine, part, part.plate, (0.0, 0.0, 0.0), seconds=5.0)
+    assert clamp.travel() == pytest.approx(2 * (cell.known.printer.clamp.stroke,), abs=1e-3)
+    return clamp
+
+
+@pytest.mark.parametrize(("share", "stays"), [(0.9, True), (1.1, False)])
+def test_a_part_on_a_plate_at_rest_in_the_clamp_comes_off_at_its_load(
+    cell: PrinterCell, engine: Engine, part: SimPart, clamped: SimClamp, share: float, stays: bool
+) -> None:
+    loaded(engine, part, part.part, (0.0, 0.0, 0.0), (0.0, 0.0, share * cell.hidden.printer.bond.twist), seconds=0.5)
+    assert part.bond.holds == stays
+
+
+def test_what_the_clamp_holds_sleeps_until_a_body_touches_it(engine: Engine, part: SimPart, clamped: SimClamp) -> None:
+    part.take_away()
+    loaded(engine, part, part.plate, (0.0, 0.0, 0.0), seconds=5.0)
+    before = part.pose(part.plate).translation
+    loaded(engine, part, part.plate, (0.0, 0.0, 0.0), seconds=1.0)
+    assert np.array_equal(part.pose(part.plate).translation, before)
+    assert clamped.presses(part.plate)
+    ball = p.createCollisionShape(p.GEOM_SPHERE, radius=0.02, physicsClientId=engine.client)
+    start = (before - np.array([0.3, 0.0, 0.0])).tolist()
+    thrown = p.createMultiBody(20.0, ball, basePosition=start, physicsClientId=engine.client)
+    p.resetBaseVelocity(thrown, [3.0, 0.0, 0.0], physicsClientId=engine.client)
+    loaded(engine, part, part.plate, (0.0, 0.0, 0.0), seconds=0.5)
+    assert part.pose(part.plate).translation[0] - before[0] > 0.01
+
+
+def test_a_clamp_at_rest_opens(engine: Engine, part: SimPart, clamped: SimClamp) -> None:
+    part.take_away()
+    loaded(engine, part, part.plate, (0.0, 0.0, 0.0), seconds=5.0)
+    clamped.open()
+    loaded(engine, part, part.plate, (0.0, 0.0, 0.0), seconds=3.0)
+    assert clamped.travel() == pytest.approx((0.0, 0.0), abs=1e-3)
