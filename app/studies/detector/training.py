@@ -27,7 +27,7 @@ class TrainingParameters:
     weight_decay: float = 1e-4  # of AdamW; choice: usual
     check_every: int = 6000  # steps; choice: a check takes as long as some 300 of them
     batches_ahead: int = 3  # made while the network learns; choice
-    averaging: float = 0.998  # of the exponential moving average of the weights, a step; choice
+    averaging: float = 0.0  # share of its old value that the moving average of the weights keeps a step; 0: no average
     # bfloat16 takes two thirds of the time where the processor has instructions for it, and far longer elsewhere.
     # torch has no public function that tells.
     bfloat16: bool = field(default_factory=torch.cpu._is_avx512_bf16_supported)
@@ -62,7 +62,7 @@ def train(
         keep(network, best)
     optimizer = torch.optim.AdamW(network.parameters(), rate, weight_decay=parameters.weight_decay)
     schedule = torch.optim.lr_scheduler.OneCycleLR(optimizer, rate, total_steps=steps)
-    # What is kept is a mean of the weights, after Polyak and Juditsky 1992: the last ones change from step to step.
+    # Its weights change from step to step: their average may be kept, after Polyak and Juditsky 1992.
     average = AveragedModel(network, multi_avg_fn=get_ema_multi_avg_fn(parameters.averaging), use_buffers=True)
     for step, (images, wanted) in enumerate(_batches(draw, draws, steps, parameters.batches_ahead), 1):
         with torch.autocast("cpu", torch.bfloat16, enabled=parameters.bfloat16):

@@ -34,8 +34,8 @@ _Seed = Annotated[int, typer.Option(min=0, max=MAX_SEED, help="Draws the picture
 def train_part_detector(
     out: Annotated[Path, typer.Option(help=f"The folder for {FILE} and evaluation.json.")],
     cell: _Cell = "habitat_open",
-    pictures: Annotated[int, typer.Option(min=24, help="Random pictures to train on.")] = 4000,
-    steps: Annotated[int, typer.Option(min=1, help="Training steps of 8 pictures each.")] = 6000,
+    pictures: Annotated[int, typer.Option(min=24, help="Random pictures to train on.")] = 6000,
+    steps: Annotated[int, typer.Option(min=1, help="Training steps of 8 pictures each.")] = 14000,
     start: Annotated[
         Path | None, typer.Option(metavar="FILE", help="An ONNX file of ours to go on from, at a slower rate.")
     ] = None,
@@ -45,7 +45,7 @@ def train_part_detector(
     """Train the network that finds the printed part.
 
     And the fingers. It learns from random pictures of a cell; then it is evaluated. Needs the extra `train` (torch,
-    onnx), about an hour on one core, and 4 GB of free memory. Ctrl-C keeps the best network so far. To use it, put its
+    onnx), an hour and a half of two cores, and 4 GB of free memory. Ctrl-C keeps the best network so far. To use it, put its
     file in the place of perception/printer/part_detector.onnx.
 
     \b

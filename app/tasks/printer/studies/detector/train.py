@@ -16,7 +16,7 @@ from regrasp.app.tasks.printer.studies.detector.score import MIN_RECORDED_SCORE,
 from regrasp.interfaces.printer.actions import CLASSES
 from regrasp.perception.printer.detector import BOX_MAPS, NETWORK_INPUT, NETWORK_SHAPE, decode, network_input
 
-TRAINING = TrainingParameters(check_every=1000)
+TRAINING = TrainingParameters(check_every=1000, averaging=0.998)  # choice: over some 500 steps
 NETWORK = NetworkParameters(inputs=12, classes=len(CLASSES), values=BOX_MAPS)
 
 
