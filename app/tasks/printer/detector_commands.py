@@ -44,9 +44,9 @@ def train_part_detector(
 ) -> None:
     """Train the network that finds the printed part.
 
-    And the fingers. It learns from random pictures of a cell; then it is evaluated. Needs the extra `train` (torch,
-    onnx), an hour and a half of two cores, and 4 GB of free memory. Ctrl-C keeps the best network so far. To use it, put its
-    file in the place of perception/printer/part_detector.onnx.
+    It finds the fingers, too. It learns from random pictures of a cell; then it is evaluated. Needs the extra `train`
+    (torch, onnx), an hour and a half of two cores, and 4 GB of free memory. Ctrl-C keeps the best network so far. To
+    use it, put its file in the place of perception/printer/part_detector.onnx.
 
     \b
     Example:
