@@ -1,6 +1,7 @@
 """The printed part on its build plate: what bonds it there, and the catch that holds the plate."""
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pybullet as p
@@ -41,20 +42,19 @@ class PartBond:
             self._hold.release()
             self._hold = None
 
-    def step(self, normal: tuple[float, float, float]) -> bool:
-        """Whether it breaks now; call after every physics step with the plate's normal in the world's axes."""
+    def step(self, normal: Callable[[], tuple[float, float, float]]) -> bool:
+        """Whether it breaks now; call after every physics step. `normal` tells the plate's, in the world's axes."""
         if self._hold is None:
             return False
         x, y, z, about_x, about_y, about_z = self._hold.wrench()
-        along = x * normal[0] + y * normal[1] + z * normal[2]
         limits = self._limits
-        # The part is the constraint's parent: a pull up on it reads as a force down.
-        over = (
-            math.sqrt(max(x * x + y * y + z * z - along * along, 0.0)) > limits.shear
-            or -along > limits.normal
-            or math.hypot(about_x, about_y) > limits.tilt
-            or abs(about_z) > limits.twist
-        )
+        over = math.hypot(about_x, about_y) > limits.tilt or abs(about_z) > limits.twist
+        if not over and math.hypot(x, y, z) > min(limits.shear, limits.normal):
+            nx, ny, nz = normal()
+            along = x * nx + y * ny + z * nz
+            shear = math.sqrt(max(x * x + y * y + z * z - along * along, 0.0))
+            # The part is the constraint's parent: a pull up on it reads as a force down.
+            over = shear > limits.shear or -along > limits.normal
         if over:
             self.release()
         return over
@@ -131,10 +131,12 @@ class SimPart:
     def step(self) -> None:
         """Check what holds the two; call after every physics step."""
         self.catch.step()
-        if self.bond.holds:
-            x, y, z, w = p.getBasePositionAndOrientation(self.plate, physicsClientId=self._engine.client)[1]
-            if self.bond.step((2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y))):
-                self._engine.let_meet(self.part, -1, self.plate)
+        if self.bond.step(self._normal):
+            self._engine.let_meet(self.part, -1, self.plate)
+
+    def _normal(self) -> tuple[float, float, float]:
+        x, y, z, w = p.getBasePositionAndOrientation(self.plate, physicsClientId=self._engine.client)[1]
+        return 2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)
 
     def _build_plate(self, known: KnownPrinter, hidden: HiddenPrinter) -> int:
         plate, client = known.plate, self._engine.client
