@@ -10,10 +10,14 @@ import statistics
 from collections.abc import Iterable, Sequence
 from functools import partial
 from pathlib import Path
+from time import perf_counter
 from typing import Any, get_args
 
+import cv2
 import numpy as np
+import typer
 from pydantic import TypeAdapter
+from scipy.spatial.transform import RigidTransform
 
 from regrasp.app.campaigns.digest import digest_of
 from regrasp.app.campaigns.statistics import wilson_interval
@@ -25,6 +29,7 @@ from regrasp.app.studies.figures import write_figures
 from regrasp.app.studies.scene_tasks import SceneTask, run_tasks
 from regrasp.app.tasks.printer.studies.approach_plots import write_plots
 from regrasp.app.tasks.printer.studies.approach_trial import ApproachParameters, Block, Trial, run_trial
+from regrasp.app.tasks.printer.studies.hand_placed import HandPlaced
 from regrasp.app.tasks.printer.studies.reach import STARTS
 from regrasp.interfaces.printer.actions import Approach
 from regrasp.interfaces.printer.cell import PrinterCell
@@ -78,7 +83,31 @@ def run_approach(
         write_whole(out / "approach.csv", _table(trials))
         write_plots(trials, out)
     _print(trials)
+    if "servo" in approaches and not code:
+        took = tracking_ms(cell)
+        typer.echo(f"a cycle of the servo's tracking takes {statistics.median(took):.1f} ms, the median of {len(took)}")
     return code
+
+
+def tracking_ms(cell: PrinterCell, seed: int = 0, pictures: int = 5) -> list[float]:
+    """How long (ms) the tracker takes for a picture on one core, for so many from each of the source's starts."""
+    threads, took = cv2.getNumThreads(), list[float]()
+    cv2.setNumThreads(1)
+    with HandPlaced(cell, seed) as hand:
+        perception, motion = hand.services.perception, hand.services.motion
+        nominal = motion.part_goal(hand.before)
+        for offset in STARTS.values():
+            hand.place(RigidTransform.from_translation(offset) * nominal)
+            hand.world.advance(0.5)  # until the jaw stands, and there are pictures from here
+            tracker = perception.part_tracker(motion.tool_at, lambda: hand.arm.gripper.reading().gap, hand.world.now())
+            for _ in range(pictures):
+                hand.picture()  # drawn before the clock starts
+                begin = perf_counter()
+                seen = tracker.update()
+                took.append(1e3 * (perf_counter() - begin))
+                assert seen is not None, tracker.why
+    cv2.setNumThreads(threads)
+    return took
 
 
 def _of_block(block: Block, approaches: Sequence[Approach]) -> list[Approach]:
