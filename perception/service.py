@@ -108,6 +108,10 @@ class Perception:
             health.feed(newest)
         return health.trouble(self._clock.now())
 
+    def repeats(self, camera: str) -> bool:
+        """Whether the newest frame, as `trouble` last saw it, shows the same as the one before."""
+        return self._health[camera].repeats
+
     @counts_as("perception")
     def surface(self, camera: str, since: float) -> FloatArray | None:
         """Points (n, 3) m, world, that the newest frame shows, by the registered camera.

@@ -43,6 +43,11 @@ class CameraHealth:
         self._brightness = float(frame.rgb[::step, ::step].mean())
         self._depth_share = float(np.count_nonzero(depth)) / depth.size
 
+    @property
+    def repeats(self) -> bool:
+        """Whether the newest frame has the depth of the one before, to the bit: the camera may have frozen."""
+        return self._repeats > 0
+
     def trouble(self, now: float) -> str | None:
         """Why the camera is not to be trusted at time `now` (s), with the numbers; None when all is well."""
         who, limits, age = f"the {self._camera} camera", self._parameters, now - self._stamp

@@ -75,7 +75,8 @@ class PartTracker:
         frame = self._perception.frame(self._camera)
         if frame is not None and frame.stamp >= self._since and frame.number != self._number:
             self._number = frame.number
-            if self._perception.trouble(self._camera) is None:
+            # A picture that a camera repeats while the hand moves on shows a part that seems to go before it.
+            if self._perception.trouble(self._camera) is None and not self._perception.repeats(self._camera):
                 self._take(frame)
         self.trouble = self._perception.trouble(self._camera)
         return self._estimate()

@@ -192,3 +192,20 @@ def test_a_line_through_estimates_gives_place_and_velocity() -> None:
     place, velocity = line_through(estimates)
     assert place == pytest.approx([0.1, 0.2, 0.3029], abs=2e-4)
     assert velocity == pytest.approx([0.0, 0.0, 0.002], abs=2e-4)
+
+
+def test_a_camera_that_freezes_does_not_make_the_part_run_before_the_hand() -> None:
+    with HandPlaced(the_cell(), 1) as hand:
+        hand.place(before(hand, 0.12))
+        tracker = tracker_of(hand)
+        for _ in range(5):
+            hand.picture()
+            seen = tracker.update()
+        assert seen is not None
+        hand.world.cameras["hand"].frozen = True
+        for x in (0.112, 0.104, 0.096):
+            hand.place(before(hand, x))
+            hand.world.advance(0.035)  # a picture
+            seen = tracker.update()
+            assert seen is not None
+            assert np.linalg.norm(seen.velocity) < 0.01  # m/s

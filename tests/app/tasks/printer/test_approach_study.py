@@ -76,7 +76,9 @@ def test_the_command_keeps_figures_table_and_plots(tmp_path: Path, capfd: pytest
     assert (tmp_path / "approach.csv").read_text().startswith("block,approach,start,seed,x_m")
     for name in ("errors.png", "paths.png", "time.png"):
         assert (tmp_path / name).read_bytes()[:4] == b"\x89PNG"
-    assert "X-Y-Z mm" in ended.output + capfd.readouterr().out
+    told = ended.output + capfd.readouterr().out
+    assert "X-Y-Z mm" in told
+    assert "a cycle of the servo's tracking takes" in told
 
 
 def test_the_shipped_tables_are_what_the_command_makes(tmp_path: Path) -> None:
