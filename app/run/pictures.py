@@ -19,7 +19,7 @@ class PictureParameters:
     """How many pictures are kept."""
 
     quality: int = 80  # of JPEG, 0 to 100
-    every: float = 0.5  # simulated s between two pictures of a camera, at least
+    every: float = 0.5  # simulated s between two pictures of a camera at events, at least
     longest_gap: float = 2.0  # s without an event after which a picture is kept all the same
     newest: float = 0.1  # s: what was found in a frame so long before still lies about there; choice
     max_bytes: int = 3_000_000  # of all pictures of a run; later ones are left out
@@ -36,7 +36,8 @@ class Pictures:
     ) -> None:
         self._folder, self._world, self._parameters = folder and folder / PICTURES, world, parameters
         self._event, self._urgent = "", False  # urgent: a failure or a warning, of which a picture is always kept
-        self._taken: dict[str, tuple[int, float]] = {}  # of a camera: frame number, second
+        # Of a camera: its last picture's frame number and second, and the second of its last at an event
+        self._taken: dict[str, tuple[int, float, float]] = {}
         self._bytes = 0
 
     def note(self, values: Mapping[str, Any]) -> None:
@@ -52,19 +53,19 @@ class Pictures:
         `outlines` tells what was found in a camera's frames.
         """
         now = self._world.now()
-        quiet = now - max((at for _, at in self._taken.values()), default=0.0) >= self._parameters.longest_gap
-        event, self._event = self._event or ("no event" if quiet else ""), ""
+        quiet = now - max((at for _, at, _ in self._taken.values()), default=0.0) >= self._parameters.longest_gap
+        of_event, event, self._event = bool(self._event), self._event or ("no event" if quiet else ""), ""
         urgent, self._urgent = self._urgent, False
         if not event or self._folder is None:
             return
         for name, camera in self._world.cameras.items():
-            number, at = self._taken.get(name, (-1, float("-inf")))
-            frame = camera.latest() if urgent or now - at >= self._parameters.every else None
+            number, _, last = self._taken.get(name, (-1, 0.0, float("-inf")))
+            frame = camera.latest() if urgent or now - last >= self._parameters.every else None
             if frame is None or frame.number == number:
                 continue
             settings = [cv2.IMWRITE_JPEG_QUALITY, self._parameters.quality]
             data = cv2.imencode(".jpg", cv2.cvtColor(frame.rgb, cv2.COLOR_RGB2BGR), settings)[1].tobytes()
-            self._taken[name] = frame.number, now
+            self._taken[name] = frame.number, now, now if of_event else last
             self._bytes += len(data)
             if self._bytes > self._parameters.max_bytes:
                 return
