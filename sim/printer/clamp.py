@@ -109,14 +109,13 @@ class SimClamp:
             )
 
     def _may_sleep(self, may: bool) -> None:
-        """Let jaws and plate sleep, or keep them awake, from now on; either wakes them (a new motor speed does not)."""
-        states = p.ACTIVATION_STATE_WAKE_UP, p.ACTIVATION_STATE_ENABLE_SLEEPING, p.ACTIVATION_STATE_DISABLE_SLEEPING
-        wake, enable, disable = states
+        """Let jaws and plate sleep while they rest, or keep them awake, which wakes them (a motor's speed does not)."""
+        state = p.ACTIVATION_STATE_ENABLE_SLEEPING if may else p.ACTIVATION_STATE_DISABLE_SLEEPING
         for body, link in ((self._plate, -1), *((self.body, link) for link in (-1, *self.jaws))):
             p.changeDynamics(
                 body,
                 link,
-                activationState=wake | (enable if may else disable),
+                activationState=state,
                 sleepThreshold=self._rest**2,
                 physicsClientId=self._client,
             )

@@ -258,11 +258,14 @@ def test_a_part_on_a_plate_at_rest_in_the_clamp_comes_off_at_its_load(
     assert part.bond.holds == stays
 
 
-def test_what_the_clamp_holds_sleeps_until_a_body_touches_it(engine: Engine, part: SimPart, clamped: SimClamp) -> None:
+def test_what_the_clamp_holds_sleeps_until_a_body_touches_it(
+    cell: PrinterCell, engine: Engine, part: SimPart, clamped: SimClamp
+) -> None:
     part.take_away()
     loaded(engine, part, part.plate, (0.0, 0.0, 0.0), seconds=5.0)
     before = part.pose(part.plate).translation
-    loaded(engine, part, part.plate, (0.0, 0.0, 0.0), seconds=1.0)
+    bears = 2.0 * cell.hidden.printer.plate_friction * cell.hidden.printer.clamp_force
+    loaded(engine, part, part.plate, (2.0 * bears, 0.0, 0.0), seconds=0.2)  # which would draw it out if it were awake
     assert np.array_equal(part.pose(part.plate).translation, before)
     assert clamped.presses(part.plate)
     ball = p.createCollisionShape(p.GEOM_SPHERE, radius=0.02, physicsClientId=engine.client)
